@@ -24,6 +24,7 @@ _INPUTS = {
     "case": "the case file",
     "reference": "the reference mesh",
     "table": "the table of designs",
+    "designs": "the table of designs",
 }
 """Words for the input files of a command line, by the name of their argument."""
 REPLACED = "there already, and replaced by this run"

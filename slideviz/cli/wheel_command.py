@@ -67,13 +67,14 @@ def wheel(arguments: argparse.Namespace) -> int:
 
 
 def _wheel(arguments: argparse.Namespace) -> int:
-    from dataclasses import asdict
+    from dataclasses import fields
 
     from slideviz import read
     from slideviz import wheel as wheel_of
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.report import save_json
-    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
+    from slideviz.cli.run_outcome import report_limits
+    from slideviz.cli.terminal import INVERTED
 
     case = read_case(arguments)
     mesh_file = require_mesh_file(arguments, case)
@@ -93,11 +94,17 @@ def _wheel(arguments: argparse.Namespace) -> int:
             designs=arguments.designs,
             progress=bar,
         )
-    report = asdict(made) | {"path": str(made.path)}
+    limits = limits_report(made.limits)
+    changed = {"path": str(made.path), "limits": limits, "warnings": list(made.warnings)}
+    report = {field.name: getattr(made, field.name) for field in fields(made)} | changed
     if not save_json(arguments.json, report) and not arguments.quiet:
         turn = "a whole turn" if made.is_closed else f"{made.passages * made.period:.6g}°"
         print(f"{made.path}: {made.passages} passages of {made.period:.6g}°, {turn}")
         print(f"  {made.cells:,} cells   {made.points:,} points")
         print(f"  quality: lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted")
         print(f"  boundaries: {', '.join(made.boundaries)}")
-    return INVERTED if made.inverted else DONE
+        if limits:
+            print(f"limits:\n{limit_lines(limits)}")
+    print_remarks(made.warnings, quiet=arguments.quiet)
+    code = report_limits(limits)
+    return INVERTED if made.inverted else code

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from slideviz.argument_types import check_types
+from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import Table, read_designs
 from slideviz.errors import CaseError
@@ -48,6 +49,10 @@ class WheelQuality:
     """`inverted`, `unproven`: numbers of cells."""
     gap: float
     """Largest distance of nodes of neighboring passages that became one, in the mesh's unit."""
+    limits: tuple[LimitResult, ...] = ()
+    """The limits of the case, met or not, for each passage that moves in another way."""
+    warnings: tuple[str, ...] = ()
+    """What the runs of the passages warn of."""
 
 
 @check_types
@@ -133,16 +138,21 @@ def wheel(
     if len(rows) > count:
         raise CaseError(f"the table has {len(rows)} rows for {count} passages; one for each")
     cases = [*(row.case for row in rows), *[case] * (len(rows) < count)]
-    meshes, measured = [], []
+    meshes, measured, limits, warnings = [], [], list[LimitResult](), list[str]()
     for each in cases:
-        points = _deformed(each, mesh, progress).points
+        points = mesh.points
+        if each.motions:
+            *_, last = deform(each, mesh, progress)
+            points = last.mesh.points
+            warnings += last.warnings
         meshes.append(Mesh(points, base.cells, base.markers, name=base.name))
         measured.append(quality(meshes[-1], base, case.quality_metric))
-    last = len(cases) - 1  # of which all further passages are copies
-    whole = Wheel([meshes[min(k, last)] for k in range(count)], pairs, numbered)
+        limits += check_case_limits(each, measured[-1], meshes[-1], base)
+    end = len(cases) - 1  # of which all further passages are copies
+    whole = Wheel([meshes[min(k, end)] for k in range(count)], pairs, numbered)
     gap, content = whole.require_meeting(), whole.content()
     write_content(Path(path), content)
-    qualities = [measured[min(k, last)] for k in range(count)]
+    qualities = [measured[min(k, end)] for k in range(count)]
     return WheelQuality(
         path=Path(path),
         passages=count,
@@ -156,12 +166,6 @@ def wheel(
         inverted=sum(one.inverted for one in qualities),
         unproven=sum(one.unproven for one in qualities),
         gap=gap,
+        limits=tuple(limits),
+        warnings=tuple(dict.fromkeys(warnings)),
     )
-
-
-def _deformed(case: Case, mesh: Mesh, progress: Callable[[Progress], None] | None) -> Mesh:
-    """Return the mesh after all steps of a case; the same mesh where nothing moves."""
-    if not case.motions:
-        return mesh
-    *_, last = deform(case, mesh, progress)
-    return last.mesh

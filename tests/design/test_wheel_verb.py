@@ -80,3 +80,16 @@ def test_the_command_writes_and_reports_it(tmp_path, capsys, monkeypatch):
     assert (report["passages"], report["is_closed"]) == (2, False)
     assert {"per1", "per2"} <= set(report["boundaries"])
     assert run(["wheel", "a.cfg", "-o", "mesh.su2"]) == 1  # its own input
+    limited = ["wheel", "a.cfg", "-o", "c.su2", "--set", "LIMITS=( aspect_ratio < 1.001 )"]
+    assert run(limited) == 4
+    assert "the limit aspect_ratio < 1.001 is not met" in capsys.readouterr().err
+
+
+def test_it_has_the_warnings_of_its_runs(tmp_path):
+    mesh = passage((2, 6, 6), 40.0)
+    reduction = sv.Reduction(tolerance=0.1)
+    case = case_of(periodic="moving", sliding="ps", reduction=reduction)
+    *_, last = sv.deform(case, mesh)
+    made = sv.wheel(tmp_path / "wheel.su2", case, mesh)
+    assert last.warnings
+    assert set(made.warnings) == set(last.warnings)
