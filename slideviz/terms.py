@@ -384,7 +384,7 @@ Metric = Literal[
     "smallest-angle",
     "largest-angle",
     "aspect-ratio",
-    "safe-fraction",
+    "straight-margin",
 ]
 WallValue = Literal[
     "first-height", "height-ratio", "growth", "equal-layers", "wall-angle", "angle-change"
@@ -515,9 +515,10 @@ METRICS: dict[Metric, MetricTerm] = {
     "aspect-ratio": MetricTerm(
         "aspect ratio", "Longest over shortest edge of the cell.", range=(1.0, inf), best="low"
     ),
-    "safe-fraction": MetricTerm(
-        "safe fraction",
-        "How many times as far the cell may go, straight on, before it folds. Below 1 it does.",
+    "straight-margin": MetricTerm(
+        "margin on the straight line",
+        "How many times as far its nodes may go on straight lines from the undeformed mesh, until "
+        "it folds.",
         range=(0.0, FARTHEST),
         limit=1.0,
         compares=True,

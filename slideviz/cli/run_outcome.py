@@ -208,7 +208,8 @@ def _print_run(
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
     if (safe := SafeFraction.of_report(report)) is not None:
-        print(f"  {safe.words}")
+        mended = bool(mended and mended["nodes_moved"])
+        print(f"  {safe.words}{safe.ending(found.inverted, mended)}")
     if report["limits"]:
         print(f"limits:\n{limit_lines(report['limits'])}")
     if rated := report.get("metrics"):

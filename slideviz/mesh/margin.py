@@ -137,6 +137,17 @@ class SafeFraction:
             return f"the undeformed mesh is not valid: {who}"
         return f"the motion {reach_words(self.fraction)}, until {who} folds"
 
+    def ending(self, inverted: int, mended: bool) -> str:
+        """Return the end of a sentence with `words`: that a cell which folds on the way unfolds.
+
+        It is "" where that is not so. ``inverted``: the cells at the end of the run. ``mended``:
+        whether cells were repaired.
+        """
+        if inverted or not 0 < self.fraction < 1:
+            return ""
+        repair = "after repair " if mended else ""
+        return f" in step {self.step}; {repair}no cell is inverted at the end"
+
     def report(self) -> dict[str, object]:
         """Return the keys of a report: ``safe_fraction``, ``safe_cell`` and so on."""
         return {f"safe_{name}": value for name, value in asdict(self).items()}

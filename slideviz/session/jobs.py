@@ -22,6 +22,7 @@ from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -366,6 +367,12 @@ def repair(
         report(JobProgress(f"Repair: {PHASES['repair']}", getattr(now, "fraction", 0.0)))
 
     step = mended_frame(case, mesh, last.step, progress)
+    if step.safe is not None:  # the last straight way now ends at the mended mesh
+        before, done = mesh, 0.0
+        if earlier and earlier[-1].step is not None:
+            before, done = earlier[-1].mesh, earlier[-1].step.part
+        safe = step_safety(before, step.mesh, mesh, (done, step.part), step.index)
+        step = replace(step, safe=safe)
     for frame in earlier:
         report(frame)
     undeformed = mesh if last.step is not None else None

@@ -62,11 +62,20 @@ def end_message(run: Run) -> str:
     done, reach = "; ".join(filter(None, (bad, repair_words(run)))), ""
     if run.safe is not None and run.safe.fraction > 0:
         reach = f"the motion {reach_words(run.safe.fraction)}"
+        if ending := path_ending(run):
+            reach += f", until a cell folds{ending}"
         if run.safe.cell is None:
             reach = run.safe.words
     if done:
         return f"Done: {done}; {reach}." if reach else f"Done: {done}."
     return f"Done. {reach[:1].upper()}{reach[1:]}." if reach else "Done."
+
+
+def path_ending(run: Run) -> str:
+    """Return what follows the words of how far a run may go, of `SafeFraction.ending`."""
+    if run.last is None or run.safe is None:
+        return ""
+    return run.safe.ending(run.last.quality.inverted, bool(repair_words(run)))
 
 
 def repair_words(run: Run) -> str:

@@ -16,17 +16,19 @@ from slideviz.solver.steps import safe_fraction_of
 def safe_fraction(deformed: Mesh | Case, reference: Mesh) -> SafeFraction:
     """Return how far a motion may go until the first cell is no longer proved valid.
 
-    On the way from a mesh to a deformed one each node goes straight on. All cells are proved valid
-    at each point of this way below the returned ``fraction``: 1 is the deformed mesh, and beyond it
-    nodes go straight on, up to 10 times as far. For triangles, quadrilaterals, tetrahedra and
-    pyramids the fraction is exact, for prisms and hexahedra at most 0.2 % too small as a rule. See
-    the metric ``safe-fraction`` for the fraction of each cell.
+    On the way from a mesh to a deformed one each node goes straight on; in a run, in each step. All
+    cells are proved valid at each point of this way below the returned ``fraction``: 1 is the
+    deformed mesh, and beyond it nodes go straight on, up to 10 times as far. For triangles,
+    quadrilaterals, tetrahedra and pyramids the fraction is exact, for prisms and hexahedra at most
+    0.2 % too small as a rule. The metric ``straight-margin`` has the number of each cell on
+    straight lines between two meshes.
 
     Parameters
     ----------
     deformed : Mesh or Case
-        The deformed mesh, or a case that is run. Each step of a run is a straight way; the fraction
-        is of the whole motion, and beyond 1 the last step goes straight on.
+        The deformed mesh, or a case that is run. Each step of a run is a straight way, to its
+        repaired mesh where REPAIR mends it; the fraction is of the whole motion, and beyond 1 the
+        last step goes straight on. So it can differ from that of the run's deformed mesh.
     reference : Mesh
         The undeformed mesh.
 

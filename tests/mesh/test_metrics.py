@@ -10,7 +10,7 @@ from slideviz.mesh.metrics import metric, metrics
 from slideviz.terms import FARTHEST, METRICS
 from tests.builders import grid
 
-FREE = "safe-fraction"
+FREE = "straight-margin"
 
 
 def test_the_unit_square_grid_has_the_numbers_that_one_counts():

@@ -77,6 +77,17 @@ def test_the_curve_ends_where_the_first_cell_folds(session):
     assert f"he motion {reach_words(found.safe.fraction)}." in end_message(run)
 
 
+def test_after_a_repair_the_path_ends_at_the_repaired_mesh(session):
+    run, mesh, found = session.run_shown, session.frames[0].mesh, []
+    jobs.repair(run.case, mesh, run.frames, found.append, lambda: False)
+    frames = [one for one in found if isinstance(one, StepFrame)]
+    (*_, whole) = sv.deform(run.case.change(repair="yes"), mesh, certify=True)
+    assert frames[-1].step.safe == whole.safe
+    assert frames[-1].step.safe.fraction > 1
+    if run.safe.fraction < 1:
+        assert run.safe != whole.safe
+
+
 def test_what_is_typed_is_compared_with_the_run(session):
     safe = session.run_shown.safe.fraction
     assert typed_words(session) == f"By run 1, it {reach_words(safe)}."

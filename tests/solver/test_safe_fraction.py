@@ -34,7 +34,7 @@ def test_a_motion_that_folds_is_safe_up_to_the_first_cell(square):
     assert safe.where == pytest.approx(mesh.points[nodes].mean(axis=0))
     assert sv.safe_fraction(case, mesh) == safe
     assert safe.words.startswith(f"the motion is safe up to {100 * safe.fraction:.0f}"[:-1])
-    values = sv.metrics(step.mesh, ["safe-fraction"], mesh)["safe-fraction"]
+    values = sv.metrics(step.mesh, ["straight-margin"], mesh)["straight-margin"]
     assert (values.min, values.worst_at) == (safe.fraction, safe.cell)
 
 
@@ -58,6 +58,32 @@ def test_the_chain_ends_with_the_step_that_folds():
     one, two, three = (SafeFraction(f, 7, step=k) for k, f in enumerate((0.9, 0.6, 3.0), 1))
     assert chain([(0.5, one), (1.0, three)]) == three
     assert chain([(0.5, one), (0.7, two), (1.0, three)]) == two
+
+
+def test_a_repaired_run_has_the_number_of_its_path_with_the_repair(square):
+    mesh, case = square
+    (step,) = sv.deform(case.change(repair="yes"), mesh, certify=True)
+    assert step.safe == sv.safe_fraction(step.mesh, mesh)
+    assert step.safe.fraction > 1 > sv.safe_fraction(case, mesh).fraction
+
+
+def test_after_several_steps_the_straight_margin_says_how_far_all_is_scaled(square):
+    mesh, case = square
+    *_, last = sv.deform(case.change(steps=4), mesh)
+    run = sv.safe_fraction(case.change(steps=4), mesh).fraction
+    straight = sv.metrics(last.mesh, ["straight-margin"], mesh)["straight-margin"].min
+    assert run > straight
+    for scale, folds in ((0.999 * straight, False), (1.001 * straight, True), (0.999 * run, True)):
+        way = scale * (last.mesh.points - mesh.points)
+        assert bool(len(inverted(mesh.with_points(mesh.points + way), mesh))) == folds
+
+
+def test_words_say_that_a_cell_which_folds_on_the_way_unfolds():
+    safe = SafeFraction(0.835, 256, "quadrilateral", (0.0, 0.0), step=2)
+    assert safe.ending(0, True) == " in step 2; after repair no cell is inverted at the end"
+    assert safe.ending(0, False) == " in step 2; no cell is inverted at the end"
+    assert safe.ending(3, True) == SafeFraction(1.1, 3).ending(0, True) == ""
+    assert SafeFraction(0.0, 3).ending(0, False) == ""
 
 
 def test_nothing_folds_where_nothing_changes_shape():
@@ -96,8 +122,8 @@ def test_without_a_limit_it_is_more_than_the_largest():
 
 
 def test_a_reference_is_needed_and_must_have_the_same_cells(square):
-    with pytest.raises(CaseError, match="safe-fraction compares with the undeformed mesh"):
-        sv.metrics(square[0], ["safe-fraction"])
-    assert "safe-fraction" not in sv.metrics(square[0])
+    with pytest.raises(CaseError, match="straight-margin compares with the undeformed mesh"):
+        sv.metrics(square[0], ["straight-margin"])
+    assert "straight-margin" not in sv.metrics(square[0])
     with pytest.raises(MeshError, match="cannot be the reference"):
         sv.safe_fraction(square[0], grid((2, 2)))

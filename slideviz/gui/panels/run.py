@@ -24,6 +24,7 @@ from slideviz.session.run_messages import (
     inverted_words,
     limits_words,
     notes_of,
+    path_ending,
     remedy_for,
     run_requirements,
 )
@@ -122,7 +123,8 @@ class RunPanel(Panel):
                 self._remedy = (run, session.folding, remedy)
             lines = [self._remedy[2], *notes] if bad else list(notes)
             if run.safe is not None:
-                lines.append(f"{run.safe.words[:1].upper()}{run.safe.words[1:]}.")
+                words = run.safe.words
+                lines.append(f"{words[:1].upper()}{words[1:]}{path_ending(run)}.")
             self.text.setToolTip(wrapped("\n".join(lines)))
         elif run is session.runs[-1] and run.panels != session.case:
             self._show_ready("Settings changed since the last run.", session)
