@@ -720,6 +720,10 @@ def test_quality_checks_limits(square, tmp_path, capsys):
     assert run(["quality", mesh, "--stream", "--limits", "skew > 1"]) == 1
     assert run(["quality", mesh, "--limits", "mni > 1"]) == 2
     assert "did you mean min?" in capsys.readouterr().err
+    assert run(["quality", mesh, "--limits", " "]) == 2
+    assert run(["quality", mesh, "-o", str(tmp_path / "rated.su2")]) == 1
+    assert "use .vtu, .vtkhdf or .csv" in capsys.readouterr().err
+    assert not (tmp_path / "rated.su2").exists()
 
 
 def test_layers_are_in_reports_and_summaries(channel, tmp_path, capsys):

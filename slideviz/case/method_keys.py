@@ -436,9 +436,10 @@ METHOD_ROWS = (
     setting(
         "REPAIR_BELOW",
         METHOD,
-        real(0.0, 1.0),
+        real(0.0, 1.0, with_low=True),
         "repair_below",
-        "The quality below which REPAIR mends valid cells, too.",
+        "The quality below which REPAIR mends valid cells, too; with 0 it mends only those that "
+        "are not proved valid.",
         label="Repair below",
         form="more",
         tip="The quality below which valid cells are mended, too.",

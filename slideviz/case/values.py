@@ -103,16 +103,21 @@ def integer(low: int) -> Kind:
     return Kind(allowed, read, str, entry="whole", span=(low, LARGEST_WHOLE))
 
 
-def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
-    """Return the kind of numbers above ``low`` and below ``high`` (or equal to it, if closed)."""
-    allowed = f"a number above {low:g}"
+def real(
+    low: float, high: float | None = None, closed: bool = False, with_low: bool = False
+) -> Kind:
+    """Return the kind of numbers above ``low`` and below ``high`` (or equal to it, if closed).
+
+    ``with_low``: or equal to ``low``.
+    """
+    allowed = f"a number {'of at least' if with_low else 'above'} {low:g}"
     if high is not None:
         allowed += f" {'up to' if closed else 'and below'} {high:g}"
 
     def read(text: str) -> float:
         value = number(text)
         too_large = high is not None and (value > high or (value == high and not closed))
-        if value <= low or too_large:
+        if value < low or (value == low and not with_low) or too_large:
             raise CaseError(f"{text} is out of range; expected {allowed}")
         return value
 

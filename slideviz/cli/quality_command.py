@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
-from slideviz.formats.table import own_endings
+from slideviz.formats.table import holds_quality, own_endings
 from slideviz.terms import METRICS, RATED, SKEW_METRICS, field_of
 
 if TYPE_CHECKING:
@@ -61,9 +61,12 @@ def limits(text: str) -> tuple[Limit, ...]:
     from slideviz.errors import CaseError
 
     try:
-        return read_limits(text)
+        found = read_limits(text)
     except CaseError as problem:
         raise argparse.ArgumentTypeError("; ".join(str(problem).splitlines())) from None
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} has no limit; expected one, as min > 0.3")
+    return found
 
 
 def quality(arguments: argparse.Namespace) -> int:
@@ -75,6 +78,7 @@ def quality(arguments: argparse.Namespace) -> int:
     from slideviz.case.limits import MeasuredMesh, check_limits
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.errors import CaseError
     from slideviz.formats.files import metric_data, quality_data
 
     output = arguments.output
@@ -86,6 +90,11 @@ def quality(arguments: argparse.Namespace) -> int:
         OutputPath(output, "-o", is_mesh=not is_table),
         OutputPath(arguments.json, "--json"),
     )
+    if output is not None and not is_table and not holds_quality(output):
+        raise CaseError(
+            f"-o {output}: that format has no quality of cells; use "
+            f"{own_endings('quality')} or .csv"
+        )
     with open_mesh(arguments, case) as opened:
         if opened.reference is None and arguments.metrics == tuple(RATED):
             arguments.metrics = tuple(k for k, term in RATED.items() if not term.compares)
@@ -100,10 +109,9 @@ def quality(arguments: argparse.Namespace) -> int:
         cells, points = metric_data(values, layers, arguments.metrics)
         if is_table:
             _write_csv(output, found, cells)
-        elif output and (data := quality_data(output, found)) is not None:
-            write(output, mesh, cell_data=data | cells, point_data=points)
         elif output:
-            write(output, mesh)
+            data = quality_data(output, found) or {}
+            write(output, mesh, cell_data=data | cells, point_data=points)
         return _report(arguments, opened, found, values, layers, results)
 
 

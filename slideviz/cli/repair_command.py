@@ -34,10 +34,10 @@ def add_repair(calls: argparse._SubParsersAction) -> None:
         call.add_argument(f"--{role}", type=_names, default=(), metavar="A,B", help=what)
     call.add_argument(
         "--below",
-        type=float,
+        type=_below,
         default=0.1,
         metavar="Q",
-        help="mend valid cells of a lower quality, too (0.1)",
+        help="mend valid cells of a lower quality, too (0.1); 0: only those not proved valid",
     )
     call.add_argument(
         "--target",
@@ -58,6 +58,17 @@ def add_repair(calls: argparse._SubParsersAction) -> None:
 def _names(text: str) -> tuple[str, ...]:
     """Return the names of a text, separated by commas."""
     return tuple(filter(None, (name.strip() for name in text.split(","))))
+
+
+def _below(text: str) -> float:
+    """Return the value of a text as of the key REPAIR_BELOW."""
+    from slideviz.case.keys import KEYS
+    from slideviz.errors import CaseError
+
+    try:
+        return float(KEYS["REPAIR_BELOW"].kind.read(text))
+    except CaseError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
 
 
 def repair(arguments: argparse.Namespace) -> int:

@@ -99,7 +99,8 @@ def _wheel(arguments: argparse.Namespace) -> int:
     report = {field.name: getattr(made, field.name) for field in fields(made)} | changed
     if not save_json(arguments.json, report) and not arguments.quiet:
         turn = "a whole turn" if made.is_closed else f"{made.passages * made.period:.6g}°"
-        print(f"{made.path}: {made.passages} passages of {made.period:.6g}°, {turn}")
+        passages = "1 passage" if made.passages == 1 else f"{made.passages} passages"
+        print(f"{made.path}: {passages} of {made.period:.6g}°, {turn}")
         print(f"  {made.cells:,} cells   {made.points:,} points")
         print(f"  quality: lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted")
         print(f"  boundaries: {', '.join(made.boundaries)}")

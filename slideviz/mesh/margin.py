@@ -135,7 +135,8 @@ class SafeFraction:
             return f"the motion could go more than {self.fraction:g} times as far"
         if self.fraction <= 0:
             return f"the undeformed mesh is not valid: {who}"
-        return f"the motion {reach_words(self.fraction)}, until {who} folds"
+        until = ": next," if 1 <= self.fraction < 1.01 else ", until"
+        return f"the motion {reach_words(self.fraction)}{until} {who} folds"
 
     def ending(self, inverted: int, mended: bool) -> str:
         """Return the end of a sentence with `words`: that a cell which folds on the way unfolds.
@@ -164,6 +165,8 @@ def reach_words(fraction: float) -> str:
     """Return in few words how far a motion may go, rounded down."""
     if fraction >= 1.01:
         return f"could go {floor(100 * fraction) / 100:.3g} times as far"
+    if fraction >= 1:
+        return "is safe, but could hardly go farther"
     return f"is safe up to {floor(1000 * fraction) / 10:g} %"
 
 

@@ -29,6 +29,9 @@ _KINDS: dict[PeriodicType, tuple[PeriodicKind, ...]] = {
     "rotational": ("rotational",),
 }
 """Kinds of transformation to try, in that order, by ``PERIODIC_TYPE``."""
+
+CHECK_PERIODIC = "check the markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
+"""What to do about markers that do not match, in a case."""
 _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 """Axes of rotation that `find_pairs` tries, in that order."""
 
@@ -105,8 +108,7 @@ def match(
     worst, best = min(tried, key=itemgetter(0))
     raise MeshError(
         f"{where}: with the best {best.kind} transformation ({best.describe()}) a node is "
-        f"{worst:.3g} from its image, allowed is {allowed:.3g}; check the markers, PERIODIC_TYPE, "
-        "PERIODIC_AXIS and PERIODIC_ORIGIN"
+        f"{worst:.3g} from its image, allowed is {allowed:.3g}; {CHECK_PERIODIC}"
     )
 
 

@@ -7,7 +7,7 @@ copies do. Here a boundary with the role internal is one to slide on: its nodes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import nan
 
@@ -20,11 +20,11 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.elastic.conditions import conditions
-from slideviz.errors import CaseError
+from slideviz.errors import MeshError, not_one_of
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
-from slideviz.mesh.periodic import find_pairs, pair_up
+from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Repaired
@@ -36,7 +36,9 @@ from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.system.threads import Tick
-from slideviz.terms import RepairTarget, Role, SkewMetric
+from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, RepairTarget, Role, SkewMetric
+
+_NO_IMAGES = "they are no images of each other; name two that are"
 
 
 @check_types
@@ -65,7 +67,7 @@ def repair(
         are not named stay.
     below
         Valid cells are mended, too, if their quality is below this, and below that of all cells of
-        the reference.
+        the reference. With 0 only cells that are not proved valid are mended.
     target
         The shapes that mended cells shall have: those of the reference, or the ideal ones in the
         local size. By default those of the reference, if there is one.
@@ -77,7 +79,8 @@ def repair(
     Raises
     ------
     CaseError
-        The mesh has no such boundary, or one is named twice; ``below`` is not from 0 to 1.
+        The mesh has no such boundary, one is named twice, or periodic ones are no pairs; ``below``
+        is below 0 or not below 1; another target or metric, or the reference's without one.
     MeshError
         Periodic boundaries do not match, or the reference has other cells.
 
@@ -95,9 +98,18 @@ def repair(
     >>> mended.nodes
     array([4])
     """
-    case = _case_alone(mesh, fixed, sliding, periodic, below)
+    problems = [
+        f"{name}: {not_one_of(value, known)}"
+        for name, value, known in (
+            ("target", target or "ideal", REPAIR_TARGETS),
+            ("metric", metric, SKEW_METRICS),
+        )
+        if value not in known
+    ]
     if target == "reference" and reference is None:
-        raise CaseError("target: 'reference' needs the undeformed mesh; give it, or take 'ideal'")
+        problems.append("target: 'reference' needs the undeformed mesh; give it, or take 'ideal'")
+    lists: dict[Role, Sequence[str]] = {"fixed": fixed, "sliding": sliding, "periodic": periodic}
+    case = _case_alone(mesh, lists, below, problems)
     if reference is not None:
         reference = checked_reference(reference, mesh)
     report = progress or (lambda _: None)
@@ -108,14 +120,9 @@ def repair(
 
 
 def _case_alone(
-    mesh: Mesh,
-    fixed: Sequence[str],
-    sliding: Sequence[str],
-    periodic: Sequence[str],
-    below: float,
+    mesh: Mesh, lists: Mapping[Role, Sequence[str]], below: float, problems: Sequence[str]
 ) -> Case:
-    """Return the case of a repair without motion."""
-    lists: dict[Role, Sequence[str]] = {"fixed": fixed, "sliding": sliding, "periodic": periodic}
+    """Return the case of a repair without motion; CaseError with all mistakes and ``problems``."""
     roles: dict[str, Role] = {}
     for role, names in lists.items():
         roles |= {name: role for name in names if name not in roles}
@@ -125,19 +132,24 @@ def _case_alone(
         for name in names
         if roles[name] != role
     )
-    raise_all((*twice, *unknown_markers(mesh, roles)))
     case = Case(roles=roles, repair="yes", repair_below=below)
-    if sliding or periodic:
+    wrong = (text.replace("REPAIR_BELOW", "below") for text in key_problems(case))
+    periodic = case.markers_with("periodic")
+    odd = f"periodic: {', '.join(periodic)}; boundaries repeat in pairs, so name both of each"
+    raise_all(
+        (*problems, *twice, *unknown_markers(mesh, roles), *wrong, *[odd] * (len(periodic) % 2))
+    )
+    if lists["sliding"] or periodic:
         case = case.change(sliding="ps")
     if periodic:
         case = case.change(periodic="moving")
         for pair in find_pairs(mesh):
             if pair.first in periodic and pair.second in periodic:
                 case = case.change(axis=pair.axis, origin=pair.origin)
-        pair_up(
-            without_halo(mesh)[0], case.markers_with("periodic"), "auto", case.axis, case.origin
-        )
-    raise_all(tuple(text.replace("REPAIR_BELOW", "below") for text in key_problems(case)))
+        try:
+            pair_up(without_halo(mesh)[0], periodic, "auto", case.axis, case.origin)
+        except MeshError as problem:
+            raise MeshError(str(problem).replace(CHECK_PERIODIC, _NO_IMAGES)) from None
     return case
 
 

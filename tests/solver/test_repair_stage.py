@@ -223,8 +223,28 @@ def test_wrong_requests_are_refused():
         sv.repair(mesh, target="reference")
     with pytest.raises(MeshError, match="must have the same cells"):
         sv.repair(mesh, builders.square(4))
-    with pytest.raises(MeshError, match="do not match"):
-        sv.repair(mesh, periodic=["x_m", "BLOCK"])
+    with pytest.raises(MeshError, match=r"do not match: .*; name two that are|same nodes") as found:
+        sv.repair(mesh, periodic=["x_m", "y_p"])
+    assert "PERIODIC_" not in str(found.value)
+    for name in ("target", "metric"):
+        with pytest.raises(CaseError, match=f"{name}: 'foo' is not one of "):
+            sv.repair(mesh, mesh, **{name: "foo"})
+
+
+def test_all_mistakes_are_told_at_once():
+    with pytest.raises(CaseError) as found:
+        sv.repair(
+            builders.square(6), fixed=["foo"], periodic=["x_m"], below=-1.0, target="reference"
+        )
+    lines = str(found.value).splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["target", "fixed", "below", "periodic"]
+
+
+def test_below_0_only_cells_that_are_not_valid_are_mended():
+    mesh = scrambled(builders.square(6, block=False), 0.1)
+    assert 0 < sv.quality(mesh).min < 0.9
+    assert not len(sv.repair(mesh, below=0).cells)
+    assert len(sv.repair(mesh, below=0.9).cells)
 
 
 def test_the_command_mends_a_file_and_reports(tmp_path, capsys):
@@ -245,6 +265,9 @@ def test_the_command_mends_a_file_and_reports(tmp_path, capsys):
     assert run([*words, "--sliding", "wall"]) == 1
     assert "no marker 'wall'" in capsys.readouterr().err
     assert run([*words[:2], "-o", str(tmp_path / "bad.su2")]) == 1
+    for value in ("2", "1", "nan", "-0.1", "x"):
+        assert run([*words, "--below", value]) == 2, value
+        assert "argument --below: " in capsys.readouterr().err
 
 
 def test_the_command_says_which_cells_are_left(tmp_path, capsys):

@@ -102,11 +102,15 @@ def test_an_undeformed_mesh_that_is_not_valid_is_not_safe(square):
     assert safe.words.startswith("the undeformed mesh is not valid: cell 1 (quadrilateral) at (0.")
 
 
+HARDLY = "is safe, but could hardly go farther"
+
+
 @pytest.mark.parametrize(
     ("fraction", "words"),
     [
         (0.62999, "the motion is safe up to 62.9 %, until cell 7 (prism) at (1, 0.5) folds"),
         (1.8888, "the motion could go 1.88 times as far, until cell 7 (prism) at (1, 0.5) folds"),
+        (1.00099, f"the motion {HARDLY}: next, cell 7 (prism) at (1, 0.5) folds"),
         (0.9999, "the motion is safe up to 99.9 %, until cell 7 (prism) at (1, 0.5) folds"),
     ],
 )
