@@ -160,6 +160,15 @@ def quality(window: MainWindow, place: Path) -> None:
     _look(window, 30.0, 0.0)
 
 
+def wheel(window: MainWindow, place: Path) -> None:
+    """Show all passages of the stator after a run."""
+    _open(window, _stator(place))
+    _run(window, **SLIDING)
+    window.store.change(changes.show_boundaries, OUTER, False)
+    window.store.change(changes.set_view, passages=-1)
+    _look(window, 30.0, 25.0)
+
+
 def section(window: MainWindow, place: Path) -> None:
     """Show a cylindrical section at mid-span, unrolled below the 3D view."""
     _open(window, _stator(place))
@@ -204,6 +213,7 @@ def dark(window: MainWindow, place: Path) -> None:
 STATES = (
     ShotState("roles", roles),
     ShotState("quality", quality),
+    ShotState("wheel", wheel),
     ShotState("section", section),
     ShotState("side-by-side", beside),
     ShotState("dark", dark),

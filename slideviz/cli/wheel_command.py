@@ -10,6 +10,8 @@ from slideviz.cli.options import add_changes, add_shared, integer, read_case, re
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
 
+MOST_NAMES = 20  # boundaries whose names are all printed
+
 
 def add_wheel(calls: argparse._SubParsersAction) -> None:
     """Add the command ``wheel`` to the parser."""
@@ -103,7 +105,9 @@ def _wheel(arguments: argparse.Namespace) -> int:
         print(f"{made.path}: {passages} of {made.period:.6g}°, {turn}")
         print(f"  {made.cells:,} cells   {made.points:,} points")
         print(f"  quality: lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted")
-        print(f"  boundaries: {', '.join(made.boundaries)}")
+        names = made.boundaries
+        few = names if len(names) <= MOST_NAMES else (names[0], "…", names[-1])
+        print(f"  {len(names)} boundaries: {', '.join(few)}")
         if limits:
             print(f"limits:\n{limit_lines(limits)}")
     print_remarks(made.warnings, quiet=arguments.quiet)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.case.limits import LimitResult, check_case_limits
@@ -15,11 +16,11 @@ from slideviz.case.model import Case
 from slideviz.design.sweeps.table import Table, read_designs
 from slideviz.errors import CaseError
 from slideviz.formats.files import read
-from slideviz.formats.table import write_content
+from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import Mesh
-from slideviz.mesh.periodic import pair_up
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.quality import quality
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
@@ -119,42 +120,71 @@ def wheel(
         if case.mesh_file is None:
             raise CaseError("the case has no MESH_FILENAME; give the mesh")
         mesh = read(case.mesh_file, case.zone, file_format=case.mesh_format)
+    *_, count = _repeated(case, mesh, passages)
+    rows = read_designs(case, designs).rows if designs is not None else ()
+    if len(rows) > count:
+        raise CaseError(f"the table has {len(rows)} rows for {count} passages; one for each")
+    cases = [*(row.case for row in rows), *[case] * (len(rows) < count)]
+    points, warnings = [], list[str]()
+    for each in cases:
+        points.append(mesh.points)
+        if each.motions:
+            *_, last = deform(each, mesh, progress)
+            points[-1] = last.mesh.points
+            warnings += last.warnings
+    made = write_wheel(Path(path), cases, mesh, points, count, numbered, progress)
+    return replace(made, warnings=tuple(dict.fromkeys(warnings)))
+
+
+def _repeated(
+    case: Case, mesh: Mesh, passages: int | Literal["all"]
+) -> tuple[Mesh, tuple[Pair, ...], int]:
+    """Return the passage without halo, its periodic sides, and the number of its copies."""
     names = case.markers_with("periodic")
     if not names:
         raise CaseError("the case has no periodic boundaries; passages are merged at these")
     base = without_halo(mesh)[0]
     known = [name for name in names if len(base.marker(name).cells)]  # halos have none
     pairs = pair_up(base, known, "rotational", case.axis, case.origin)
-    one = Wheel((base,), pairs)
-    count = round(2.0 * np.pi / one.period) if passages == "all" else passages
-    if passages == "all" and abs(count * one.period - 2.0 * np.pi) > 1e-9:
+    period = Wheel((base,), pairs).period
+    count = round(2.0 * np.pi / period) if passages == "all" else passages
+    if passages == "all" and abs(count * period - 2.0 * np.pi) > 1e-9:
         raise CaseError(
-            f"the period is {np.degrees(one.period):.6g}°, which is no whole part of a turn; give "
+            f"the period is {np.degrees(period):.6g}°, which is no whole part of a turn; give "
             "the number of passages"
         )
     if count < 1:
         raise CaseError(f"{count} passages; expected 1 or more, or all")
-    rows = read_designs(case, designs).rows if designs is not None else ()
-    if len(rows) > count:
-        raise CaseError(f"the table has {len(rows)} rows for {count} passages; one for each")
-    cases = [*(row.case for row in rows), *[case] * (len(rows) < count)]
-    meshes, measured, limits, warnings = [], [], list[LimitResult](), list[str]()
-    for each in cases:
-        points = mesh.points
-        if each.motions:
-            *_, last = deform(each, mesh, progress)
-            points = last.mesh.points
-            warnings += last.warnings
-        meshes.append(Mesh(points, base.cells, base.markers, name=base.name))
+    return base, pairs, count
+
+
+def write_wheel(
+    path: Path,
+    cases: Sequence[Case],
+    mesh: Mesh,
+    points: Sequence[FloatArray],
+    passages: int | Literal["all"] = "all",
+    numbered: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> WheelQuality:
+    """Write the wheel of deformed passages; parameters and errors as `wheel`.
+
+    ``cases`` and ``points`` (n, d) of passages, one after the other; those of the last one are
+    repeated.
+    """
+    base, pairs, count = _repeated(cases[-1], mesh, passages)
+    meshes, measured, limits = [], [], list[LimitResult]()
+    for case, moved in zip(cases, points, strict=True):
+        meshes.append(Mesh(moved, base.cells, base.markers, name=base.name))
         measured.append(quality(meshes[-1], base, case.quality_metric))
-        limits += check_case_limits(each, measured[-1], meshes[-1], base)
+        limits += check_case_limits(case, measured[-1], meshes[-1], base)
     end = len(cases) - 1  # of which all further passages are copies
     whole = Wheel([meshes[min(k, end)] for k in range(count)], pairs, numbered)
     gap, content = whole.require_meeting(), whole.content()
-    write_content(Path(path), content)
+    _write(path, content, progress or (lambda _: None))
     qualities = [measured[min(k, end)] for k in range(count)]
     return WheelQuality(
-        path=Path(path),
+        path=path,
         passages=count,
         is_closed=whole.is_closed,
         period=float(np.degrees(whole.period)),
@@ -167,5 +197,24 @@ def wheel(
         unproven=sum(one.unproven for one in qualities),
         gap=gap,
         limits=tuple(limits),
-        warnings=tuple(dict.fromkeys(warnings)),
     )
+
+
+def _write(path: Path, content: ZoneContent, progress: Callable[[Progress], None]) -> None:
+    """Write a wheel, and call ``progress`` after each block."""
+    done = 0.0
+
+    def points(i: int, j: int) -> FloatArray:
+        nonlocal done  # cells come before points, and take as long
+        done = max(done, 0.5 + 0.5 * j / content.n_points)
+        return content.points(i, j)
+
+    def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        nonlocal done
+        done = max(done, 0.5 * j / content.n_cells)
+        return content.cells(i, j)
+
+    def going_on() -> None:
+        progress(Progress(1, 1, "write", done))
+
+    write_content(path, replace(content, points=points, cells=cells), going_on=going_on)

@@ -250,7 +250,12 @@ def write_blocks(path: Path, blocks: Iterable[bytes], options: WriteOptions) -> 
             options.going_on()
 
 
-def write_content(path: Path, content: ZoneContent, replaces: Path | None = None) -> None:
+def write_content(
+    path: Path,
+    content: ZoneContent,
+    replaces: Path | None = None,
+    going_on: Callable[[], None] = lambda: None,
+) -> None:
     """Write a mesh whose parts are made by functions, as SU2's text or binary, whole or not at all.
 
     Raises MeshError if it cannot be written, or a name of a boundary cannot be.
@@ -262,4 +267,4 @@ def write_content(path: Path, content: ZoneContent, replaces: Path | None = None
             f"{' or '.join(endings(lambda one: one.content))}, and convert it afterwards"
         )
     blocks = row.function("content")(content, path.name)
-    write_blocks(path, blocks, WriteOptions({}, {}, replaces))
+    write_blocks(path, blocks, WriteOptions({}, {}, replaces, going_on))

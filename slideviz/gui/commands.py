@@ -26,6 +26,7 @@ from slideviz.gui.widgets.command import (
     has_mesh,
     has_steps,
     has_steps_and_is_idle,
+    has_wheel,
     in_memory,
     is_2d,
     is_3d,
@@ -127,6 +128,11 @@ _FILE = Menu("file", "&File", entries=(
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
             lambda window: window.files.save_mesh(), (KEY.Save,), "save", in_memory(is_idle),
             tip_now=why_not(in_memory(is_idle), "There is no mesh yet: open one first.")),
+    Command("save_wheel", "Save as &wheel…",
+            "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
+            lambda window: window.exports.wheel(), enabled=in_memory(has_wheel),
+            tip_now=why_not(in_memory(has_wheel), "The mesh is no passage of a wheel: two "
+                            "boundaries must be periodic, by a whole part of a turn.")),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
             lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", has_mesh),
@@ -134,7 +140,7 @@ _FILE = Menu("file", "&File", entries=(
     None,
     Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",
             lambda window: window.close(), (KEY.Quit,)),
-))
+), tooltips=True)
 
 _EDIT = Menu("edit", "&Edit", entries=(
     Command("undo", "Undo", "Undo the last change.",

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -40,6 +41,10 @@ from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import private_folder
 from slideviz.system.file_checks import require_regular_file
 from slideviz.terms import CELL_STATES
+
+if TYPE_CHECKING:
+    from slideviz.design.wheel import WheelQuality
+    from slideviz.solver.steps import Progress
 
 _ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
 
@@ -311,7 +316,7 @@ def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
     """Deform the mesh; report every step as a `StepFrame`, and the progress as `JobProgress`."""
-    from slideviz.solver.deform import Progress, deform
+    from slideviz.solver.deform import deform
 
     furthest = 0.0
 
@@ -392,7 +397,6 @@ def compute_in_file(
     that was at ``output`` is as before.
     """
     from slideviz.session.inspect import WORST
-    from slideviz.solver.steps import Progress
     from slideviz.streaming.run import stream
 
     phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
@@ -443,6 +447,30 @@ def save_mesh(
     data = cell_values(frame) if holds_quality(path) else None
     write(path, frame.mesh, overwrite, data, base, lambda: raise_if_cancelled(stopped))
     return path
+
+
+def save_wheel(
+    path: Path,
+    case: Case,
+    mesh: Mesh,
+    frame: StepFrame,
+    passages: int | Literal["all"],
+    numbered: bool,
+    report: Report,
+    stopped: Stopped,
+) -> WheelQuality:
+    """Write the wheel of the mesh of a frame, and return its quality; ``mesh`` is undeformed.
+
+    Other parameters and errors as of `slideviz.design.wheel.wheel`.
+    """
+    from slideviz.design.wheel import write_wheel
+
+    def progress(now: Progress) -> None:
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"Writing {path.name}", now.fraction))
+
+    moved = [frame.mesh.points]
+    return write_wheel(path, [case], mesh, moved, passages, numbered, progress)
 
 
 def cell_values(frame: StepFrame) -> dict[str, FloatArray]:

@@ -37,6 +37,7 @@ from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.session.passages import passages_around
 from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.system.atomic import atomic_write
@@ -217,13 +218,25 @@ def targets(session: Session) -> tuple[Target, ...]:
     return (*moving, *several, *(("",) if len(moving) > 1 else ()))
 
 
-def machine_axis(session: Session) -> Axis | None:
-    """Return the axis of the first rotational pair of periodic boundaries, or None."""
+def machine_pair(session: Session) -> Pair | None:
+    """Return the first rotational pair of periodic boundaries, or None."""
     for pair in session.pairs:
         both = {session.role(pair.first), session.role(pair.second)}
         if pair.kind == "rotational" and both == {"periodic"}:
-            return pair.axis, pair.origin
+            return pair
     return None
+
+
+def machine_axis(session: Session) -> Axis | None:
+    """Return the axis of the first rotational pair of periodic boundaries, or None."""
+    pair = machine_pair(session)
+    return None if pair is None else (pair.axis, pair.origin)
+
+
+def wheel_passages(session: Session) -> int | None:
+    """Return how many passages make the wheel; None without periodic sides of such an angle."""
+    pair = machine_pair(session)
+    return None if pair is None else passages_around(pair)
 
 
 def box_names(session: Session) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog
 
 from slideviz import read
+from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.export import film as film_module
 from slideviz.export.film import FilmOptions
@@ -29,6 +30,7 @@ from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
 from slideviz.session import changes, jobs, pieces
+from tests.builders import passage
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -481,6 +483,40 @@ def test_all_steps_are_saved_with_numbers(ran, answers, tmp_path):
     assert sorted(path.name for path in tmp_path.glob("s_*")) == ["s_1.su2", "s_2.su2"]
     assert np.array_equal(read(tmp_path / "s_2.su2").points, ran.session.frames[2].mesh.points)
     assert not ran.session.unsaved_mesh
+
+
+def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_path):
+    mesh, roles = passage((2, 6, 6), 40.0), {"blade": "moving", "per1": "periodic"}
+    case = Case(roles=roles | {"per2": "periodic"}, periodic_type="rotational")
+    path = tmp_path / "ring.su2"
+    driver.window.show_opened(jobs.prepare(mesh, path, case, lambda _: None, lambda: False))
+    act, shown = driver.window.actions_table.by_name["save_wheel"], []
+
+    def look(dialog):
+        shown.append(dialog.passages.itemText(dialog.passages.count() - 1))
+        dialog.numbered.setChecked(len(shown) > 1)
+        dialog.passages.setCurrentIndex(dialog.passages.count() - 1)
+        driver.qtbot.waitUntil(lambda: not dialog._runner.busy)
+        assert not dialog.preview.pixmap().isNull()
+        return True
+
+    for passages, name in ((0, "wheel.su2"), (1, "part.su2b")):
+        driver.window.store.change(changes.set_view, passages=passages)
+        answers("ask_save", tmp_path / name)
+        in_dialog(look)
+        act.trigger()
+        driver.settle()
+    assert shown == ["the whole wheel, 9", "those in the view, 3"]
+    whole, part = read(tmp_path / "wheel.su2"), read(tmp_path / "part.su2b")
+    assert (len(whole.cells), len(part.cells)) == (9 * len(mesh.cells), 3 * len(mesh.cells))
+    assert "per1" not in whole.marker_names
+    assert {"blade_1", "blade_3", "per1"} <= set(part.marker_names)
+    assert "3 passages" in driver.window.statusBar().currentMessage()
+    in_dialog(lambda _: False)  # nothing is asked or written afterwards
+    act.trigger()
+    driver.window.store.change(changes.set_role, ["per1"], "fixed")
+    assert not act.isEnabled()
+    assert "two boundaries must be periodic" in " ".join(act.toolTip().split())
 
 
 def test_steps_that_exist_are_asked_about(ran, answers, tmp_path):

@@ -4,9 +4,11 @@ import pytest
 from slideviz import read
 from slideviz.case.model import Case, FromFile, Translate
 from slideviz.errors import Cancelled, CaseError, MeshError
+from slideviz.mesh.quality import quality
 from slideviz.session import jobs
 from slideviz.session.motions import Ghosts
 from slideviz.session.state import StepFrame
+from tests.builders import passage
 
 
 def never():
@@ -148,3 +150,18 @@ def test_the_view_needs_no_qt():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_wheel_is_written_whole_or_not_at_all(tmp_path):
+    mesh, path = passage((2, 6, 6), 40.0), tmp_path / "wheel.su2"
+    roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
+    case, heard = Case(roles=roles, periodic_type="rotational"), []
+    values = path, case, mesh, StepFrame(mesh, quality(mesh)), "all", False
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs.save_wheel(*values, heard.append, lambda: True)
+    assert not list(tmp_path.iterdir())
+    made = jobs.save_wheel(*values, heard.append, never)
+    assert (made.passages, made.points) == (9, len(read(path).points))
+    fractions = [doing.fraction for doing in heard]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0

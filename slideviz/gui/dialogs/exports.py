@@ -8,7 +8,7 @@ from collections.abc import Generator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qtpy.QtCore import QObject, QSignalBlocker, Qt
 from qtpy.QtGui import QShowEvent
@@ -19,8 +19,9 @@ from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, size_words
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
-from slideviz.formats.table import format_for, own_endings, usual_ending
+from slideviz.formats.table import FORMATS, format_for, own_endings, usual_ending
 from slideviz.gui.dialogs.film import FilmDialog
+from slideviz.gui.dialogs.wheel import WheelDialog
 from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
 from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets import questions
@@ -48,8 +49,12 @@ from slideviz.gui.widgets.pixmaps import (
 )
 from slideviz.gui.widgets.services import Services
 from slideviz.session import changes, jobs
+from slideviz.session.motions import shown_case, wheel_passages
 from slideviz.session.state import Session
 from slideviz.terms import SHOWN
+
+if TYPE_CHECKING:
+    from slideviz.design.wheel import WheelQuality
 
 log = logging.getLogger("slideviz")
 COPIED_WIDTH = 1600  # least width of a picture on the clipboard, in pixels
@@ -207,6 +212,35 @@ class Exports(QObject):
             partial(jobs.save_steps, first=session.frames[0]),
             path,
             run.frames,
+        )
+
+    def wheel(self) -> None:
+        """Ask for passages and a file name, and write the wheel of the shown step."""
+        session, files = self._session, self.window.files
+        frame, mesh, around = session.frame, session.mesh, wheel_passages(session)
+        if frame is None or mesh is None or around is None or self.window.runner.busy:
+            return
+        with self._renderer() as renderer:
+            dialog = WheelDialog(self.window, renderer, around)
+            accepted = dialog.exec() == WheelDialog.DialogCode.Accepted
+            count, numbered = dialog.count, dialog.numbered.isChecked()
+            dialog.deleteLater()
+        if not accepted:
+            return
+        default = files.folder() / f"{files.stem()}_wheel.su2"
+        filters = ";;".join(questions.mesh_filter(FORMATS[end]) for end in (".su2", ".su2b"))
+        path = questions.ask_save(self.window, "Save as wheel", default, filters)
+        if path is not None:
+            case = session.case if frame.step is None else shown_case(session)
+            values = path, case, mesh, frame, count, numbered
+            name = f"Saving {path.name}"
+            self.window.running.start_job(name, self._wheel_written, jobs.save_wheel, *values)
+
+    def _wheel_written(self, made: WheelQuality) -> None:
+        self._written(made.path)
+        self.window.show_status(
+            f"Saved {made.path}: {made.passages} passages, {made.cells:,} cells, "
+            f"min {made.min:.4f}, {made.inverted:,} inverted"
         )
 
     def _steps_written(self, paths: list[Path], number: int) -> None:

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QMenu
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
-from slideviz.session.motions import box_names
+from slideviz.session.motions import box_names, wheel_passages
 from slideviz.session.panes import choices, panes, show_in
 from slideviz.session.run_messages import to_mend
 from slideviz.session.state import IN_FILE, Session
@@ -226,6 +226,11 @@ def needs_repair(now: CommandState) -> bool:
 def has_steps_and_is_idle(now: CommandState) -> bool:
     """Return whether the shown run has steps and no job runs."""
     return has_steps(now) and is_idle(now)
+
+
+def has_wheel(now: CommandState) -> bool:
+    """Return whether periodic boundaries make the mesh a passage of a wheel, and no job runs."""
+    return is_idle(now) and wheel_passages(now.session) is not None
 
 
 def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], bool]:
