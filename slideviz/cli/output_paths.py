@@ -48,8 +48,8 @@ class OutputPath:
 
 def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
     """Return the input files of a command line, with words for what each is."""
-    inputs = {what: getattr(arguments, name, None) for name, what in _INPUTS.items()}
-    return {path: what for what, path in inputs.items() if path is not None}
+    paths = ((getattr(arguments, name, None), what) for name, what in _INPUTS.items())
+    return {path: what for path, what in paths if path is not None}
 
 
 def qualities_path(output: Path) -> Path:
