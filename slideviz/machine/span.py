@@ -1,0 +1,441 @@
+"""Normalised span between two boundaries, and the curves of constant span in the meridional plane.
+
+Coordinates (n, 3) are meridional: ``(z, r, theta)`` about an axis, theta in radians. The span of a
+point is ``s = d_H / (d_H + d_S)``, with its distances to hub and shroud: 0 at the hub, 1 at the
+shroud. It needs no direction of the flow, so axial, mixed and radial passages are alike. On a
+curve of constant span, m is the arc length, and ``dm' = dm / r``: the plane of (m', theta) keeps
+angles, and blade sections are designed in it.
+
+    field = find_span(mesh, "HUB", "SHROUD", axis, origin, period)
+    coords = field.meridional(points)       # (z, r, theta)
+    s, slopes = field.span(coords)          # span, and its derivative by (z, r, theta)
+    curves = SpanCurves(field, start)       # start: z and r where m' and m are 0 (at its span)
+    plane = curves.plane(coords)            # (m', theta, s): laid flat
+    m = curves.length(plane)                # the arc length m
+    coords = curves.coords(plane)           # and back, exactly onto the span
+    points = field.points(coords)
+
+m grows along the axis where the hub is within the shroud, and outwards at the exit of a radial
+compressor. Distances to walls that are surfaces of revolution are those to their profile in the
+meridional plane, so the hole that a blade leaves in a wall does not matter. Other walls (contoured
+along theta) count as they are, in (z, r, rho theta), with their images one period before and after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from slideviz.errors import MeshError
+from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.topology import unit, vertex_normals
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.projection import as_simplices
+
+REVOLUTION = 0.02
+"""A wall is a surface of revolution if its normals at nodes have a smaller component along theta,
+as a root of the mean square: facets of a curved profile have some, too."""
+APART = 1e-3  # least distance of points of a profile, as a part of its extent
+STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
+NEAR = 1e-7  # part of the distance between the walls, within which a wall's own normal counts
+FACING = 0.3  # least cosine between the directions from hub to shroud at both walls
+SPANS = 33  # curves that `SpanCurves` traces
+STEPS, MOST_STEPS = 64, 512
+"""Steps of a curve along the extent of the walls, and most steps in each direction."""
+BEND = 0.5  # largest sine of the angle between a wall's normal and the way to it, before its rim
+NEWTON, EXACT, OFF = 12, 1e-15, 1e-9
+"""Most Newton steps to a span, its error that needs no further one, and its largest error."""
+ON_AXIS = 1e-9  # a point nearer to the axis, as a part of the largest radius, has no theta
+
+Distances = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class SpanField:
+    """The normalised span between two walls, and meridional coordinates about the axis."""
+
+    axis: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    middle: float  # theta that is farthest from where its branch ends
+    radius: float  # the largest one of the walls
+    walls: tuple[ClosestPoints, ClosestPoints]
+    """Hub and shroud: segments in (z, r), or triangles in (z, r, radius theta)."""
+
+    @property
+    def revolved(self) -> bool:
+        """Return whether both walls are surfaces of revolution, so that theta does not matter."""
+        return self.walls[0].corners.shape[2] == 2
+
+    def meridional(self, points: FloatArray) -> FloatArray:
+        """Return (z, r, theta), (n, 3), of points (n, 3)."""
+        return _meridional(points, self.axis, self.origin, self.middle)
+
+    def points(self, coords: FloatArray) -> FloatArray:
+        """Return the points (n, 3) of meridional coordinates (n, 3)."""
+        z, r, theta = coords.T
+        local = np.stack([r * np.cos(theta), r * np.sin(theta), z], axis=1)
+        return along(axis_basis(self.axis).T, local) + np.asarray(self.origin)
+
+    def slopes(self, coords: FloatArray) -> FloatArray:
+        """Return the derivative (n, 3, 3) of `points` by the coordinates (n, 3)."""
+        _, r, theta = coords.T
+        cos, sin, e = np.cos(theta), np.sin(theta), axis_basis(self.axis)
+        out = np.empty((len(coords), 3, 3))
+        out[:, :, 0] = e[2]
+        out[:, :, 1] = cos[:, None] * e[0] + sin[:, None] * e[1]
+        out[:, :, 2] = (r * cos)[:, None] * e[1] - (r * sin)[:, None] * e[0]
+        return out
+
+    def span(self, coords: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the span (n,) at meridional coordinates (n, 3), and its derivative (n, 3) by them.
+
+        Beyond a wall it is below 0, or above 1.
+        """
+        return self.span_of(self.distances(coords))
+
+    def span_of(self, ends: Sequence[Distances]) -> tuple[FloatArray, FloatArray]:
+        """Return the same as `span`, of `distances`."""
+        (hub, to_hub, _), (shroud, to_shroud, _) = ends
+        total = hub + shroud
+        total = np.where(np.abs(total) > 0.0, total, 1.0)
+        slope = (shroud[:, None] * to_hub - hub[:, None] * to_shroud) / total[:, None] ** 2
+        out = np.zeros((len(slope), 3))
+        out[:, : slope.shape[1]] = slope
+        out[:, 2] *= self.radius
+        return hub / total, out
+
+    def distances(self, coords: FloatArray) -> list[Distances]:
+        """Return for hub and shroud distances (n,), their slopes (n, d), and how oblique they are.
+
+        Distances are negative beyond a wall. Oblique is the sine (n,) of the angle between the way
+        to the wall and its normal: it is not small where the wall has ended. d is 2 where theta
+        does not matter; else the slope's third number is that along radius theta.
+        """
+        x = coords[:, : self.walls[0].corners.shape[2]].copy()
+        x[:, 2:] *= self.radius
+        (hub, at_hub), (shroud, at_shroud) = (wall.nearest(x) for wall in self.walls)
+        across = shroud - hub
+        ends = (hub, at_hub, across), (shroud, at_shroud, -across)
+        return [
+            _signed(x, place, wall.simplices(which), into)
+            for wall, (place, which, into) in zip(self.walls, ends, strict=True)
+        ]
+
+
+def _signed(x: FloatArray, place: FloatArray, corners: FloatArray, into: FloatArray) -> Distances:
+    """Return distance, slope and obliqueness of points x (n, d) whose closest ones are ``place``.
+
+    ``corners`` (n, c, d): what they are on; ``into`` (n, d): from there to the other wall.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    if x.shape[1] == 2:
+        normal = unit(np.stack([-edges[:, 0, 1], edges[:, 0, 0]], axis=1))
+    else:
+        normal = unit(np.cross(edges[:, 0], edges[:, 1]))
+    normal[np.sum(normal * into, axis=1) < 0.0] *= -1.0
+    gap = x - place
+    size = np.linalg.norm(gap, axis=1)
+    inside = np.where(np.sum(gap * into, axis=1) < 0.0, -1.0, 1.0)
+    near = size <= NEAR * np.linalg.norm(into, axis=1)
+    way = gap * (inside / np.where(size > 0.0, size, 1.0))[:, None]
+    cosine = np.abs(np.sum(way * normal, axis=1))
+    oblique = np.where(near, 0.0, np.sqrt(np.maximum(1.0 - cosine**2, 0.0)))
+    distance = np.where(near, np.sum(gap * normal, axis=1), inside * size)
+    return distance, np.where(near[:, None], normal, way), oblique
+
+
+def _meridional(
+    points: FloatArray, axis: Sequence[float], origin: Sequence[float], middle: float
+) -> FloatArray:
+    x, y, z = in_axis_frame(points, axis, origin).T
+    theta = np.arctan2(y, x) - middle
+    theta -= 2.0 * np.pi * np.round(theta / (2.0 * np.pi))
+    return np.stack([z, np.hypot(x, y), theta + middle], axis=1)
+
+
+def find_span(
+    mesh: Mesh,
+    hub: str,
+    shroud: str,
+    axis: tuple[float, float, float],
+    origin: tuple[float, float, float],
+    period: float = 2.0 * np.pi,
+) -> SpanField:
+    """Return the span between two boundaries of a 3D mesh, whose passages repeat by ``period``.
+
+    Raises MeshError if the mesh is 2D, a boundary is unknown or empty, both are one, or they do
+    not face each other.
+    """
+    if mesh.dim != 3:
+        raise MeshError(f"{mesh.name}: the span between two boundaries needs a mesh in 3D")
+    boundary, facets = boundary_of(mesh), list[IntArray]()
+    for name in (hub, shroud):
+        mesh.marker(name)  # which knows what to say of an unknown one
+        facets.append(boundary.facets[boundary.marker == boundary.names.index(name)])
+        if not len(facets[-1]):
+            raise MeshError(f"{mesh.name}: boundary {name!r} has no facets, so there is no span")
+    nodes = np.unique(np.concatenate([table.ravel() for table in facets]))
+    x, y, _ = in_axis_frame(mesh.points[nodes], axis, origin).T
+    middle = float(np.arctan2(y.sum(), x.sum()))
+    radius = float(np.hypot(x, y).max())
+    coords = _meridional(mesh.points, axis, origin, middle) * (1.0, 1.0, radius)
+    profiles = [_profile(coords, table) for table in facets]
+    if all(profile is not None for profile in profiles):
+        walls = [ClosestPoints(profile) for profile in profiles if profile is not None]
+    else:
+        walls = [_wall(coords, table, radius, period) for table in facets]
+    field = SpanField(axis, origin, middle, radius, (walls[0], walls[1]))
+    if hub == shroud or not _face(field, coords[nodes] / (1.0, 1.0, radius)):
+        raise MeshError(
+            f"{mesh.name}: the boundaries {hub!r} and {shroud!r} do not face each other, so there "
+            "is no span between them; name hub and shroud in SPAN"
+        )
+    return field
+
+
+def _profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
+    """Return the profile of a surface of revolution, segments (k, 2, 2) in (z, r); else None.
+
+    ``coords`` (n, 3): (z, r, rho theta). The profile goes through nodes at least `APART` from each
+    other, in the order in which Prim's algorithm joins them to an end: each time the nearest one.
+    """
+    nodes, normals = vertex_normals(coords, facets)
+    size = np.linalg.norm(normals, axis=1)
+    along_theta = normals[:, 2] / np.where(size > 0.0, size, 1.0)
+    if np.sqrt(np.average(along_theta**2, weights=size)) > REVOLUTION:
+        return None
+    places = coords[nodes, :2]
+    apart = APART * float(np.linalg.norm(np.ptp(places, axis=0)))
+    _, first = np.unique(np.round(places / (0.5 * apart)), axis=0, return_index=True)
+    places = places[first]
+    last = int(np.argmax(np.sum((places - places[0]) ** 2, axis=1)))
+    away, path = np.full(len(places), np.inf), [places[last]]
+    for _ in range(len(places) - 1):
+        away = np.minimum(away, np.sum((places - places[last]) ** 2, axis=1))
+        away[last] = np.inf
+        places, away = np.delete(places, last, axis=0), np.delete(away, last)
+        last = int(np.argmin(away))
+        if np.sum((places[last] - path[-1]) ** 2) > apart**2:
+            path.append(places[last])
+    steps = unit(np.diff(path, axis=0))
+    if len(path) < 2 or (np.sum(steps[1:] * steps[:-1], axis=1) < STRAIGHT).any():
+        return None
+    return np.stack([path[:-1], path[1:]], axis=1)
+
+
+def _wall(coords: FloatArray, facets: IntArray, radius: float, period: float) -> ClosestPoints:
+    corners, turn = coords[facets], 2.0 * np.pi * radius
+    # Facets may go across the end of theta's branch.
+    corners[..., 2] -= turn * np.round((corners[..., 2] - corners[:, :1, 2]) / turn)
+    return ClosestPoints(as_simplices(corners), np.array([0.0, 0.0, radius * period]))
+
+
+def _face(field: SpanField, coords: FloatArray) -> bool:
+    """Return whether the walls face each other, judged at their nodes (n, 3)."""
+    (hub, to_hub, _), (shroud, to_shroud, _) = field.distances(coords)
+    opposite = -np.sum(to_hub * to_shroud, axis=1)
+    apart = np.median(np.maximum(hub, shroud)) > 0.0
+    return bool(apart and np.median(opposite) > FACING)
+
+
+class SpanCurves:
+    """Curves of constant span in the meridional plane: the maps to (m', theta, span) and back.
+
+    m' and m are 0 on the line from hub to shroud through ``start`` that is normal to the curves.
+    Curves are traced by Runge-Kutta steps of equal m' with Newton steps back onto the span, all
+    spans at once; a spline between them has z and r. `coords` corrects these, normal to the curve,
+    until the span is exact. Beyond the rims of the walls curves go on straight.
+    """
+
+    def __init__(self, field: SpanField, start: Sequence[float]) -> None:
+        """Trace the curves; ``start``: z and r of a point between the walls.
+
+        Raises MeshError if it is not between them, or on the axis.
+        """
+        from scipy.interpolate import RectBivariateSpline
+
+        self.field = field
+        corners = np.concatenate([wall.corners[..., :2].reshape(-1, 2) for wall in field.walls])
+        self._size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+        self._theta = field.middle if field.revolved else _clear_angle(field, corners)
+        spans = np.linspace(0.0, 1.0, SPANS)
+        seeds = self._seeds(np.asarray(start, float), spans)
+        step = self._size / (STEPS * float(seeds[:, 1].mean()))
+        before, after = (self._trace(seeds, spans, sign * step) for sign in (-1.0, 1.0))
+        table = np.concatenate([before[:0:-1], after])  # (steps, spans, 3): z, r and m
+        self.m_prime = step * np.arange(1 - len(before), len(after))
+        """(k,): where the curves were traced; they go on straight beyond."""
+        self._splines = [
+            RectBivariateSpline(spans, self.m_prime, table[..., k].T) for k in range(3)
+        ]
+        self._places = table[..., :2].reshape(-1, 2)
+
+    def plane(self, coords: FloatArray) -> FloatArray:
+        """Return (m', theta, span), (n, 3), of meridional coordinates (n, 3).
+
+        Raises MeshError for a point on the axis.
+        """
+        from scipy.spatial import cKDTree
+
+        on_axis = np.flatnonzero(coords[:, 1] <= ON_AXIS * self.field.radius)
+        if len(on_axis):
+            z = coords[on_axis[0], 0]
+            raise MeshError(
+                f"a point at z = {z:.6g} is on the axis, where no section can be laid flat"
+            )
+        span = self.field.span(coords)[0]
+        column = cKDTree(self._places).query(coords[:, :2])[1] // SPANS
+        m_prime = self.m_prime[column]
+        for _ in range(8):  # the foot of the point on its curve
+            place, speed, bend = (self._at(span, m_prime, k) for k in range(3))
+            gap = coords[:, :2] - place
+            slope = np.sum(gap * bend - speed**2, axis=1)
+            ahead = np.sum(gap * speed, axis=1)
+            m_prime = m_prime - ahead / np.where(slope < 0.0, slope, -np.sum(speed**2, axis=1))
+        return np.stack([m_prime, coords[:, 2], span], axis=1)
+
+    def length(self, plane: FloatArray) -> FloatArray:
+        """Return the arc length m (n,) at (m', theta, span), (n, 3)."""
+        return self._value(plane[:, 2], plane[:, 0], 2, 0)
+
+    def at_length(self, m: FloatArray, span: FloatArray) -> FloatArray:
+        """Return m' (n,) at arc lengths m (n,) of the curves at spans (n,)."""
+        m_prime = m / np.maximum(self._at(span, np.zeros(len(m)), 0)[:, 1], ON_AXIS)
+        for _ in range(30):
+            gap = m - self._value(span, m_prime, 2, 0)
+            m_prime = m_prime + gap / self._value(span, m_prime, 2, 1)
+        return m_prime
+
+    def coords(self, plane: FloatArray) -> FloatArray:
+        """Return meridional coordinates (n, 3) of (m', theta, span), (n, 3)."""
+        return self.coords_and_slopes(plane)[0]
+
+    def coords_and_slopes(self, plane: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return meridional coordinates (n, 3), and their derivatives (n, 3, 2) by (m', theta).
+
+        Span does not change; the derivatives are exact but where a wall's facets meet.
+        """
+        m_prime, theta, span = plane.T
+        place, speed, bend = (self._at(span, m_prime, k) for k in range(3))
+        size = np.linalg.norm(speed, axis=1)
+        normal = np.stack([-speed[:, 1], speed[:, 0]], axis=1) / size[:, None]
+        out = np.column_stack([place, theta])
+        off = np.zeros(len(plane))
+        for _ in range(NEWTON):
+            value, slope = self.field.span(out)
+            across = np.sum(slope[:, :2] * normal, axis=1)
+            if np.abs(value - span).max(initial=0.0) <= EXACT:
+                break
+            off -= (value - span) / np.where(np.abs(across) > 0.0, across, 1.0)
+            out[:, :2] = place + off[:, None] * normal
+        lost = np.flatnonzero(~(np.abs(value - span) <= OFF))
+        if len(lost):
+            z, r = place[lost[0]]
+            raise MeshError(
+                f"there is no span of {span[lost[0]]:.6g} at z = {z:.6g}, r = {r:.6g}, "
+                f"theta = {np.degrees(theta[lost[0]]):.6g} degrees: the walls have a hole there, "
+                "or end; move the blade less"
+            )
+        # By m': the normal turns against the speed as the curve bends to its side.
+        by = np.zeros((len(plane), 3, 2))
+        by[:, :2, 0] = speed * (1.0 - off * np.sum(normal * bend, axis=1) / size**2)[:, None]
+        by[:, 2, 1] = 1.0
+        change = np.einsum("ni,nik->nk", slope, by) / across[:, None]
+        by[:, :2] -= normal[:, :, None] * change[:, None, :]
+        return out, by
+
+    def _at(self, span: FloatArray, m_prime: Any, order: int) -> FloatArray:
+        """Return z and r (n, 2) of the curves, or a derivative of an order by m'."""
+        return np.stack([self._value(span, m_prime, k, order) for k in range(2)], axis=1)
+
+    def _value(self, span: FloatArray, m_prime: FloatArray, k: int, order: int) -> FloatArray:
+        """Return z, r or m (n,) for k = 0, 1, 2, or a derivative by m'; linear beyond the ends."""
+        inside = np.clip(m_prime, self.m_prime[0], self.m_prime[-1])
+        spline, s = self._splines[k], np.clip(span, 0.0, 1.0)
+        value = spline.ev(s, inside, dy=order)
+        beyond = m_prime - inside
+        if order == 0:
+            value = value + beyond * spline.ev(s, inside, dy=1)
+        return np.asarray(np.where(beyond != 0.0, 0.0, value) if order > 1 else value)
+
+    def _seeds(self, start: FloatArray, spans: FloatArray) -> FloatArray:
+        """Return z and r (k, 2) at spans (k,), on a line through ``start`` normal to the curves."""
+        here = np.array([[*start, self._theta]])
+        first = self.field.span(here)[0]
+        if not (-1e-6 < first[0] < 1.0 + 1e-6 and start[1] > ON_AXIS * self.field.radius):
+            raise MeshError(
+                f"z = {start[0]:.6g}, r = {start[1]:.6g} is not between hub and shroud, so curves "
+                "of constant span cannot begin there"
+            )
+        out = np.empty((len(spans), 2))
+        for side in (spans <= first[0], spans > first[0]):
+            at, span = here.copy(), float(first[0])
+            order = np.flatnonzero(side)
+            for k in order[::-1] if side[0] else order:
+                for part in range(1, 5):
+                    goal = span + (spans[k] - span) * part / 4
+                    at[:, :2] = self._onto(at[:, :2], np.array([goal]))
+                span = float(spans[k])
+                out[k] = at[0, :2]
+        return out
+
+    def _onto(self, places: FloatArray, spans: FloatArray) -> FloatArray:
+        """Return places (n, 2), z and r, moved along the slope of the span onto spans (n,)."""
+        at = np.column_stack([places, np.full(len(places), self._theta)])
+        for _ in range(3):
+            value, slope = self.field.span(at)
+            square = np.sum(slope[:, :2] ** 2, axis=1)
+            factor = (value - spans) / np.where(square > 0.0, square, 1.0)
+            at[:, :2] -= factor[:, None] * slope[:, :2]
+        return at[:, :2]
+
+    def _direction(self, places: FloatArray) -> tuple[FloatArray, np.ndarray]:
+        """Return the unit tangents (n, 2) of the curves, and where a wall has ended, (n,) bool."""
+        at = np.column_stack([places, np.full(len(places), self._theta)])
+        ends = self.field.distances(at)
+        slope = self.field.span_of(ends)[1]
+        ended = np.maximum(ends[0][2], ends[1][2]) > BEND
+        return unit(np.stack([slope[:, 1], -slope[:, 0]], axis=1)), ended
+
+    def _trace(self, seeds: FloatArray, spans: FloatArray, step: float) -> FloatArray:
+        """Return z, r and m (k, n, 3) on the curves from seeds (n, 2), by steps of m'."""
+        at = np.column_stack([seeds, np.zeros(len(seeds))])
+        straight, ahead = np.zeros(len(seeds), bool), self._direction(seeds)[0]
+        table = [at]
+        while not straight.all() and len(table) <= MOST_STEPS:
+            # By m': d(z, r) = r t dm', dm = r dm'.
+            rates: list[FloatArray] = []
+            for factor in (0.0, 0.5, 0.5, 1.0):
+                x = at + factor * step * rates[-1] if rates else at
+                tangent, ended = self._direction(x[:, :2])
+                straight = straight | ended
+                tangent = np.where(straight[:, None], ahead, tangent)
+                rates.append(np.column_stack([x[:, 1:2] * tangent, x[:, 1]]))
+            new = at + step / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
+            back = np.where(straight[:, None], new[:, :2], self._onto(new[:, :2], spans))
+            moved = np.linalg.norm(new[:, :2] - at[:, :2], axis=1)
+            straight = straight | (np.linalg.norm(back - new[:, :2], axis=1) > 0.2 * moved)
+            new[:, :2] = np.where(straight[:, None], new[:, :2], back)
+            ahead = np.where(straight[:, None], ahead, self._direction(new[:, :2])[0])
+            table.append(new)
+            at = new
+        return np.array(table)
+
+
+def _clear_angle(field: SpanField, corners: FloatArray) -> float:
+    """Return the theta at which the walls have fewest holes: profiles (n, 2) are nearest there."""
+    some: Any = corners[:: max(1, len(corners) // 200)]
+    low, high = (f(field.walls[0].corners[..., 2]) / field.radius for f in (np.min, np.max))
+    angles = np.linspace(low, high, 16)
+    far = [
+        np.abs([d for d, _, _ in field.distances(np.column_stack([some, np.full(len(some), a)]))])
+        .min(axis=0)
+        .sum()
+        for a in angles
+    ]
+    return float(angles[int(np.argmin(far))])
