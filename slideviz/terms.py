@@ -274,9 +274,9 @@ RELAXES: dict[Relax, Term] = {
 
 Repair = Literal["auto", "no", "yes"]
 REPAIRS: dict[Repair, Term] = {
-    "auto": Term("automatic", "Mended where cells are bad, unless the mesh stays in its file."),
+    "auto": Term("automatic", "Mended where cells are bad."),
     "no": Term("off", "Cells stay as the method leaves them."),
-    "yes": Term("on", "Mended where cells are bad."),
+    "yes": Term("on", "Mended where cells are bad, as automatic."),
 }
 """Whether inverted and poor cells are mended."""
 

@@ -425,8 +425,7 @@ METHOD_ROWS = (
         "repair",
         "Mend cells that are inverted, not proved valid, or of a quality below REPAIR_BELOW (and "
         "lower than before): nodes near them move, never those of moving and fixed boundaries. "
-        "The mesh is never worse after it. AUTO does the same, but not to meshes that are "
-        "streamed.",
+        "The mesh is never worse after it. AUTO is the same as YES.",
         label="Repair",
         form="main",
         tip="Whether inverted and poor cells are then mended, by moving the nodes near them: never "
@@ -451,7 +450,8 @@ METHOD_ROWS = (
         METHOD,
         YES_NO,
         "repair_steps",
-        "Whether REPAIR acts after each step (YES), or after the last one (NO).",
+        "Whether REPAIR acts after each step (YES, not of a streamed mesh), or after the last one "
+        "(NO).",
         label="Repair each step",
         form="more",
         tip="Whether cells are mended after each step, so that the next one starts from a better "

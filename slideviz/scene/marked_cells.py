@@ -208,18 +208,22 @@ class RepairLayer(KeyedLayer):
         if not len(done.nodes):
             return
         mesh, before = done.mesh, np.array(done.mesh.points)
-        before[done.nodes] = done.points
+        nodes, cells = done.nodes, done.cells
+        if mesh.part is not None:
+            nodes = np.searchsorted(mesh.part.points, nodes)
+            cells = np.searchsorted(mesh.part.cells, cells)
+        before[nodes] = done.points
         lift = 4.0 * self.stage.lift(mesh)
         edges = np.concatenate(
             [
-                nodes[:, np.array(ELEMENTS[vtk].edges)].reshape(-1, 2)
-                for vtk, (_, nodes) in mesh.cells.take(done.cells).by_type.items()
+                table[:, np.array(ELEMENTS[vtk].edges)].reshape(-1, 2)
+                for vtk, (_, table) in mesh.cells.take(cells).by_type.items()
             ]
         )
         used, ends = np.unique(edges, return_inverse=True)
         lines = np.insert(ends.reshape(-1, 2), 0, 2, axis=1).ravel()
         ghost = pv.PolyData(lifted(before[used], lift), lines=lines)
-        dots = pv.PolyData(lifted(mesh.points[done.nodes], lift))
+        dots = pv.PolyData(lifted(mesh.points[nodes], lift))
         self._shapes = ghost, dots  # a data set that only VTK holds may come back without points
         for name, shape, color in (
             (CELLS_BEFORE, ghost, INVERTED_COLOR),

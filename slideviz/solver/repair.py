@@ -7,7 +7,7 @@ copies do. Here a boundary with the role internal is one to slide on: its nodes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import nan
 
@@ -25,9 +25,9 @@ from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
-from slideviz.mesh.quality import VALID, checked_reference, quality
+from slideviz.mesh.quality import checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.repair import Repaired
+from slideviz.mesh.repair.repair import Impossible, is_bad
 from slideviz.mesh.repair.repair import repair as mend_cells
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.domain import find_domain
@@ -203,7 +203,7 @@ def mend(
     limit = case.repair_below
     if shapes is not None:
         limit = min(limit, quality(shapes, metric=case.quality_metric).min)
-    if not ((found.status != VALID) | (found.values < limit)).any():
+    if not is_bad(found, limit).any():
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
@@ -213,7 +213,7 @@ def mend(
         shapes,
         below=limit,
         metric=case.quality_metric,
-        report=lambda _, part: tick(part),
+        report=tick,
     )
     points = done.points
     if now.halo is not None:
@@ -223,34 +223,37 @@ def mend(
     number = np.arange(len(now.cells)) if cells is None else cells
     mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
     bad = number[done.bad_before], number[done.bad_after]
-    unmendable, warnings = _unmendable(done, number)
+    unmendable, warnings = unmendable_words(done.impossible, mesh, number)
     return MeshRepair(mended, *bad, moved, before, done.largest_move, unmendable, warnings)
 
 
-def _unmendable(
-    done: Repaired, number: IntArray
+def unmendable_words(
+    impossible: Sequence[Impossible], mesh: Mesh, number: IntArray | None = None
 ) -> tuple[tuple[tuple[int, str], ...], tuple[str, ...]]:
     """Return the cells that no motion of free nodes mends, with reasons, and a warning of them.
 
-    ``number`` (m,): numbers of the cells that were repaired.
+    ``mesh``: it has the markers.
+    ``number`` (m,): numbers of the cells that were repaired, if they are not all.
     """
-    if not done.impossible:
+    if not impossible:
         return (), ()
+    numbers = np.arange(len(mesh.points)) if mesh.part is None else mesh.part.points
+    nodes = {marker.name: numbers[marker.nodes] for marker in mesh.markers}
 
-    def held(names: Iterable[str]) -> str:
+    def on(ones: Sequence[Impossible]) -> str:
+        wrong = np.concatenate([one.nodes for one in ones])
+        names = [name for name, some in nodes.items() if np.isin(wrong, some).any()]
         return f"held on {' and '.join(names)}" if names else "held"
 
-    found = tuple(
-        (int(number[one.cell]), f"its nodes are {held(one.boundaries)}") for one in done.impossible
-    )
-    first = ", ".join(str(cell) for cell, _ in found[:5]) + " ..." * (len(found) > 5)
-    names = dict.fromkeys(name for one in done.impossible for name in one.boundaries)
+    cells = [one.cell if number is None else int(number[one.cell]) for one in impossible]
+    reasons = [f"its nodes are {on([one])}" for one in impossible]
+    first = ", ".join(map(str, cells[:5])) + " ..." * (len(cells) > 5)
     sentence = (
-        f"{counted(len(found), 'cell')} cannot be mended ({first}): the nodes that make them bad "
-        f"are {held(names)}, so that no motion of the others helps; let that boundary slide, move "
-        "it less, or mend its mesh"
+        f"{counted(len(cells), 'cell')} cannot be mended ({first}): the nodes that make them bad "
+        f"are {on(impossible)}, so that no motion of the others helps; let that boundary slide, "
+        "move it less, or mend its mesh"
     )
-    return found, (sentence,)
+    return tuple(zip(cells, reasons, strict=True)), (sentence,)
 
 
 def repair_case(case: Case) -> Case:
@@ -276,7 +279,7 @@ def still_setup(case: Case, mesh: Mesh, points: FloatArray) -> Setup:
 def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None = None) -> Freedom:
     """Return the freedom of the nodes of a mesh that was deformed to ``points`` (n, d).
 
-    ``mesh``: undeformed, with its halo. Nodes slide on its boundaries.
+    ``mesh``: undeformed, with its halo. Nodes slide on its boundaries. It may be a skin.
     ``setup``: that of the run, if there was one: its known nodes stay.
     """
     if not mesh.markers:
@@ -289,7 +292,9 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     known = np.concatenate([classes.moving, classes.fixed])
     if setup is None or sliding is not case:
         setup = still_setup(sliding, mesh, points)
-    held = np.concatenate([known, setup.known, _unmarked(mesh, setup.boundary.facets)])
+    held = np.concatenate([known, setup.known])
+    if mesh.part is None:
+        held = np.concatenate([held, unmarked_sides(mesh, setup.boundary.facets).ravel()])
     if mesh.halo is not None:  # copies that are no images would have to follow their donors
         copies = np.setdiff1d(mesh.halo.receivers, setup.images)
         pairs = np.isin(mesh.halo.receivers, np.setdiff1d(copies, mesh.halo.outer))
@@ -381,9 +386,9 @@ def _projection(
     return project
 
 
-def _unmarked(mesh: Mesh, marked: IntArray) -> IntArray:
-    """Return the nodes of outer sides that are no facets ``marked`` (f, 2 or 4) of a boundary."""
+def unmarked_sides(mesh: Mesh, marked: IntArray) -> IntArray:
+    """Return the outer sides (s, 2 or 4) that are none of ``marked`` (f, 2 or 4)."""
     shell = shell_of(without_halo(mesh)[0])
     rows = np.sort(np.concatenate([marked, shell]), axis=1)
     group = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
-    return np.unique(shell[~np.isin(group[len(marked) :], group[: len(marked)])])
+    return shell[~np.isin(group[len(marked) :], group[: len(marked)])]

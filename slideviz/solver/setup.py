@@ -257,7 +257,7 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         reach=REACH * conditions.largest,
     )
     warnings = *domain.warnings, *conditions.warnings, *loose, *idle_settings(case)
-    warnings += _not_relaxed(case, mesh) + _not_repaired(case, mesh)
+    warnings += _not_relaxed(case, mesh)
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
@@ -311,18 +311,6 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
             Note(f"RELAX= AUTO relaxes no mesh of more than {RELAXED_CELLS:,} cells; YES does"),
         )
     return ()
-
-
-def _not_repaired(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return the note that REPAIR= AUTO mends no mesh in its file; CaseError if it is YES."""
-    if case.repair == "no" or mesh.part is None:
-        return ()
-    if case.repair == "yes":
-        raise CaseError(
-            "REPAIR= YES needs the whole mesh in memory, but this run goes from file to file; use "
-            "REPAIR= NO or AUTO, or run it in memory"
-        )
-    return (Note("REPAIR= AUTO mends no mesh that goes from file to file"),)
 
 
 def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Relaxation | None:

@@ -54,12 +54,12 @@ class Trial:
 class MeshRepair:
     """A mesh after repair, and what was mended."""
 
-    mesh: Mesh  # the repaired mesh
+    mesh: Mesh  # the repaired mesh; of a streamed one only the bad cells and the moved nodes
     cells: IntArray
     left: IntArray
-    """`cells`, `left` (k,), (l,): the bad cells before and after: those that are not proved valid,
-    or below the limit."""
-    nodes: IntArray  # (m,): the nodes that were moved
+    """`cells`, `left` (k,), (l,): the numbers of the bad cells before and after: those that are not
+    proved valid, or below the limit."""
+    nodes: IntArray  # (m,): the numbers of the nodes that were moved
     points: FloatArray  # (m, d): where they were
     largest_move: float  # the farthest that one was moved, in the mesh's length unit
     unmendable: tuple[tuple[int, str], ...] = ()

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import DeformError, MeshError, UnsoundError
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.rbf.frames import on_axis
+from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.layers import LayerZone, find_zone
 from slideviz.rbf.tape import value
 from slideviz.solver.growth import overshoot_of_rest
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import cartesian, shifted
-from slideviz.solver.steps import Step
+from slideviz.solver.steps import MeshRepair, Step
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,26 @@ class InteriorDisplacer:
         skin = replace(self.skin, cells=none, markers=())
         steps = [replace(step, mesh=skin.with_points(step.mesh.points)) for step in self.steps]
         return replace(self, skin=skin, steps=steps)
+
+    def repaired(self, repair: MeshRepair) -> InteriorDisplacer:
+        """Return the same after the repair of the whole mesh, with its nodes in the skin moved."""
+        last, mesh = self.steps[-1], repair.mesh
+        assert self.skin.part is not None
+        assert mesh.part is not None
+        skin, points = self.skin.part.points, np.array(last.mesh.points)
+        nodes = repair.nodes[np.isin(repair.nodes, skin)]
+        now = mesh.points[np.searchsorted(mesh.part.points, nodes)]
+        points[np.searchsorted(skin, nodes)] = now
+        last = replace(
+            last,
+            mesh=last.mesh.with_points(sealed(points)),
+            repaired=repair,
+            warnings=(*last.warnings, *repair.warnings),
+            periodic_misfit=largest_misfit(
+                self.setup.frame, self.setup.coords, points, self.setup.images
+            ),
+        )
+        return replace(self, steps=(*self.steps[:-1], last))
 
     def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """Yield the points (m, d) of some nodes after each step.

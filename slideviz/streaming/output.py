@@ -13,12 +13,14 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.rbf.problem import PhaseTimer
+from slideviz.solver.steps import MeshRepair
 from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.quality import (
@@ -32,6 +34,7 @@ from slideviz.streaming.stream_input import StreamInput, text_blocks
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool
+from slideviz.system.threads import Tick
 from slideviz.terms import SkewMetric
 
 CHUNK = 1 << 20  # most nodes or cells of a part: one part is in memory at a time
@@ -164,6 +167,13 @@ class Output:
                 require_consistent_orientation(do(parts(count)), self.source.file.name)
             self._is_oriented = True
         return self._collector
+
+    def mend(self, repair: Callable[[FileSource, BinaryIO, Tick], MeshRepair]) -> MeshRepair:
+        """Return what ``repair`` did to the deformed mesh, in the file of its points."""
+        partial = self._opened()
+        zone = self._mesh_file, self._zone
+        with self._timer.phase("repair") as tick, ExitStack() as stack:
+            return repair(FileSource.open(stack, zone, moved=partial.path), partial.file, tick)
 
     def finish(self, ffd: bytes | None) -> None:
         """Write the output where it is a text, with the boxes ``ffd``, None: those of the mesh."""

@@ -250,6 +250,7 @@ def _safe_fractions(block: CellBlock, displacer: InteriorDisplacer) -> list[Safe
     if len(steps) > 1:
         moved = displacer.after_steps(block.nodes, base.points)
         meshes = [base.with_points(points) for points in moved]
+        meshes[-1] = block.mesh  # where cells were repaired, not what the last step left
     before, done = base, 0.0
     for step, mesh in zip(steps, meshes, strict=True):
         safe = step_safety(before, mesh, base, (done, step.part), step.index)

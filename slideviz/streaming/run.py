@@ -28,12 +28,13 @@ from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
-from slideviz.solver.setup import make_setup
+from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
 from slideviz.streaming.quality import RunCollector, folded_steps
+from slideviz.streaming.repair import mend_file
 from slideviz.streaming.stream_input import open_for_run, require_su2
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
@@ -70,6 +71,11 @@ class RemainingTime:
             self._spent += monotonic() - self._begin
             self._usual += SECONDS[done]
         self._begin, self._part = monotonic(), 0.0
+
+    def more(self, stage: str) -> None:
+        """Begin a stage that was not foreseen."""
+        self._left_stages.insert(1, stage)
+        self.next()
 
     def __call__(self, progress: Progress) -> None:
         """Pass a progress on, with the seconds that are left."""
@@ -180,12 +186,24 @@ def stream(
             remaining.next()
             return skin
 
-        displacer = _deform_skin(case, read, out, remaining)
+        displacer, skin, setup = _deform_skin(case, read, out, remaining)
         give_back()
         remaining.next()
         out.displace(displacer, final=True)
         remaining.next()
         measured = out.measure(listed, displacer)
+        if setup is not None:
+            points = displacer.steps[-1].mesh.points
+            before, after = measured.before.quality(), measured.after.quality()
+            done = out.mend(
+                lambda source, file, tick: mend_file(
+                    case, source, file, tick, skin, setup, points, before, after
+                )
+            )
+            displacer = displacer.repaired(done)
+            if len(done.nodes):
+                remaining.more("quality")
+                measured = out.measure(listed, displacer)
         folded = folded_steps(displacer, out.source, measured.inverted)
         moved = displacer.steps[-1].mesh.origin.ffd
         if is_text:
@@ -203,8 +221,10 @@ def stream(
 
 def _deform_skin(
     case: Case, read: Callable[[], Mesh], out: Output, report: ReportProgress
-) -> InteriorDisplacer:
-    """Read and deform the skin; return what displaces the rest of the mesh.
+) -> tuple[InteriorDisplacer, Mesh, Setup | None]:
+    """Read and deform the skin; return what displaces the rest of the mesh, the skin and its setup.
+
+    The setup is None where the mesh is not repaired, and the skin then lacks its cells.
 
     With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
     """
@@ -219,7 +239,10 @@ def _deform_skin(
         # Let go of what is not needed any more: cells and joints, and after the steps the tracks.
         none = Cells.from_blocks([])
         markers = tuple(Marker(marker.name, none) for marker in skin.markers)
-        skin = replace(skin, cells=none, markers=markers)
+        whole, skin = skin, replace(skin, cells=none, markers=markers)
+        full: Setup | None = setup
+        if case.repair == "no":
+            whole, full = skin, None
         pairs = np.empty((0, 2), np.int64)
         boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
         setup = replace(setup, boundary=boundary)
@@ -231,7 +254,7 @@ def _deform_skin(
             return out.measure(0).after.quality()
 
         steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
-    return InteriorDisplacer(skin, lean, steps)
+    return InteriorDisplacer(skin, lean, steps), whole, full
 
 
 @contextmanager
@@ -246,11 +269,16 @@ def _naming_file_nodes(numbers: IntArray) -> Iterator[None]:
 def require_stream(case: Case) -> None:
     """Raise where a case cannot be streamed.
 
-    Raises CaseError if its method, linear elasticity, or one of its limits needs the whole mesh at
-    once, and MeshError if its mesh is of no format that can be streamed.
+    Raises CaseError if its method, linear elasticity, repair of each step, or one of its limits
+    needs the whole mesh at once, and MeshError if its mesh is of no format that can be streamed.
     """
     path = case.mesh_file
     assert path is not None
+    if case.repair != "no" and case.repair_steps:
+        raise CaseError(
+            "REPAIR_STEPS= YES needs the whole mesh after each step and cannot be streamed; use "
+            "REPAIR_STEPS= NO, or run it without --stream"
+        )
     if case.method == "elastic":
         raise CaseError(
             "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "

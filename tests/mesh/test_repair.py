@@ -258,7 +258,7 @@ def test_cells_that_no_motion_mends_are_named():
     result = repair(folded, Freedom.within(2, held), mesh)
     (cell,) = result.impossible
     assert corner in cell.nodes
-    assert cell.boundaries == ("x_m", "y_m")
+    assert held[cell.nodes].all()
     assert len(result.bad_before) > 1
     assert result.bad_after.tolist() == [cell.cell]
 
@@ -270,7 +270,8 @@ def test_a_side_that_folds_on_itself_is_named():
     node = int(np.argmin(np.linalg.norm(points - [1 / 3, 1 / 3, 0], axis=1)))
     points[node] = 0.6, 0.6, 0.0
     result = repair(mesh.with_points(points), Freedom.within(3, held), mesh, below=0.0)
-    assert {one.boundaries for one in result.impossible} == {("z_m",)}
+    assert all(node in one.nodes for one in result.impossible)
+    assert not points[[one.nodes for one in result.impossible], 2].any()
     assert {one.cell for one in result.impossible} == set(result.bad_after.tolist())
 
 
@@ -289,7 +290,7 @@ def test_a_report_may_cancel():
     held = held_boundary(mesh)
     seen = []
 
-    def report(phase, fraction):
+    def report(fraction):
         seen.append(fraction)
         if len(seen) > 5:
             raise KeyboardInterrupt

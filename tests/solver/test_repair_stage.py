@@ -295,7 +295,10 @@ def test_a_run_reports_its_repair(tmp_path, capsys):
     assert run([*words, "--json", str(report)]) == 3
     assert json.loads(report.read_text())["repair"] is None
     assert "REPAIR= YES" in capsys.readouterr().err
-    assert run([*words, "--stream", "--set", "REPAIR=YES"]) == 1
-    assert "REPAIR= YES needs the whole mesh in memory" in capsys.readouterr().err
-    assert run([*words, "--stream", "--set", "REPAIR=AUTO"]) == 3
-    assert "REPAIR= AUTO mends no mesh that goes from file to file" in capsys.readouterr().err
+    words += ["--stream", "--json", str(report), "--set", "REPAIR=AUTO"]
+    assert run(words) == 0
+    streamed = json.loads(report.read_text())
+    assert streamed["repair"] == found["repair"]
+    assert streamed["seconds"]["repair"] > 0.0
+    assert run([*words, "--set", "REPAIR_STEPS=YES"]) == 1
+    assert "REPAIR_STEPS= YES needs the whole mesh after each step" in capsys.readouterr().err

@@ -24,7 +24,7 @@ from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from slideviz.solver.deform import folded_at
 from slideviz.solver.steps import Progress
-from slideviz.streaming import interior, output, resources, stream_input
+from slideviz.streaming import interior, output, repair, resources, stream_input
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import SECONDS, stream
 from slideviz.streaming.skin import read_skin
@@ -56,6 +56,14 @@ RUNS = [
     ("polar", 12, ("STEPS=2", "LAYERS=KEEP", "LAYER_THICKNESS=0.1")),
     ("cylindrical", 6, ("STEPS=2", "LAYERS=KEEP", "LAYER_THICKNESS=0.1")),
     ("airfoil", 24, ("STEPS=1", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-3")),
+    ("square", 25, ("STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none", "REPAIR=YES")),
+    ("square", 25, ("STEPS=2", "REPAIR=AUTO", "REPAIR_BELOW=0.5")),
+    ("polar", 12, ("STEPS=1", "REPAIR=YES", "REPAIR_BELOW=0.6")),
+    ("cylindrical", 6, ("STEPS=1", "REPAIR=YES", "REPAIR_BELOW=0.5")),
+    pytest.param(
+        *("stator", 7000, ("STEPS=1", "REPAIR=YES", "REPAIR_BELOW=0.75")),
+        marks=pytest.mark.slow,
+    ),
 ]
 """Sample, size and changes of its case: every sliding method, periodic mode and kind of frame."""
 
@@ -78,6 +86,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
     ids = found.inverted_cells(100)
     for chunk in (37, 1 << 20):
         monkeypatch.setattr(output, "CHUNK", chunk)
+        monkeypatch.setattr(repair, "CELLS", chunk)
         done = stream(case, tmp_path / "out.su2b")
         moved = sv.read(tmp_path / "out.su2b")
         assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
@@ -91,6 +100,9 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
             for field in ("max_error", "control_nodes", "node_counts", "warnings", "tried", "safe"):
                 assert getattr(one, field) == getattr(other, field)
             assert one.periodic_misfit == other.periodic_misfit
+            if one.repaired is not None:
+                assert len(one.repaired.nodes)
+                assert one.repaired.report() == other.repaired.report()
     assert sorted(p.name for p in tmp_path.glob(".*")) == []
 
 
@@ -262,6 +274,57 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
         out.write_bytes(b"older")
+
+
+def test_a_run_that_was_stopped_in_its_repair_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(output, "CHUNK", 60)
+    sets = "STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none", "REPAIR=YES"
+    case, out = made(tmp_path, "square", 25, sets), tmp_path / "out.su2b"
+    stream(case, out)
+    whole, phases = out.read_bytes(), ["write"]
+
+    def stop(progress):
+        if progress.phase != phases[-1]:
+            phases.append(progress.phase)
+        if phases[-2:] == ["repair", "quality"]:
+            raise KilledError
+
+    with pytest.raises(KilledError):
+        stream(case, out, report=stop)
+    told: list[str] = []
+    stream(case, out, note=told.append, resume=True)
+    assert "continues after" in told[0]
+    assert out.read_bytes() == whole
+
+
+def test_nodes_on_sides_without_a_marker_stay(tmp_path):
+    mesh, path = grid((9, 9)), tmp_path / "mesh.su2b"
+    sv.write(path, replace(mesh, markers=mesh.markers[:2]))
+    case = sv.Case(
+        mesh_file=path,
+        roles={"x_m": "moving"},
+        motions=(sv.Rotate("x_m", 15.0, (0.0, 0.5)),),
+        repair="yes",
+        repair_below=0.95,
+    )
+    mesh = sv.read(path)
+    *_, last = sv.deform(case, mesh)
+    bare = mesh.points[:, 1] == mesh.points[:, 1].max()
+    assert bare[mesh.cells.take(last.repaired.cells).nodes].any()
+    assert not bare[last.repaired.nodes].any()
+    stream(case, tmp_path / "out.su2b")
+    assert np.array_equal(bits(sv.read(tmp_path / "out.su2b").points), bits(last.mesh.points))
+
+
+def test_bad_cells_stay_where_their_repair_does_not_fit_into_memory(tmp_path, monkeypatch):
+    sets = "STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none", "REPAIR=YES"
+    case = made(tmp_path, "square", 25, sets)
+    plain = stream(case.change(repair="no"), tmp_path / "plain.su2b")
+    monkeypatch.setattr(repair, "free_memory", lambda: 1e5)
+    done = stream(case, tmp_path / "out.su2b")
+    assert done.quality.summary() == plain.quality.summary()
+    assert "bad cells stay as they are" in done.steps[-1].warnings[-1]
+    assert len(done.steps[-1].repaired.left) == len(done.steps[-1].repaired.cells) > 0
 
 
 @pytest.mark.parametrize(

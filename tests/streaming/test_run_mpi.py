@@ -155,7 +155,7 @@ def sent(thing):
     [
         ("square", 25, ("STEPS=2", "SLIDING_MODE=ds", "RBF_KERNEL=thin-plate")),
         ("cylindrical", 9, ("STEPS=2", "METHOD=idw")),
-        ("polar", 12, ("STEPS=auto",)),
+        ("polar", 12, ("STEPS=auto", "REPAIR=YES", "REPAIR_BELOW=0.9")),
         ("stator", 5000, ("STEPS=2",)),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +65,33 @@ class Freedom:
             None if whole is None else project,
         )
 
+    def embedded(self, places: IntArray, count: int) -> Freedom:
+        """Return the freedom of ``count`` nodes, of which these are at ``places`` (n,), ascending.
+
+        All others move anywhere.
+        """
+        place = self.place.max(initial=-1) + 1 + np.arange(count)
+        place[places] = self.place
+        whole = self.project
+
+        def project(some: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+            assert whole is not None
+            return whole(np.searchsorted(places, some), points)
+
+        bound, curved = places[self.bound], places[self.curved]
+        return Freedom(sealed(place), bound, self.maps, curved, None if whole is None else project)
+
+    def without(self, held: IntArray) -> Freedom:
+        """Return the freedom in which some nodes (h,) and their images are held, too."""
+        blocks = self.place[held]
+        place = np.where(np.isin(self.place, blocks[blocks >= 0]), -1, self.place)
+        return replace(self, place=sealed(place))
+
     def only(self, moves: NDArray[np.bool_]) -> Freedom:
         """Return the freedom in which the nodes of the mask (n,) move alone; blocks from 0."""
-        place = np.unique(self.place[moves], return_inverse=True)[1]
+        _, first, block = np.unique(self.place[moves], return_index=True, return_inverse=True)
         every = np.full(len(moves), -1)
-        every[moves] = place
+        every[moves] = np.argsort(np.argsort(first))[block]
         bound = moves[self.bound]
         return Freedom(
             sealed(every),

@@ -41,11 +41,11 @@ def find_patches(
     place, count = freedom.place, len(freedom.place)
     chosen = bad.copy()
     for _ in range(rings):
-        near = _with_images(place, _nodes_of(cells, chosen, count))
+        near = with_images(place, _nodes_of(cells, chosen, count))
         for ids, nodes in cells.by_type.values():
             chosen[ids] |= near[nodes].any(axis=1)
     inside = ~_nodes_of(cells, ~chosen, count) & (place >= 0)
-    inside &= ~_with_images(place, ~inside)
+    inside &= ~with_images(place, ~inside)
     ids = np.flatnonzero(chosen)
     part = cells.take(ids)
     first, sizes = part.connectivity[part.offsets[:-1]], np.diff(part.offsets)
@@ -62,7 +62,7 @@ def _nodes_of(cells: Cells, chosen: NDArray[np.bool_], count: int) -> NDArray[np
     return out
 
 
-def _with_images(place: IntArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def with_images(place: IntArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the mask ``chosen`` (n,) with all nodes of the blocks of those in it."""
     blocks = np.zeros(int(place.max(initial=-1)) + 2, bool)  # the last one: of held nodes
     blocks[place[chosen]] = True

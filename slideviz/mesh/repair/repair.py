@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +59,8 @@ that folds on itself the Jacobian vanishes, wherever the other nodes are."""
 BELOW = 0.1
 """Cells of a lower quality are mended, too."""
 
-Report = Callable[[str, float], object]
-"""Called with what is done and the fraction of it; what it raises ends the repair."""
+Report = Callable[[float], object]
+"""Called with the fraction that is done; what it raises ends the repair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +69,33 @@ class Impossible:
 
     cell: int
     nodes: IntArray
-    """(k,): its nodes that are held and make it fold."""
-    boundaries: tuple[str, ...]
-    """The markers that these nodes are on."""
+    """(k,): its nodes that are held and make it fold, ascending."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Cells of a mesh, with what their repair needs."""
+
+    cells: IntArray
+    nodes: IntArray
+    """`cells`, `nodes` (m,), (n,): the numbers of its cells and nodes in the mesh, ascending."""
+    mesh: Mesh
+    reference: Mesh | None
+    """`mesh`, `reference`: the region itself, as it is now and undeformed."""
+    freedom: Freedom
+
+
+class Regions(Protocol):
+    """A mesh to repair, in memory or in a file, of which one region is in memory at a time."""
+
+    def near(self, cells: IntArray, rings: int) -> Region | None:
+        """Return a region with all cells at the nodes of some cells (k,) and rings around them.
+
+        None: it is too large, and the cells stay as they are.
+        """
+
+    def move(self, region: Region, points: FloatArray) -> None:
+        """Take the points (n, d) of the nodes of a region, some of which were moved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +140,7 @@ def repair(
     *,
     below: float = BELOW,
     metric: SkewMetric = "knupp",
-    report: Report = lambda _phase, _fraction: None,
+    report: Report = lambda _: None,
 ) -> Repaired:
     """Return the mesh's points with bad cells mended: those not proved valid, or too low.
 
@@ -133,69 +158,112 @@ def repair(
     metric : {"knupp", "rbf-slide"}
         Of the quality (`slideviz.mesh.quality.Quality`).
     report : callable
-        Called with a phase and the fraction of it; may raise, to cancel.
+        Called with the fraction that is done; may raise, to cancel.
 
     Raises
     ------
     MeshError
         As `quality` raises it.
     """
-    report("Repair", 0.0)
-    found = quality(mesh, reference, metric)
-    before = _bad(found, below)
-    sums, signs = reference_of(mesh if reference is None else checked_reference(reference, mesh))
-    points, hopeless = np.array(mesh.points), np.zeros(len(before), bool)
-    impossible = _impossible(mesh, found, before, freedom)
-    hopeless[[one.cell for one in impossible]] = True
-    after, bad = before, before & ~hopeless
-    with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
-        for stage, rings in enumerate(RINGS):
-            if not bad.any():
-                break
-
-            def staged(fraction: float, stage: int = stage) -> None:
-                report("Repair", (stage + fraction) / len(RINGS))
-
-            now = mesh.with_points(points)
-            settings = freedom, sums, signs, metric, below, staged, hopeless, pool
-            _mend_patches(_Work(now, reference, *settings), bad, rings, points)
-            found = quality(mesh.with_points(points), reference, metric)
-            after = _bad(found, below)
-            bad &= after if stage + 1 < POOR else found.status != VALID
+    shapes = None if reference is None else checked_reference(reference, mesh)
+    before = np.flatnonzero(is_bad(quality(mesh, shapes, metric), below))
+    whole = _Whole(mesh, shapes, freedom)
+    after, impossible = mend_cells(whole, before, below, metric, report)
+    points = whole.points
     way = np.linalg.norm(points - mesh.points, axis=1)
     return Repaired(
         points=sealed(points),
-        bad_before=sealed(np.flatnonzero(before)),
-        bad_after=sealed(np.flatnonzero(after)),
+        bad_before=sealed(before),
+        bad_after=sealed(after),
         moved=sealed(np.flatnonzero((points != mesh.points).any(axis=1))),
         largest_move=float(way.max(initial=0.0)),
         impossible=impossible,
     )
 
 
-def _bad(found: Quality, below: float) -> NDArray[np.bool_]:
+class _Whole:
+    """A mesh in memory: one region."""
+
+    def __init__(self, mesh: Mesh, reference: Mesh | None, freedom: Freedom) -> None:
+        self.points = np.array(mesh.points)
+        self._region = Region(
+            np.arange(len(mesh.cells)), np.arange(len(mesh.points)), mesh, reference, freedom
+        )
+
+    def near(self, _cells: IntArray, _rings: int) -> Region:
+        """Return the mesh."""
+        return replace(self._region, mesh=self._region.mesh.with_points(self.points))
+
+    def move(self, _region: Region, points: FloatArray) -> None:
+        """Take the points (n, d) of the mesh."""
+        self.points = points
+
+
+def mend_cells(
+    regions: Regions, bad: IntArray, below: float, metric: SkewMetric, report: Report
+) -> tuple[IntArray, tuple[Impossible, ...]]:
+    """Mend the bad cells (k,) of a mesh; return those that are bad then, and the hopeless ones.
+
+    The rest as of `repair`.
+    """
+    report(0.0)
+    after, impossible = bad, tuple[Impossible, ...]()
+    with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
+        for stage, rings in enumerate(RINGS):
+            if not len(bad):
+                break
+
+            def staged(fraction: float, stage: int = stage) -> None:
+                report((stage + fraction) / len(RINGS))
+
+            region = regions.near(bad, rings)
+            if region is None:
+                break
+            mesh, reference = region.mesh, region.reference
+            sums, signs = reference_of(mesh if reference is None else reference)
+            wanted, points = np.isin(region.cells, bad), np.array(mesh.points)
+            if not stage:
+                impossible = _impossible(region, wanted, signs, sums, metric)
+            hopeless = np.isin(region.cells, [one.cell for one in impossible])
+            wanted &= ~hopeless
+            settings = region.freedom, sums, signs, metric, below, staged, hopeless, pool
+            _mend_patches(_Work(mesh, reference, *settings), wanted, rings, points)
+            regions.move(region, points)
+            found = quality(mesh.with_points(points), reference, metric)
+            still = is_bad(found, below)
+            after = np.union1d(np.setdiff1d(after, region.cells), region.cells[still])
+            bad = region.cells[wanted & (still if stage + 1 < POOR else found.status != VALID)]
+    return after, impossible
+
+
+def is_bad(found: Quality, below: float) -> NDArray[np.bool_]:
+    """Return a mask (m,) of the cells that are not proved valid, or below a limit."""
     return (found.status != VALID) | (found.values < below)
 
 
 def _impossible(
-    mesh: Mesh, found: Quality, bad: NDArray[np.bool_], freedom: Freedom
+    region: Region,
+    bad: NDArray[np.bool_],
+    signs: NDArray[np.int8],
+    sums: FloatArray,
+    metric: SkewMetric,
 ) -> tuple[Impossible, ...]:
     """Return the bad cells (mask (m,)) that no motion of free nodes mends.
 
     All their nodes are held, or those of a corner that folds, or of a side that folds on itself.
     """
-    out = []
-    held = freedom.place < 0
-    for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        for row in np.flatnonzero(bad[ids] & (held[nodes].sum(axis=1) >= mesh.dim)):
-            cell, own = int(ids[row]), nodes[row]
+    out, points, held = [], region.mesh.points, region.freedom.place < 0
+    for vtk, (ids, table) in region.mesh.cells.by_type.items():
+        few = np.flatnonzero(bad[ids] & (held[table].sum(axis=1) >= points.shape[1]))
+        cells, nodes = ids[few], table[few]
+        status = cell_quality(points, vtk, nodes, signs[cells], sums[cells], metric)[2]
+        for cell, own, proved in zip(cells, nodes, status == VALID, strict=True):
             wrong = own if held[own].all() else None
-            if wrong is None and found.status[cell] != VALID:
-                wrong = _fold(vtk, own, held[own], mesh.points[own], int(found.signs[cell]))
+            if wrong is None and not proved:
+                wrong = _fold(vtk, own, held[own], points[own], int(signs[cell]))
             if wrong is not None:
-                wrong = np.sort(wrong)
-                on = (m.name for m in mesh.markers if np.isin(wrong, m.nodes).any())
-                out.append(Impossible(cell, sealed(wrong), tuple(on)))
+                wrong = sealed(np.sort(region.nodes[wrong]))
+                out.append(Impossible(int(region.cells[cell]), wrong))
     return tuple(sorted(out, key=lambda one: one.cell))
 
 

@@ -1,0 +1,235 @@
+"""Repair of a streamed mesh: the cells near bad ones are read from the file, and mended there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.case.model import Case
+from slideviz.formats.su2b.read import ElementBlock, element_blocks
+from slideviz.mesh.elements import SIZES
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, sealed
+from slideviz.mesh.quality import VALID, Quality
+from slideviz.mesh.repair.freedom import Freedom
+from slideviz.mesh.repair.patches import with_images
+from slideviz.mesh.repair.repair import Region, mend_cells
+from slideviz.solver.deform import free_memory
+from slideviz.solver.repair import find_freedom, unmarked_sides, unmendable_words
+from slideviz.solver.setup import Setup
+from slideviz.solver.steps import MeshRepair
+from slideviz.streaming.source import CELLS, FileSource
+from slideviz.system.threads import Tick
+
+BYTES = 3000  # of memory that repair takes for each cell of a region: measured on hexahedra
+RUN = 64  # nodes whose numbers are at most so far apart are written in one piece
+
+Chosen = Callable[[ElementBlock, IntArray], NDArray[np.bool_]]
+"""Takes cells (k,) of a file, and where the nodes of each begin; returns which of them count."""
+
+
+class FileRegions:
+    """A deformed mesh in a file, of which one region is in memory at a time.
+
+    Parameters
+    ----------
+    source : FileSource
+        The mesh, and the undeformed points.
+    file : BinaryIO
+        The file of its points, to which moved ones are written.
+    skin : Mesh
+        The boundary and the cells at it.
+    freedom : Freedom
+        Of the nodes of the skin.
+    facets : (f, 2 or 4)
+        The sides that are on a boundary, by nodes of the skin.
+    going_on : callable
+        Called with each block of cells; what it raises ends the work.
+    """
+
+    def __init__(
+        self,
+        source: FileSource,
+        file: BinaryIO,
+        skin: Mesh,
+        freedom: Freedom,
+        facets: IntArray,
+        going_on: Callable[[], object],
+    ) -> None:
+        assert skin.part is not None
+        self._source, self._file, self._going_on = source, file, going_on
+        self._skin, self._freedom, self._facets = skin.part.points, freedom, facets
+        self.nodes = self._skin[:0]
+        self.before = np.empty((0, skin.dim))
+        """`nodes`, `before` (m,), (m, d): nodes in regions that were moved, and where they were."""
+        self.warnings: tuple[str, ...] = ()
+        self.bad: Cells | None = None  # the cells of which the first region was asked for
+
+    def near(self, cells: IntArray, rings: int) -> Region | None:
+        """Return a region with all cells at the nodes of some cells (k,) and rings around them.
+
+        None where it does not fit into memory.
+        """
+        near = self._nodes_of(lambda block, _: np.isin(block.ids, cells))
+        for _ in range(rings):
+            near = self._nodes_of(_touching(near))
+        blocks, count, free = [], 0, free_memory()
+        for block in self._blocks(_touching(near)):
+            blocks.append(block)
+            count += len(block.ids)
+            if BYTES * count > free:
+                sentence = (
+                    f"{len(cells)} bad cells stay as they are: with the cells near them, their "
+                    f"repair needs more than the {free / 1e9:.1f} GB of memory that are free"
+                )
+                self.warnings = (sentence,)
+                return None
+        ids = np.concatenate([block.ids for block in blocks])
+        flat = np.concatenate([block.nodes for block in blocks])
+        nodes, connectivity = np.unique(flat, return_inverse=True)
+        types = np.concatenate([block.types for block in blocks])
+        order = np.argsort(ids, kind="stable")
+        ids, table = ids[order], Cells.from_types(types, connectivity).take(order)
+        if self.bad is None:
+            some = table.take(np.searchsorted(ids, cells))
+            self.bad = Cells.from_types(some.types, nodes[some.connectivity])
+        assert self._source.base is not None
+        mesh = Mesh(self._source.points.at(nodes), table, name=self._source.file.name)
+        reference = mesh.with_points(self._source.base.at(nodes))
+        return Region(ids, nodes, mesh, reference, self._freedom_of(nodes, near[nodes], reference))
+
+    def move(self, region: Region, points: FloatArray) -> None:
+        """Write the points (n, d) of the nodes of a region that were moved."""
+        moved = np.flatnonzero((points != region.mesh.points).any(axis=1))
+        nodes = region.nodes[moved]
+        new = ~np.isin(nodes, self.nodes)
+        every = np.concatenate([self.nodes, nodes[new]])
+        order = np.argsort(every)
+        before = np.concatenate([self.before, region.mesh.points[moved[new]]])
+        self.nodes, self.before = every[order], before[order]
+        self._write(nodes, points[moved])
+
+    def _write(self, nodes: IntArray, points: FloatArray) -> None:
+        """Write the points (k, d) of ascending nodes (k,), and wait until they are on the disk."""
+        table = self._source.points
+        for part in np.split(np.arange(len(nodes)), np.flatnonzero(np.diff(nodes) > RUN) + 1):
+            if not len(part):
+                continue
+            first = int(nodes[part[0]])
+            rows = np.array(table.rows(first, int(nodes[part[-1]]) + 1 - first))
+            rows["x"][nodes[part] - first] = points[part]
+            left, at = rows.view(np.uint8).data, table.byte(first)
+            while left:
+                written = os.pwrite(self._file.fileno(), left, at)
+                at, left = at + written, left[written:]
+        os.fsync(self._file.fileno())
+
+    def _blocks(self, chosen: Chosen) -> Iterator[ElementBlock]:
+        """Yield the chosen cells of the file, block by block."""
+        file, place = self._source.file, self._source.place
+        for block in element_blocks(file, place, place.cells, place.dim, CELLS):
+            self._going_on()
+            sizes = SIZES[block.types]
+            which = chosen(block, np.cumsum(sizes) - sizes)
+            if which.any():
+                nodes = block.nodes[np.repeat(which, sizes)]
+                yield ElementBlock(0, block.types[which], nodes, block.ids[which])
+
+    def _nodes_of(self, chosen: Chosen) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the nodes of the chosen cells, and of their images."""
+        mask = np.zeros(self._source.n_points, bool)
+        for block in self._blocks(chosen):
+            mask[block.nodes] = True
+        mask[self._skin] = with_images(self._freedom.place, mask[self._skin])
+        return mask
+
+    def _freedom_of(self, nodes: IntArray, inside: NDArray[np.bool_], undeformed: Mesh) -> Freedom:
+        """Return the freedom of the nodes (n,) of a region.
+
+        ``inside`` (n,): those of which all cells are in the region.
+        """
+        shared = np.flatnonzero(np.isin(self._skin, nodes))
+        places = np.searchsorted(nodes, self._skin[shared])
+        of_skin = np.full(len(self._skin), -1)
+        of_skin[shared] = places
+        facets = of_skin[self._facets]
+        sides = unmarked_sides(undeformed, facets[(facets >= 0).all(axis=1)])
+        bare = np.unique(sides[inside[sides].all(axis=1)])
+        return self._freedom.of_part(shared).embedded(places, len(nodes)).without(bare)
+
+
+def _touching(near: NDArray[np.bool_]) -> Chosen:
+    """Return what chooses the cells with a node in the mask ``near`` (n,)."""
+    return lambda block, first: np.logical_or.reduceat(near[block.nodes], first)
+
+
+def mend_file(
+    case: Case,
+    source: FileSource,
+    file: BinaryIO,
+    tick: Tick,
+    skin: Mesh,
+    setup: Setup,
+    points: FloatArray,
+    before: Quality,
+    after: Quality,
+) -> MeshRepair:
+    """Return a streamed mesh with its bad cells mended in the file.
+
+    Parameters
+    ----------
+    source, file
+        As of `FileRegions`.
+    skin, setup : Mesh, Setup
+        The undeformed skin, with its cells, and its setup.
+    points : (k, d)
+        Of the deformed skin.
+    before, after : Quality
+        Of all cells, undeformed and deformed.
+    """
+    below, count = min(case.repair_below, before.min), source.n_cells
+    bad = np.concatenate(
+        [
+            first + np.flatnonzero((after.status[here] != VALID) | (after.values[here] < below))
+            for first in range(0, count, CELLS)
+            for here in [slice(first, first + CELLS)]
+        ]
+    )
+    if not len(bad):
+        return MeshRepair(skin, bad, bad, bad, points[bad], 0.0)
+    done = 0.0
+
+    def report(fraction: float) -> None:
+        nonlocal done
+        done = fraction
+        tick(done)
+
+    freedom = find_freedom(case, skin, points, setup)
+    facets = setup.boundary.facets
+    regions = FileRegions(source, file, skin, freedom, facets, lambda: tick(done))
+    left, impossible = mend_cells(regions, bad, below, case.quality_metric, report)
+    if regions.bad is None:
+        none = bad[:0]
+        return MeshRepair(skin, bad, left, none, points[none], 0.0, warnings=regions.warnings)
+    nodes = np.union1d(regions.bad.nodes, regions.nodes)
+    cells = Cells.from_types(regions.bad.types, np.searchsorted(nodes, regions.bad.connectivity))
+    part = Part(sealed(nodes), sealed(bad), source.n_points, count)
+    mesh = Mesh(source.points.at(nodes), cells, name=skin.name, part=part)
+    moved = np.searchsorted(nodes, regions.nodes)
+    way = np.linalg.norm(mesh.points[moved] - regions.before, axis=1)
+    # Later regions may have moved a node back to where it was.
+    kept = np.flatnonzero(way > 0.0)
+    unmendable, warnings = unmendable_words(impossible, skin)
+    return MeshRepair(
+        mesh,
+        bad,
+        left,
+        regions.nodes[kept],
+        regions.before[kept],
+        float(way.max(initial=0.0)),
+        unmendable,
+        (*warnings, *regions.warnings),
+    )
