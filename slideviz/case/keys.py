@@ -15,7 +15,18 @@ from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
 from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
-from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, integer, one_of
+from slideviz.case.values import (
+    AXIS,
+    ENDS,
+    NAMES,
+    PAIRS,
+    PATH,
+    POINT,
+    YES_NO,
+    choice,
+    integer,
+    one_of,
+)
 from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
 from slideviz.formats.table import FILE_FORMATS
@@ -105,6 +116,16 @@ PERIODIC_ROWS = (
         form="main",
         run_label="axis through {}",
         idle_reason=no_pair,
+    ),
+    setting(
+        "SPAN",
+        PERIODICITY,
+        ENDS,
+        "span",
+        "Hub and shroud, between which the span of a machine goes from 0 to 1. AUTO takes the "
+        "boundaries whose names contain hub, and shroud or casing.",
+        label="Span",
+        run_label="span {}",
     ),
 )
 

@@ -267,6 +267,7 @@ class Case(CheckedFields):
 
     * ``mesh_format``, ``mesh_out_format``: None: by the ending of the file.
     * ``axis``, ``origin``: direction and a point of the axis of rotational periodicity.
+    * ``span``: hub and shroud, between which the span is from 0 to 1; None: by their names.
     * ``direction``, ``curved``: RBF-SliDe's, without effect: both are found from the mesh.
       ``direction`` is 0, 1, 2 for x, y, z or r, theta, z, or None.
     * ``feature_angle_deg``: the angle in degrees from which a bend in a boundary is an edge; the
@@ -322,6 +323,7 @@ class Case(CheckedFields):
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     direction: int | None = None
+    span: tuple[str, str] | None = None
     feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
     curved: bool = False
     steps: Annotated[int, 'a whole number, or "auto"'] = 1

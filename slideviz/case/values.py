@@ -12,7 +12,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from slideviz.case.words import Word, check_writable, is_none, list_of, name_text, number, words_of
+from slideviz.case.words import (
+    Word,
+    check_writable,
+    counted,
+    is_none,
+    list_of,
+    name_text,
+    number,
+    words_of,
+)
 from slideviz.errors import CaseError, not_one_of, shown
 from slideviz.terms import AXES, Term, labels
 
@@ -169,6 +178,18 @@ def _write_names(names: tuple[str, ...]) -> str:
     return f"( {', '.join(name_text(name) for name in names)} )"
 
 
+def _read_ends(text: str) -> tuple[str, str] | None:
+    names = _names(list_of(text))
+    if len(names) == 1 and names[0].upper() == "AUTO":
+        return None
+    if len(names) != 2:
+        raise CaseError(
+            f"{shown(text)} has {counted(len(names), 'name')}; expected AUTO, or two boundaries: "
+            "( hub, shroud )"
+        )
+    return names[0], names[1]
+
+
 def _is_su2_form(items: list[Word]) -> bool:
     if not items or len(items) % _SU2_GROUP:
         return False
@@ -243,6 +264,11 @@ YES_NO = replace(
 )
 PATH = Kind("a file name", _read_path, path_text)
 NAMES = Kind("( A, B, ... )", lambda text: _names(list_of(text)), _write_names)
+ENDS = Kind(
+    "AUTO | ( hub, shroud )",
+    _read_ends,
+    lambda names: "AUTO" if names is None else _write_names(names),
+)
 PAIRS = Kind("( A, B, ... ), also with SU2's numbers", _read_pairs, _write_names, _remark_pairs)
 AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text, entry="axis")
 POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text, entry="point")
