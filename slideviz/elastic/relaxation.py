@@ -275,7 +275,7 @@ class Relaxation:
         low, high = np.sort(np.concatenate(pairs), axis=1).T
         ends = np.stack(np.divmod(np.unique(low * n + high), n), axis=1)
         length = np.linalg.norm(np.diff(self.mesh.points[ends], axis=1)[:, 0], axis=1)
-        far = np.maximum(size[ends].max(axis=1), 1e-300)
+        far = np.maximum(size[ends].max(axis=1), TINY * length + 1e-300)
         images = np.flatnonzero(problem.same_as != np.arange(n))
         rows = np.concatenate([ends[:, 0], images])
         columns = np.concatenate([ends[:, 1], problem.same_as[images]])

@@ -189,6 +189,8 @@ class WallNodes:
         place[hit] = np.arange(len(hit))
         found = []
         for k, (some, *_, each) in enumerate(parts):
+            left = outside[some] < 1.0  # where two walls are as near, none may have a share
+            some, each = some[left], each[left]
             nearest, carrier = self._carriers(k, targets[some])
             carrier *= (each * (1.0 - outside[some]) / weight[some])[:, None]
             row, column = np.nonzero(carrier)
