@@ -734,7 +734,7 @@ def test_layers_are_in_reports_and_summaries(channel, tmp_path, capsys):
     walls = json.loads(report.read_text())["walls"]
     assert list(walls) == ["y_m", "y_p", "x_p"]
     assert walls == sv.walls(sv.read(out), mesh, list(walls)).summary()
-    low = walls["y_m"]["height_ratio"]["min"]
+    low = walls["y_m"]["first_height"]["ratio"]["min"]
     assert line.startswith(f"  layers at y_m  first heights {low:.3f} to ")
     assert run(["quality", str(out), "--case", f"{tmp_path}/case.cfg"]) == 0
     assert line in capsys.readouterr().out

@@ -71,17 +71,10 @@ Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
 """Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
 
 
-@dataclass(eq=False)
-class _Kept:
-    """What is made once for a mesh: its forces, and the preconditioner of the last conditions."""
-
-    forces: Corotated
-    made_for: tuple[IntArray, np.ndarray] | None = None
-    """Unknowns (n,) of the nodes, and which of their components are held, (k, d)."""
-    cycle: LaplacianCycle | None = None
-
-
-_KEPT: WeakKeyDictionary[Mesh, _Kept] = WeakKeyDictionary()
+_MADE: WeakKeyDictionary[Mesh, tuple[Corotated, IntArray, np.ndarray, LaplacianCycle]]
+_MADE = WeakKeyDictionary()
+"""Of each mesh its forces, and the last preconditioner with the conditions that it was made for:
+the unknowns (n,) of the nodes, and which of their components are held, (k, d)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +123,8 @@ class Relaxation:
                 return displacement, None
             start = self.body.frame.coords(self.mesh.points)
             free = self._conditions(problem, start, held, constraints).free
-            kept = self._prepared(problem, given.place, free, tick)
-            moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
+            body = self._prepared(problem, given.place, free, tick)
+            moved, residual = self._iterated(problem, displacement, *body, given, tie, tick)
             theta: FloatArray = problem.choose(
                 "theta", lambda: self._kept_part(problem, displacement, moved, tie)
             )
@@ -147,15 +140,15 @@ class Relaxation:
         there = replace(problem, coords=at, normal_nodes=nodes, normals=normals)
         return conditions(there, self.body, held, np.zeros((len(held), at.shape[1])))
 
-    def _prepared(self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick) -> _Kept:
-        """Return what is kept of this mesh, with the preconditioner for these conditions.
+    def _prepared(
+        self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick
+    ) -> tuple[Corotated, LaplacianCycle]:
+        """Return the forces of this mesh and the preconditioner for these conditions.
 
         ``place`` (n,) and ``free`` (k, d, d) are those of undeformed conditions.
         """
         x, frame = self.mesh.points, self.body.frame
-        kept = _KEPT.get(self.mesh)
-        if kept is None:
-            kept = _KEPT[self.mesh] = _Kept(Corotated.of(x, self.body.parts))
+        made = _MADE.get(self.mesh)
         axes = np.eye(x.shape[1])
         if frame.cylindrical:
             start = frame.coords(x)
@@ -164,24 +157,25 @@ class Relaxation:
             each = [frame.turned_back(start[owner], np.tile(row, (len(free), 1))) for row in axes]
             axes = np.stack(each, axis=2)
         held = _held(axes @ free @ np.swapaxes(axes, -1, -2))
-        made_for = place, held
-        if kept.made_for is None or not all(map(np.array_equal, kept.made_for, made_for)):
-            make = partial(LaplacianCycle.of, kept.forces, place, held, axes)
-            kept.cycle, kept.made_for = while_ticking(make, tick), made_for
-        return kept
+        wanted = place, held, axes
+        if made is None or not all(map(np.array_equal, (*made[1:3], made[3].axes), wanted)):
+            forces = Corotated.of(x, self.body.parts) if made is None else made[0]
+            cycle = while_ticking(partial(LaplacianCycle.of, forces, *wanted), tick)
+            made = _MADE[self.mesh] = forces, place, held, cycle
+        return made[0], made[3]
 
     def _iterated(
         self,
         problem: Problem,
         moved: Array,
-        kept: _Kept,
+        forces: Corotated,
+        cycle: LaplacianCycle,
         given: Conditions,
         tie: Callable[[Array], Array],
         tick: Tick,
     ) -> tuple[Array, float]:
         """Return the relaxed displacement, and the last residual over the first."""
-        frame, forces, cycle = self.body.frame, kept.forces, kept.cycle
-        assert cycle is not None
+        frame = self.body.frame
         unknowns, start = _Unknowns.of(given), points(frame, problem.coords + moved)
         at, force = start, unknowns.collected(_force(forces, start))
         along: Array = np.zeros_like(value(force))

@@ -236,6 +236,13 @@ VALUES = ("first_height", "growth", "equal_layers", "wall_angle")
 """The numbers of the walls of one mesh."""
 CHANGES = ("height_ratio", "angle_change")
 """The numbers that compare the walls of two meshes."""
+_REPORTED = {
+    "first_height": ("first_height", "ratio", "height_ratio"),
+    "growth": ("growth", "", ""),
+    "equal_layers": ("equal_layers", "", ""),
+    "angle": ("wall_angle", "change", "angle_change"),
+}
+"""What a report says of a boundary: a number of `VALUES`, and what of `CHANGES` is said with it."""
 
 
 def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]:
@@ -310,21 +317,23 @@ class Walls:
     def summary(self) -> dict[str, dict]:
         """Return what the report says, by boundary.
 
-        ``layered`` (bool); ``after``, and with a reference ``before``, with the smallest, mean and
-        largest of each of `VALUES` over the columns (of the first height also over the facets
-        without): ``{"min": ..., "mean": ..., "max": ...}``, None where there is none. With a
-        reference also of each of the `CHANGES`.
+        ``layered`` (bool), ``first_height``, ``growth``, ``equal_layers`` and ``angle``. Each of
+        these has ``after``, and with a reference ``before``, the first height also ``ratio`` and
+        the angle ``change``: with the smallest, mean and largest over the columns (of the first
+        height also over the facets without) as ``{"min": ..., "mean": ..., "max": ...}``, None
+        where there is none.
         """
         return {marker: self._summary(marker) for marker in self.markers}
 
     def _summary(self, marker: str) -> dict:
-        at = self.columns.places(marker)
-        now = {name: _statistics(value[at]) for name, value in self.values.items()}
-        after = {name: now.pop(name) for name in VALUES}
-        if self.before is None:
-            return {"layered": marker in self.layered, "after": after}
-        before = {name: _statistics(value[at]) for name, value in self.before.items()}
-        return {"layered": marker in self.layered, "before": before, "after": after, **now}
+        at, out = self.columns.places(marker), dict[str, object](layered=marker in self.layered)
+        for name, (number, comparison, change) in _REPORTED.items():
+            each = {"before": self.before[number]} if self.before is not None else {}
+            each["after"] = self.values[number]
+            if change in self.values:
+                each[comparison] = self.values[change]
+            out[name] = {key: _statistics(values[at]) for key, values in each.items()}
+        return out
 
     def at_cells(self, name: str, before: bool = False) -> FloatArray:
         """Return one of the values at the cells (m,): nan where a cell has no side in ``markers``.
@@ -364,16 +373,15 @@ BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 def wall_words(row: dict) -> str:
     """Return the layers at a boundary in words; ``row`` is its entry of `Walls.summary`."""
-    if "before" not in row:
-        after = row["after"]
-        height, growth, equal = (after[name] for name in VALUES[:3])
-        turned = f"edges at {after['wall_angle']['min']:.3g}° or more"
+    if "before" not in row["angle"]:
+        height, growth, equal, angle = (row[name]["after"] for name in _REPORTED)
+        turned = f"edges at {angle['min']:.3g}° or more"
         growing = f", growth up to {growth['max']:.3g}" if growth["max"] is not None else ""
         layers = f", {equal['min']:.0f} equal"
         return (
             f"first heights {height['min']:.4g} to {height['max']:.4g}{growing}{layers}, {turned}"
         )
-    ratio, change = row["height_ratio"], row["angle_change"]
+    ratio, change = row["first_height"]["ratio"], row["angle"]["change"]
     heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
     turned = f"by up to {turn:.2g}°" if (turn := change["max"]) >= 0.01 else "by less than 0.01°"
     return f"{heights}, first edges turned {turned}"
@@ -437,10 +445,10 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     ...     for k in range(3)])])
     >>> lower = sv.Marker("lower", sv.Cells.from_blocks([(3, [[0, 1]])]))
     >>> mesh = sv.Mesh(points, cells, (lower,))
-    >>> sv.walls(mesh).summary()["lower"]["after"]["equal_layers"]["min"]
+    >>> sv.walls(mesh).summary()["lower"]["equal_layers"]["after"]["min"]
     2.0
     >>> moved = mesh.with_points([[0, 0.05], [1, 0.05], *points[2:]])
-    >>> sv.walls(moved, reference=mesh).summary()["lower"]["height_ratio"]["mean"]
+    >>> sv.walls(moved, reference=mesh).summary()["lower"]["first_height"]["ratio"]["mean"]
     0.5
     """
     columns, layered = _columns_of(

@@ -25,7 +25,7 @@ _NUMBERS = (
     ("first_height", "min", ".4g"),
     ("growth", "max", ".3f"),
     ("equal_layers", "min", ".0f"),
-    ("wall_angle", "min", ".1f°"),
+    ("angle", "min", ".1f°"),
 )
 """The number of each column after the first, the end of it that is worst, and its format."""
 
@@ -58,10 +58,10 @@ def wall_rows(session: Session) -> list[WallRow]:
     rows = []
     for name, entry in wall_entries(session).items():
         before, after = (
-            tuple(_text(entry[state][number][end], form) for number, end, form in _NUMBERS)
+            tuple(_text(entry[number][state][end], form) for number, end, form in _NUMBERS)
             for state in ("before", "after")
         )
-        ratio, turned = entry["height_ratio"], entry["angle_change"]["max"]
+        ratio, turned = entry["first_height"]["ratio"], entry["angle"]["change"]["max"]
         ends = " to ".join(dict.fromkeys(_text(ratio[end], ".3f") for end in ("min", "max")))
         change = (ends, "", "", _text(turned, ".1f°"))
         rows.append(WallRow(name, entry["layered"], before, after, change, _tip(entry)))
@@ -78,7 +78,7 @@ def _tip(entry: dict) -> str:
     lines = []
     for state in ("before", "after"):
         for (number, _, _), title in zip(_NUMBERS, COLUMNS[1:], strict=True):
-            ends = entry[state][number]
+            ends = entry[number][state]
             if ends["min"] is not None:
                 numbers = ", ".join(f"{name} {ends[name]:.6g}" for name in ("min", "mean", "max"))
                 lines.append(f"{title} {state}: {numbers}")
@@ -91,14 +91,14 @@ def height_ratios(frame: StepFrame | None, case: Case) -> tuple[float, float] | 
     Of moving and fixed boundaries with layers, or of sliding ones if there are only these;
     (None, None) where there are none.
     """
-    ends = [entry["height_ratio"] for entry in _layered(frame, case)]
+    ends = [entry["first_height"]["ratio"] for entry in _layered(frame, case)]
     lows, highs = ([end[k] for end in ends if end[k] is not None] for k in ("min", "max"))
     return (min(lows), max(highs)) if lows else (None, None)
 
 
 def angle_change(frame: StepFrame | None, case: Case) -> float | None:
     """Return the largest change of a first edge's angle in degrees, as `height_ratios`."""
-    ends = (entry["angle_change"]["max"] for entry in _layered(frame, case))
+    ends = (entry["angle"]["change"]["max"] for entry in _layered(frame, case))
     return max((end for end in ends if end is not None), default=None)
 
 
@@ -129,7 +129,7 @@ def write_table(path: Path, session: Session) -> None:
 
 
 def _csv_rows(session: Session) -> list[list[object]]:
-    """Return a row of titles as ``before.growth.max``, and one of numbers for each boundary."""
+    """Return a row of titles as ``growth.before.max``, and one of numbers for each boundary."""
     flat = {name: _flat(entry) for name, entry in wall_entries(session).items()}
     titles = list(next(iter(flat.values()), {}))
     return [["boundary", *titles], *([name, *row.values()] for name, row in flat.items())]

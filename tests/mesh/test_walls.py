@@ -67,12 +67,12 @@ def test_channel_by_hand():
     mesh = grid((4, 6), place=lambda p: np.stack([p[:, 0], y[p[:, 1].astype(int)]], axis=1))
     lower, upper = (sv.walls(mesh).summary()[name] for name in ("y_m", "y_p"))
     assert lower["layered"]
-    assert lower["after"]["equal_layers"]["min"] == 2
-    assert lower["after"]["first_height"]["max"] == pytest.approx(0.1)
-    assert lower["after"]["growth"]["mean"] == pytest.approx(0.1495 / 0.1005)
-    assert lower["after"]["wall_angle"]["min"] == pytest.approx(90)
-    assert upper["after"]["equal_layers"]["max"] == 1
-    assert upper["after"]["growth"]["max"] == pytest.approx(0.1495 / 0.1005)
+    assert lower["equal_layers"]["after"]["min"] == 2
+    assert lower["first_height"]["after"]["max"] == pytest.approx(0.1)
+    assert lower["growth"]["after"]["mean"] == pytest.approx(0.1495 / 0.1005)
+    assert lower["angle"]["after"]["min"] == pytest.approx(90)
+    assert upper["equal_layers"]["after"]["max"] == 1
+    assert upper["growth"]["after"]["max"] == pytest.approx(0.1495 / 0.1005)
 
 
 def test_changes_of_a_sheared_layer():
@@ -82,10 +82,10 @@ def test_changes_of_a_sheared_layer():
     points[points[:, 1] == 0.1] += [0.05, -0.05]
     walls = sv.walls(mesh.with_points(points), mesh)
     low = walls.summary()["y_m"]
-    for value, expected in (("height_ratio", 0.5), ("angle_change", 45.0)):
-        assert (low[value]["min"], low[value]["max"]) == pytest.approx((expected, expected))
-    assert low["before"]["first_height"]["mean"] == pytest.approx(0.1)
-    assert low["after"]["first_height"]["mean"] == pytest.approx(0.05)
+    for value, expected in ((low["first_height"]["ratio"], 0.5), (low["angle"]["change"], 45.0)):
+        assert (value["min"], value["max"]) == pytest.approx((expected, expected))
+    assert low["first_height"]["before"]["mean"] == pytest.approx(0.1)
+    assert low["first_height"]["after"]["mean"] == pytest.approx(0.05)
     inner = np.isnan(walls.at_cells("height_ratio"))
     assert np.count_nonzero(inner) == 16
     below = (mesh.points[mesh.cells.by_type[9][1], 1].max(axis=1) == 0.1) & ~inner
@@ -193,9 +193,9 @@ def test_a_mesh_of_tetrahedra_has_first_heights_only():
     block = walls.summary()["BLOCK"]
     assert list(walls.summary()) == ["BLOCK"]
     assert not block["layered"]
-    assert block["before"]["first_height"]["min"] > 0
-    assert block["height_ratio"]["min"] < 1 < block["height_ratio"]["max"]
-    assert block["after"]["growth"] == {"min": None, "mean": None, "max": None}
+    assert block["first_height"]["before"]["min"] > 0
+    assert block["first_height"]["ratio"]["min"] < 1 < block["first_height"]["ratio"]["max"]
+    assert block["growth"]["after"] == {"min": None, "mean": None, "max": None}
 
 
 def test_mistakes():

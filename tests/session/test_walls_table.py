@@ -46,9 +46,9 @@ def test_the_csv_has_every_number():
     session = sheared_session({"x_m": "internal"})
     rows = list(csv.DictReader(io.StringIO(table_text(session))))
     low = next(row for row in rows if row["boundary"] == "y_m")
-    assert float(low["height_ratio.mean"]) == pytest.approx(0.5)
-    assert float(low["before.equal_layers.max"]) == 2
-    assert float(low["angle_change.min"]) == pytest.approx(45)
+    assert float(low["first_height.ratio.mean"]) == pytest.approx(0.5)
+    assert float(low["equal_layers.before.max"]) == 2
+    assert float(low["angle.change.min"]) == pytest.approx(45)
     assert len(low) == 2 + 4 * 3 * 2 + 2 * 3
 
 

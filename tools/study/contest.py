@@ -273,8 +273,8 @@ def run_row(row: Contest, methods: Sequence[str]) -> Iterator[Outcome]:
         heights = (nan, nan, nan)
         if row.layered:
             walls = sv.walls(last.mesh, mesh, case.markers_with("moving")).summary()
-            ratios = [wall["height_ratio"] for wall in walls.values()]
-            turned = max(wall["angle_change"]["max"] for wall in walls.values())
+            ratios = [wall["first_height"]["ratio"] for wall in walls.values()]
+            turned = max(wall["angle"]["change"]["max"] for wall in walls.values())
             heights = min(r["min"] for r in ratios), max(r["max"] for r in ratios), turned
         counts = found.inverted, found.unproven
         yield Outcome(row.name, method, found.mean, found.min, *counts, *heights, seconds)
