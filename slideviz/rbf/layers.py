@@ -188,8 +188,9 @@ class WallNodes:
         place = np.empty(len(targets), np.int64)
         place[hit] = np.arange(len(hit))
         found = []
-        for k, part in enumerate(parts):  # where two walls are as near, none may have a share
-            some, _, _, each = (x[outside[part[0]] < 1.0] for x in part)
+        for k, part in enumerate(parts):
+            left = outside[part[0]] < 1.0  # where two walls are as near, none may have a share
+            some, each = part[0][left], part[3][left]
             nearest, carrier = self._carriers(k, targets[some])
             carrier *= (each * (1.0 - outside[some]) / weight[some])[:, None]
             row, column = np.nonzero(carrier)
