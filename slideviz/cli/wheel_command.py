@@ -104,7 +104,9 @@ def _wheel(arguments: argparse.Namespace) -> int:
         passages = "1 passage" if made.passages == 1 else f"{made.passages} passages"
         print(f"{made.path}: {passages} of {made.period:.6g}°, {turn}")
         print(f"  {made.cells:,} cells   {made.points:,} points")
-        print(f"  quality: lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted")
+        unproven = f", {made.unproven} unproven" if made.unproven else ""
+        quality = f"lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted{unproven}"
+        print(f"  quality: {quality}")
         names = made.boundaries
         few = names if len(names) <= MOST_NAMES else (names[0], "…", names[-1])
         print(f"  {len(names)} boundaries: {', '.join(few)}")

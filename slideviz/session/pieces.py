@@ -63,13 +63,18 @@ def run_to_end(pieces: Generator[object, Any, Result]) -> Result:
 
 
 def actor_groups(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
-    """Return the visible actors in groups of at most ``cells`` faces, or of one larger actor."""
+    """Return the visible actors in groups of at most ``cells`` faces, or of one larger actor.
+
+    Faces of several actors with one mapper, as neighbouring passages, count once.
+    """
     parts: list[list[Any]] = [[]]
-    count = 0
+    count, mappers = 0, set[Any]()
     for actor in actors:
         if not actor.GetVisibility():
             continue
-        size = _faces(actor)
+        mapper = getattr(actor, "mapper", None)
+        size = 0 if mapper in mappers else _faces(actor)
+        mappers.add(mapper)
         if size and count and count + size > cells:
             parts.append([])
             count = 0

@@ -88,6 +88,14 @@ def test_portions_are_of_not_much_more_than_so_many_faces(plotter):
     ]
 
 
+def test_what_several_actors_share_counts_once(plotter):
+    for k in range(3):
+        copy = pv.Actor(mapper=plotter.renderer.actors["plane 3"].mapper, name=f"copy {k}")
+        plotter.renderer.AddActor(copy)
+    parts = actor_groups(plotter.renderer.actors.values(), 7)
+    assert [len(part) for part in parts] == [2, 6]
+
+
 @pytest.mark.parametrize("stop", [None, 1])
 def test_what_appears_part_by_part_is_all_there_in_the_end(plotter, monkeypatch, stop):
     monkeypatch.setattr(pieces.actor_groups, "__defaults__", (6,))
