@@ -84,6 +84,8 @@ def draw_distribution(
         left = low - BAND * (high - low)
         _strip(axes, bars, outlines, (left, low), foot, style)
     axes.set_xlim(left, high)
+    if high - left < 0.1 * max(abs(left), abs(high)):
+        axes.locator_params(axis="x", nbins=4)  # numbers at ticks are long
     _counts_axis(axes, bars, outlines, log)
     inset = (low - left) / (high - left)
     box = (inset, 0.0, 1.0 - inset, 1.0)

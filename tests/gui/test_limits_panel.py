@@ -95,6 +95,14 @@ def test_walls_before_and_after(panel):
     assert panel.walls.topLevelItem(0).childCount() == 0
 
 
+def test_the_hint_says_when_there_are_no_walls(panel):
+    roles = dict.fromkeys(("x_m", "x_p", "y_m", "y_p"), "internal")
+    show(panel, **roles)
+    assert panel.hint.text().startswith("No boundary is a wall")
+    show(panel)
+    assert panel.hint.text().startswith("Walls: ")
+
+
 def test_a_click_on_a_wall_selects_its_boundary(panel):
     show(panel)
     click(panel.walls, panel.walls.topLevelItem(0).child(1))

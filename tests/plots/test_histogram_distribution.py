@@ -153,6 +153,17 @@ def test_inverted_cells_have_a_strip_left_of_the_values(frames, log):
     assert stem.get_color() == cap.get_color() == ON_DARK.series(1).color
 
 
+def test_long_numbers_at_the_ticks_do_not_touch():
+    axes = Figure(figsize=(3.0, 3.0)).add_subplot()
+    edges = np.linspace(0.98625, 1.00125, BINS + 1)
+    bars = Bars("run 1", Distribution(np.ones(BINS, np.int64), edges, 0))
+    draw_distribution(axes, bars, [], "height ratio [-]")
+    axes.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
+    assert len(boxes) > 2
+    assert all(one.x1 < two.x0 for one, two in zip(boxes, boxes[1:], strict=False))
+
+
 def test_without_inverted_cells_there_is_no_strip(frames):
     axes = Figure().add_subplot()
     bars = Bars("undeformed", distribution(frames[0], "size"))

@@ -37,6 +37,7 @@ LIMIT_TIPS = (
 """What each column of the list of limits has."""
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 ROW_HEIGHT = 20  # height of a row in pixels
+WALLS = "Walls: worst number of each boundary, at the step that is shown."
 NO_WALLS = "No boundary is a wall: all are periodic or internal."
 
 
@@ -96,7 +97,7 @@ class LimitsPanel(Panel):
         set_style(self.problem, "bad", True)
         self.limits = _table("limits", ("Limit", "Now", "Cells"), LIMIT_TIPS, False)
         self.limits.itemClicked.connect(self._limit_clicked)
-        self.hint = hint_label("Walls: worst number of each boundary, at the step that is shown.")
+        self.hint = hint_label(WALLS)
         self.walls = _table("walls", walls_table.COLUMNS, walls_table.TIPS, True)
         self.walls.itemSelectionChanged.connect(self._wall_chosen)
         self.words = words_label()
@@ -187,8 +188,7 @@ class LimitsPanel(Panel):
                     item.addChild(_row(("before", *row.before), row.tip, row.name))
                     item.addChild(_row(("change", *row.change), row.tip, row.name))
                     item.setExpanded(row.layered)
-        if not self.walls.topLevelItemCount():
-            self.hint.setText(NO_WALLS)
+        self.hint.setText(WALLS if self.walls.topLevelItemCount() else NO_WALLS)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
