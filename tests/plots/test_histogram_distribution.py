@@ -1,5 +1,7 @@
 """Counts of cells by value, and the bars and outlines drawn of them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
@@ -161,7 +163,7 @@ def test_long_numbers_at_the_ticks_do_not_touch():
     axes.figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
     assert len(boxes) > 2
-    assert all(one.x1 < two.x0 for one, two in zip(boxes, boxes[1:], strict=False))
+    assert all(one.x1 < two.x0 for one, two in pairwise(boxes))
 
 
 def test_without_inverted_cells_there_is_no_strip(frames):
