@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         Translate,
     )
     from slideviz.design.deformer import Constraint, Deformer
+    from slideviz.design.gap import Gap, gaps
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.design.wheel import WheelQuality, wheel
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
@@ -54,6 +55,7 @@ _NAMES = {
     "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
     "Prescribed Radial Rotate Scale Translate",
     "design.deformer": "Constraint Deformer",
+    "design.gap": "Gap gaps",
     "design.sweeps.sweep": "sweep",
     "design.wheel": "WheelQuality wheel",
     "errors": "ConditionWarning SlidevizError ToleranceWarning",
@@ -80,12 +82,12 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 
 __all__ = [
     "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
-    "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker",
-    "Mesh", "MeshRepair", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial",
-    "Reduction", "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle", "SlidevizError",
-    "Step", "ToleranceWarning", "Translate", "Walls", "WheelQuality", "__version__", "compare",
-    "convert", "deform", "film", "metrics", "picture", "quality", "read", "repair", "safe_fraction",
-    "section", "sweep", "walls", "wheel", "write",
+    "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "Gap", "HicksHenne",
+    "Marker", "Mesh", "MeshRepair", "MetricValues", "Prescribed", "Quality", "QualityDerivative",
+    "Radial", "Reduction", "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle",
+    "SlidevizError", "Step", "ToleranceWarning", "Translate", "Walls", "WheelQuality",
+    "__version__", "compare", "convert", "deform", "film", "gaps", "metrics", "picture", "quality",
+    "read", "repair", "safe_fraction", "section", "sweep", "walls", "wheel", "write",
 ]  # fmt: skip
 
 

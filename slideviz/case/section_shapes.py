@@ -36,6 +36,7 @@ class Size:
     example: str  # an example of the option of the command line, in words
     high: float = inf  # values must be below this
     usual: float = 1.0  # the value where none is given
+    picks: tuple[float, ...] = ()  # values that the window offers as buttons
 
     def fault(self, value: float) -> str:
         """Return why a value is not allowed, as the end of a sentence; "" where it is."""
@@ -212,6 +213,45 @@ SECTION_SHAPES = {
                     flat="Show the cone unrolled, its apex at 0, beside the 3D view.",
                     flat_name="Unrolled",
                     look="Look at the cone from outside, at the middle of the cells that it cuts.",
+                )
+            },
+        ),
+        ShapeTerms(
+            "span",
+            direction="axis",
+            point="Centre",
+            about="a point of the axis",
+            size=Size(
+                "span",
+                "Span",
+                "span",
+                unit="parts of the way from hub to shroud",
+                remedy="give a number between 0, the hub, and 1, the shroud",
+                example="a span, as in 0.5 or s=0.5",
+                high=1.0,
+                usual=0.5,
+                picks=(0.1, 0.5, 0.9),
+            ),
+            flat="unrolled",
+            numbers="s, ax, ay, az, x, y, z",
+            meaning="span between the walls of SPAN, axis and a point on it",
+            option="constant span between hub (0) and shroud (1), as in 0.5, "
+            + _AXIS.format(point="a point on it"),
+            one_way=True,
+            tip_to_add="Show the cells on a surface of constant span, and lay it flat to m′ and θ.",
+            key="Alt+Shift+C",
+            metavar="S[,AXIS]",
+            words={
+                3: Words(
+                    "Span",
+                    "Cut at constant &span",
+                    add="Add a section halfway between hub and shroud.",
+                    handle="Drag the ball in the view to change the span.",
+                    flat="Show the section laid flat to m′ and θ beside the 3D view; angles are "
+                    "as they are.",
+                    flat_name="Laid flat",
+                    look="Look at the section from outside, at the middle of the cells that it "
+                    "cuts.",
                 )
             },
         ),

@@ -39,6 +39,7 @@ COMMANDS = {
     "repair": "repair_command",
     "film": "film_command",
     "section": "section_command",
+    "gap": "gap_command",
     "compare": "compare_command",
     "sweep": "sweep_command",
     "convert": "convert_command",

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
-from slideviz.cli.section_options import limits, neighbours, pixels, section_reader
+from slideviz.cli.section_options import (
+    limits,
+    neighbours,
+    pair_of_names,
+    pixels,
+    section_reader,
+)
 from slideviz.terms import COLOR_MAPS, QUANTITIES, SKEW_METRICS
 
 if TYPE_CHECKING:
@@ -28,6 +34,7 @@ examples:
   slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
   slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
   slideviz section stator.su2 --cone 10,z,0,0,-1.5 --copies 2 -o cone.png
+  slideviz section stator.su2 --span 0.9 --between HUB,SHROUD -o tip.png
   slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
 """
 
@@ -48,6 +55,12 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         where.add_argument(
             f"--{name}", type=section_reader(row), dest="asked", metavar=metavar, help=row.option
         )
+    add(
+        "--between",
+        type=pair_of_names,
+        metavar="HUB,SHROUD",
+        help="the walls of --span; by default those of the case, or by their names",
+    )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(
         call,
@@ -205,6 +218,8 @@ def _check_usage(arguments: argparse.Namespace) -> None:
     if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":
         able = (f"--{name}" for name, row in SECTION_SHAPES.items() if row.flat == "unrolled")
         arguments.wrong_usage(f"--unrolled is for a {' or '.join(able)}; a plane is flat already")
+    if arguments.between and arguments.asked.section.kind != "span":
+        arguments.wrong_usage("--between names the walls of --span, which is not given")
 
 
 def _section_and_passages(
@@ -217,6 +232,7 @@ def _section_and_passages(
     import numpy as np
 
     from slideviz.errors import CaseError
+    from slideviz.sections.span import find_walls
     from slideviz.session.passages import find_period, passages
 
     asked = arguments.asked
@@ -224,13 +240,17 @@ def _section_and_passages(
         asked.section, whole_cells=mesh.dim == 2 if arguments.whole is None else arguments.whole
     )
     pair: Pair | None = None
-    if not asked.axis or arguments.copies:
+    if not asked.axis or arguments.copies or chosen.kind == "span":
         # Of the undeformed mesh: a deformed one need not be exactly periodic.
         pair = find_period(read_base() or mesh, case)
     if not asked.axis and case is not None:
         chosen = replace(chosen, direction=case.axis, origin=case.origin)
     elif not asked.axis and pair is not None and pair.kind == "rotational":
         chosen = replace(chosen, direction=pair.axis, origin=pair.origin)
+    if chosen.kind == "span":
+        about = chosen.direction, chosen.origin
+        walls = find_walls(read_base() or mesh, case, pair, arguments.between, about)
+        chosen = replace(chosen, walls=walls)
     if not arguments.copies:
         return chosen, {0: np.eye(4)}
     if pair is None:
@@ -250,5 +270,6 @@ def _as_json(chosen: Section) -> dict[str, Any]:
         "direction": list(chosen.direction),
         "radius": None,
         **sizes,
+        **({} if chosen.walls is None else {"between": [chosen.walls.hub, chosen.walls.shroud]}),
         "whole": chosen.whole_cells,
     }

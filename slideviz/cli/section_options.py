@@ -95,6 +95,14 @@ def _comma(text: str, number: str) -> str:
     return f"{text!r}: a comma separates numbers; write a decimal point, as in {number}"
 
 
+def pair_of_names(text: str) -> tuple[str, str]:
+    """Return the two boundaries of a text like ``BLADE,HUB``."""
+    first, _, second = (word.strip() for word in text.partition(","))
+    if not first or not second or "," in second:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two boundaries, as BLADE,HUB")
+    return first, second
+
+
 def limits(text: str) -> tuple[float, float]:
     """Return the two numbers of a text like ``0.2,0.9``."""
     low, high = _numbers(text, (2,), "lowest,highest, as in 0.2,0.9")

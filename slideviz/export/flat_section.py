@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.argument_types import check_types
+from slideviz.case.model import Case
 from slideviz.errors import CaseError, not_one_of
 from slideviz.export.titles import pair_names
 from slideviz.mesh.model import FloatArray, Mesh
@@ -25,9 +26,10 @@ from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange
+from slideviz.sections.span import find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.passages import show_passages
+from slideviz.session.passages import find_period, show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, WALL_VALUES, ColorMap, Quantity, quantity_of
@@ -141,9 +143,12 @@ def frame_words(session: Session) -> str:
 def section(
     path: str | Path,
     mesh: Mesh,
-    at: Section,
+    at: Section | None = None,
     reference: Mesh | None = None,
     *,
+    span: float | None = None,
+    between: tuple[str, str] | None = None,
+    case: Case | None = None,
     rated: Quality | None = None,
     color: Quantity = "size-skew",
     color_range: tuple[float, float] | None = None,
@@ -160,10 +165,17 @@ def section(
         The picture: .png, .svg or .pdf; one that exists is replaced.
     mesh : Mesh
         What to cut.
-    at : Section
+    at : Section, optional
         Where: a plane, cylinder or cone.
     reference : Mesh, optional
         The undeformed mesh, with the same cells; needed for displacements.
+    span : float, optional
+        Instead of ``at``: the surface of constant span, between hub (0) and shroud (1) of the
+        undeformed mesh.
+    between : (str, str), optional
+        Hub and shroud; by default those of the case, or by their names.
+    case : Case, optional
+        The case with the axis of the span, and the periodic boundaries.
     rated : Quality, optional
         The quality of the cells, if it is known already.
     color : {"size-skew", "size", "skew", "displacement"}
@@ -202,6 +214,13 @@ def section(
     array([0])
     """
     require_picture_name(Path(path))
+    if (at is None) == (span is None):
+        raise CaseError("give either a section or a span, as in section(path, mesh, span=0.5)")
+    if at is None:
+        base = reference or mesh
+        walls = find_walls(base, case, find_period(base, case), between)
+        of = walls.curves.field
+        at = Section("span", of.origin, of.axis, span=span or 0.0, walls=walls)
     if color_map not in COLOR_MAPS:
         raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")
     measured = quality(mesh, reference=reference) if rated is None else rated

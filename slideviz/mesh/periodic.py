@@ -14,7 +14,7 @@ from operator import itemgetter
 import numpy as np
 
 from slideviz.errors import MeshError
-from slideviz.mesh.axis_frame import Z_AXIS, axis_text, in_axis_frame, ordered_sum
+from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.nearest import nearest
@@ -29,6 +29,9 @@ _KINDS: dict[PeriodicType, tuple[PeriodicKind, ...]] = {
     "rotational": ("rotational",),
 }
 """Kinds of transformation to try, in that order, by ``PERIODIC_TYPE``."""
+
+WHOLE_NUMBER = 1e-3
+"""Largest difference of the number of passages of a wheel from a whole number, over that number."""
 
 CHECK_PERIODIC = "check the markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
 """What to do about markers that do not match, in a case."""
@@ -63,6 +66,31 @@ class Pair:
         if self.kind == "rotational":
             return abs(self.angle)
         return float(np.linalg.norm(self.vector))
+
+    @property
+    def around(self) -> int | None:
+        """Return the number of passages of the whole wheel; None if not whole, or no wheel."""
+        if self.kind != "rotational":
+            return None
+        number = 2.0 * np.pi / self.period
+        whole = round(number)
+        return whole if abs(number - whole) <= WHOLE_NUMBER * number else None
+
+    def matrix(self, periods: int) -> FloatArray:
+        """Return the transformation (4, 4) by a number of periods."""
+        matrix = np.eye(4)
+        if self.kind == "translational":
+            matrix[: len(self.vector), 3] = periods * self.vector
+            return matrix
+        # A full turn over the number of passages, where it is whole, so that a wheel closes.
+        around = self.around
+        angle = self.angle if around is None else np.copysign(2.0 * np.pi / around, self.angle)
+        cos, sin = np.cos(periods * angle), np.sin(periods * angle)
+        basis, origin = axis_basis(self.axis), np.asarray(self.origin)
+        turn = basis.T @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ basis
+        matrix[:3, :3] = turn
+        matrix[:3, 3] = origin - turn @ origin
+        return matrix
 
     def describe(self) -> str:
         """Return the transformation in words, for people."""

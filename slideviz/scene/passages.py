@@ -14,7 +14,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.session.passages import find_period, passages, passages_around
+from slideviz.session.passages import find_period, passages
 from slideviz.session.state import Session
 
 PALER = 0.45
@@ -58,7 +58,7 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
     count = session.view.passages
     if pair is None or count == 0:
         return {}
-    is_wheel = passages_around(pair) is not None
+    is_wheel = pair.around is not None
     if count < 0 and not is_wheel:
         count = UNENDING
     by_number = passages(pair, "wheel" if count < 0 else count)

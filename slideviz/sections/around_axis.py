@@ -1,7 +1,7 @@
-"""What cylinder and cone have in common: surfaces of revolution of a straight line about an axis.
+"""What cylinders, cones and surfaces of constant span have in common: they go around an axis.
 
-They can be unrolled without stretching. The seam, at which they are cut open, lies in the largest
-gap between the angles of the points.
+They can be laid flat; cylinders and cones without stretching. The seam, at which they are cut open,
+lies in the largest gap between the angles of the points.
 """
 
 from __future__ import annotations
@@ -114,10 +114,6 @@ class AboutAxis(Shape):
 
     # What each shape defines, besides the functions of `Shape` ------------------------
     @abstractmethod
-    def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
-
-    @abstractmethod
     def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
 
@@ -146,31 +142,6 @@ class AboutAxis(Shape):
     def size(self) -> Size:
         assert self.terms.size is not None
         return self.terms.size
-
-    def crossings(
-        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
-        """Return where edges cross the surface, as parts of the edge (k,), exactly.
-
-        Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
-        one at which the distance changes its sign as it does from end to end of the edge.
-        """
-        weights, total = self.quadric(section)
-        used = weights != 0.0
-        rows, weight = section.basis[used], weights[used]
-        p, d = (edges[0] - np.asarray(section.origin)) @ rows.T, edges[1] @ rows.T
-        square, slope = np.sum(weight * d * d, axis=1), np.sum(weight * p * d, axis=1)
-        constant = np.sum(weight * p * p, axis=1) - total
-        root = np.sqrt(np.maximum(slope**2 - square * constant, 0.0))
-        before, after = level
-        sign = np.where(after > before, 1.0, -1.0)
-        # Of the two formulas of a root, the one without cancellation.
-        stable = sign * slope > 0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            roots = np.where(
-                stable, -constant / (slope + sign * root), (sign * root - slope) / square
-            )
-        return np.asarray(np.clip(np.nan_to_num(roots), 0.0, 1.0))
 
     def position(self, section: Section) -> float:
         return section.size
@@ -228,6 +199,39 @@ class AboutAxis(Shape):
         straight = np.cos(lean) * straight - np.sin(lean) * axis
         up = np.eye(3)[1 if abs(straight[2]) > 0.9 else 2]
         return np.stack([np.cross(up, straight), up, straight])
+
+
+class Quadric(AboutAxis):
+    """A shape about an axis with a straight line as its profile."""
+
+    @abstractmethod
+    def quadric(self, section: Section) -> tuple[FloatArray, float]:
+        """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
+
+    def crossings(
+        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+    ) -> FloatArray:
+        """Return where edges cross the surface, as parts of the edge (k,), exactly.
+
+        Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
+        one at which the distance changes its sign as it does from end to end of the edge.
+        """
+        weights, total = self.quadric(section)
+        used = weights != 0.0
+        rows, weight = section.basis[used], weights[used]
+        p, d = (edges[0] - np.asarray(section.origin)) @ rows.T, edges[1] @ rows.T
+        square, slope = np.sum(weight * d * d, axis=1), np.sum(weight * p * d, axis=1)
+        constant = np.sum(weight * p * p, axis=1) - total
+        root = np.sqrt(np.maximum(slope**2 - square * constant, 0.0))
+        before, after = level
+        sign = np.where(after > before, 1.0, -1.0)
+        # Of the two formulas of a root, the one without cancellation.
+        stable = sign * slope > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            roots = np.where(
+                stable, -constant / (slope + sign * root), (sign * root - slope) / square
+            )
+        return np.asarray(np.clip(np.nan_to_num(roots), 0.0, 1.0))
 
 
 def axis_shape(section: Section) -> AboutAxis:

@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons, patch_of
+from slideviz.sections.around_axis import Quadric, UnrolledPolygons, patch_of
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -40,7 +40,7 @@ def _lines(section: Section) -> tuple[float, float]:
     return float(np.sin(angle)), float(np.cos(angle))
 
 
-class Cone(AboutAxis):
+class Cone(Quadric):
     """The half of a double cone in the direction of its axis."""
 
     terms = SECTION_SHAPES["cone"]

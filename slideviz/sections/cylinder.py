@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
+from slideviz.sections.around_axis import Quadric, UnrolledPolygons
 from slideviz.sections.handles import HandleParts, Part, rounded, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
@@ -87,7 +87,7 @@ class Circle(InPlane):
         return Label("angle [°]", "θ [°]")
 
 
-class Cylinder(AboutAxis):
+class Cylinder(Quadric):
     """The cylinder; its direction has no sign."""
 
     terms = SECTION_SHAPES["cylinder"]

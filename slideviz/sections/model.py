@@ -17,10 +17,13 @@ from slideviz.sections.cone import Cone
 from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
 from slideviz.sections.shape import InPlane, Shape
+from slideviz.sections.span import ConstantSpan, SpanWalls
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
-SHAPES: dict[str, Shape] = {shape.terms.value: shape for shape in (Plane(), Cylinder(), Cone())}
+SHAPES: dict[str, Shape] = {
+    shape.terms.value: shape for shape in (Plane(), Cylinder(), Cone(), ConstantSpan())
+}
 """The shapes by name; their words are in `slideviz.case.section_shapes.SECTION_SHAPES`."""
 
 Triple = tuple[float, float, float]
@@ -62,6 +65,10 @@ class Section:
     unrolled."""
     half_angle_deg: float = 0.0
     """The half angle of the cone; 0 for others."""
+    span: float = 0.0
+    """The constant span, 0 at the hub to 1 at the shroud; 0 for other shapes."""
+    walls: SpanWalls | None = None
+    """Hub and shroud of a section of constant span: it cuts nothing without."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -102,7 +109,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """Return the radius or half angle in degrees; 0 for a plane."""
+        """Return the radius, half angle in degrees, or span; 0 for a plane."""
         size = self.shape.terms.size
         return 0.0 if size is None else float(getattr(self, size.field))
 
@@ -159,7 +166,13 @@ class Section:
         2D meshes are cut by planes, and by cylinders about z, which are circles there.
         """
         seen = self.shape.in_plane
-        return dim == 3 or (seen is not None and seen.can_cut(self))
+        if dim == 2:
+            return seen is not None and seen.can_cut(self)
+        return self.walls is not None or self.kind != "span"
+
+    def needs(self, dim: int) -> str:
+        """Return in words what a section needs that cannot cut meshes of ``dim`` dimensions."""
+        return "needs a 3D mesh" if dim == 2 else "needs hub and shroud"
 
     def describe(self, dim: int = 3) -> str:
         """Return the section in words: in 2D as a line or a circle."""

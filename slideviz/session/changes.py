@@ -14,6 +14,7 @@ from slideviz.case.model import Case, FromFile, Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
+from slideviz.session.saving import bound_sections
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
 
@@ -263,8 +264,15 @@ def confirm_guesses(session: Session, names: Iterable[str] | None = None) -> Ses
 
 @undoable("settings")
 def set_case(session: Session, **values: Any) -> Session:
-    """Return the session with other values of fields of its case."""
-    return replace(session, case=session.case.change(**values))
+    """Return the session with other values of fields of its case.
+
+    Sections of constant span get the walls that SPAN has then.
+    """
+    changed = replace(session, case=session.case.change(**values))
+    if session.mesh is None or changed.case.span == session.case.span:
+        return changed
+    bound = bound_sections(session.view.sections, session.mesh, changed.case, session.pairs)
+    return set_view(changed, sections=bound)
 
 
 def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:

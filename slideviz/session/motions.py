@@ -37,7 +37,6 @@ from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.session.passages import passages_around
 from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.system.atomic import atomic_write
@@ -236,7 +235,7 @@ def machine_axis(session: Session) -> Axis | None:
 def wheel_passages(session: Session) -> int | None:
     """Return how many passages make the wheel; None without periodic sides of such an angle."""
     pair = machine_pair(session)
-    return None if pair is None else passages_around(pair)
+    return None if pair is None else pair.around
 
 
 def box_names(session: Session) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from slideviz.case.model import NEW, BoxMotion, Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
-from slideviz.session.saving import view_from_case
+from slideviz.session.saving import bound_sections, view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColorBy, Role
 
@@ -38,6 +38,7 @@ def open_mesh(
     view = view_from_case(chosen, ViewState(), mesh.marker_names)
     if has_ffd(chosen) and "VIEW_SHOW" not in chosen.view:
         view = view.with_drawn({"ffd": True})
+    view = replace(view, sections=bound_sections(view.sections, mesh, chosen, pairs))
     flat = view.flat_index
     if mesh.part is not None:
         view = replace(view, threshold=None)  # needs the values of all cells

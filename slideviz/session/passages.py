@@ -10,16 +10,12 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
-from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, find_pairs, pair_up
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.opening import guess_by_name
-
-WHOLE_NUMBER = 1e-3
-"""Largest difference of the number of passages of a wheel from a whole number, over that number."""
 
 _SAME = 1e-9
 """A section is taken onto itself where it moves by less than this, over its size or distance."""
@@ -54,22 +50,13 @@ def find_period(
     return min(find_pairs(mesh) if pairs is None else pairs, key=rank, default=None)
 
 
-def passages_around(pair: Pair) -> int | None:
-    """Return the number of passages of the whole wheel; None if it is not whole, or no wheel."""
-    if pair.kind != "rotational":
-        return None
-    number = 2.0 * np.pi / pair.period
-    whole = round(number)
-    return whole if abs(number - whole) <= WHOLE_NUMBER * number else None
-
-
 def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]:
     """Return the transformation (4, 4) of each passage by its number; 0 is the mesh itself.
 
     ``count``: neighbours on each side, or all around; on a wheel each passage is there once at
     most. Raises CaseError if it is negative, or the period makes no whole wheel.
     """
-    around = passages_around(pair)
+    around = pair.around
     if count == "wheel" and around is None:
         raise CaseError(
             f"{pair.first!r} and {pair.second!r} repeat by {pair.describe()}, which makes no whole "
@@ -81,24 +68,7 @@ def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]
         numbers = range(-((around - 1) // 2), around // 2 + 1)
     else:
         numbers = range(-int(count), int(count) + 1)
-    return {number: _power(pair, number) for number in numbers}
-
-
-def _power(pair: Pair, number: int) -> FloatArray:
-    """Return the transformation (4, 4) by ``number`` periods."""
-    matrix = np.eye(4)
-    if pair.kind == "translational":
-        matrix[: len(pair.vector), 3] = number * pair.vector
-        return matrix
-    # A full turn over the number of passages, where it is whole, so that a wheel closes exactly.
-    around = passages_around(pair)
-    angle = pair.angle if around is None else np.copysign(2.0 * np.pi / around, pair.angle)
-    cos, sin = np.cos(number * angle), np.sin(number * angle)
-    basis, origin = axis_basis(pair.axis), np.asarray(pair.origin)
-    turn = basis.T @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ basis
-    matrix[:3, :3] = turn
-    matrix[:3, 3] = origin - turn @ origin
-    return matrix
+    return {number: pair.matrix(number) for number in numbers}
 
 
 def keeps(section: Section, matrix: FloatArray) -> bool:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Case, FromFile
 from slideviz.case.view_keys import SectionText, hyphened
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import Pair
 from slideviz.sections.model import Section
+from slideviz.sections.span import find_walls
 from slideviz.session.state import Session, ViewState
 from slideviz.terms import SHOWN
 
@@ -206,6 +210,31 @@ def _section(text: SectionText) -> Section:
     *size, a, b, c, x, y, z = numbers
     section = Section.of(kind, (x, y, z), (a, b, c), sum(size))
     return replace(section, whole_cells=whole, shown=shown, flat=flat)
+
+
+def with_walls(section: Section, mesh: Mesh, case: Case, pairs: Sequence[Pair] = ()) -> Section:
+    """Return a section of constant span with hub and shroud of the case; others as they are.
+
+    Raises CaseError or MeshError if there are none.
+    """
+    if section.kind != "span":
+        return section
+    period = next((pair for pair in pairs if pair.kind == "rotational"), None)
+    about = section.direction, section.origin
+    return replace(section, walls=find_walls(mesh, case, period, about=about))
+
+
+def bound_sections(
+    sections: Sequence[Section], mesh: Mesh, case: Case, pairs: Sequence[Pair]
+) -> tuple[Section, ...]:
+    """Return sections `with_walls`, or without where there are none: these cut nothing."""
+    out = []
+    for section in sections:
+        try:
+            out.append(with_walls(section, mesh, case, pairs))
+        except SlidevizError:
+            out.append(replace(section, walls=None))
+    return tuple(out)
 
 
 def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:

@@ -8,7 +8,7 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.periodic import match
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
-from slideviz.session.passages import find_period, keeps, passages, passages_around, show_passages
+from slideviz.session.passages import find_period, keeps, passages, show_passages
 from tests.builders import cube, grid, passage, ring, sector
 from tests.oracles.sections import cut_cells
 
@@ -42,7 +42,7 @@ def test_a_2d_mesh_has_copies_in_its_plane():
 @pytest.mark.parametrize(("angle", "around"), [(30.0, 12), (360 / 41, 41), (120.0, 3)])
 def test_the_whole_wheel_has_every_passage_once(angle, around):
     pair = match(sector_mesh(angle), "y_m", "y_p", "rotational")
-    assert passages_around(pair) == around
+    assert pair.around == around
     copies = passages(pair, "wheel")
     assert sorted(copies) == list(range(-((around - 1) // 2), around // 2 + 1))
     at = np.array([transformed(np.array([[1.0, 0, 0]]), m)[0] for m in copies.values()])
@@ -55,8 +55,8 @@ def test_the_whole_wheel_has_every_passage_once(angle, around):
 def test_what_makes_no_wheel_says_so():
     flat = match(cube(4), "y_m", "y_p")
     odd = match(sector_mesh(31.0), "y_m", "y_p", "rotational")
-    assert passages_around(flat) is None
-    assert passages_around(odd) is None
+    assert flat.around is None
+    assert odd.around is None
     for pair in (flat, odd):
         with pytest.raises(CaseError, match="makes no whole wheel; give the number"):
             passages(pair, "wheel")

@@ -30,7 +30,6 @@ from slideviz.mesh.periodic import Pair
 from slideviz.scene.passages import Period
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
-from slideviz.session.passages import passages_around
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 from slideviz.terms import (
@@ -258,7 +257,7 @@ class DisplayPanel(Panel):
     def _sync_passages(self, session: Session, pair: Pair | None) -> None:
         tip, count = NOT_PERIODIC, 0
         if pair is not None:
-            self.passages.set_around(passages_around(pair))
+            self.passages.set_around(pair.around)
             count = session.view.passages
             tip = (
                 f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} "

@@ -15,13 +15,14 @@ from qtpy.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QMenu,
+    QPushButton,
     QSizePolicy,
     QSlider,
     QWidget,
 )
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, SlidevizError
 from slideviz.export.flat_section import PageFormat, save_section
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets import questions
@@ -42,7 +43,7 @@ from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
-from slideviz.gui.widgets.services import Services
+from slideviz.gui.widgets.services import Services, main_window
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.scene.passages import Period
@@ -123,6 +124,15 @@ class SectionEditor(QWidget):
         form.addRow(self.centre_name, self.centre)
         form.addRow(self.place_name, place)
         self.form = form
+        self.picks: dict[str, QWidget] = {}
+        for kind, row in SECTION_SHAPES.items():
+            if row.size is not None and row.size.picks:
+                self.picks[kind] = as_widget(in_row(*map(self._pick, row.size.picks), spacing=5))
+                form.addRow("", self.picks[kind])
+
+    def _pick(self, value: float) -> QPushButton:
+        words = f"{100.0 * value:g} %"
+        return push_button(words, f"Go to {words}.", lambda: self._position_typed(value))
 
     # What is shown ---------------------------------------------------------------------
     def show_section(
@@ -137,8 +147,8 @@ class SectionEditor(QWidget):
         if mesh is not self._mesh:
             self._mesh, self._points = mesh, section_cuts.cell_points(mesh)
         terms, flat = section.shape.terms, mesh.dim == 2
-        # A circle's axis is always z.
-        fixed = flat and bool(terms.point)
+        # A circle's axis is always z, and that of a span the machine's.
+        fixed = (flat and bool(terms.point)) or section.walls is not None
         word = _axis_of(section)
         # A direction changed elsewhere (undo, handle) is shown as x, y or z again if it is.
         if other and not self._typing:
@@ -158,7 +168,8 @@ class SectionEditor(QWidget):
         self.centre.show_value(section.origin)
         for widget, shown in (
             (self.direction, self._free and not fixed),
-            (self.centre, bool(terms.point)),
+            (self.centre, bool(terms.point) and section.walls is None),
+            *((widget, kind == section.kind) for kind, widget in self.picks.items()),
         ):
             self.form.setRowVisible(widget, shown)
         with QSignalBlocker(self.whole):
@@ -383,7 +394,7 @@ class SectionsPanel(Panel):
             for row, section in enumerate(sections):
                 item = self.list.item(row)
                 dim = session.mesh.dim if session.mesh is not None else 3
-                why = "" if can_cut(session.mesh, section) else " (needs a 3D mesh)"
+                why = "" if can_cut(session.mesh, section) else f" ({section.needs(dim)})"
                 text = (section.name or section.brief(dim)) + why
                 tip = wrapped((section.name or section.describe(dim)) + why)
                 state = Qt.CheckState.Checked if section.shown else Qt.CheckState.Unchecked
@@ -419,7 +430,14 @@ class SectionsPanel(Panel):
     def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.store.session
         pair = self._period.of(session)
-        self.store.change(changes.add_section, first_section(kind, session, pair))
+        try:
+            section = first_section(kind, session, pair)
+        except SlidevizError as error:  # no hub and shroud
+            window = main_window(self)
+            assert window is not None
+            window.banner.show_error(error)
+            return
+        self.store.change(changes.add_section, section)
 
     def _want_picture(self, paper: PageFormat) -> None:
         title, axes = self.titled.isChecked(), self.with_axes.isChecked()

@@ -1,0 +1,148 @@
+"""``slideviz gap``: throat, tip gap and other smallest distances, before and after a run."""
+
+from __future__ import annotations
+
+import argparse
+from itertools import zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.cli.options import add_changes, add_shared, read_case, require_mesh_file
+from slideviz.cli.progress import Bar
+from slideviz.cli.section_options import pair_of_names
+from slideviz.cli.terminal import holding
+
+if TYPE_CHECKING:
+    from slideviz.design.gap import Gap
+
+LISTED = (0.1, 0.3, 0.5, 0.7, 0.9)  # the places that the summary has
+
+
+def add_gap(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``gap`` to the parser."""
+    call = calls.add_parser(
+        "gap",
+        help="throat, tip gap and other smallest distances, before and after",
+        description="Measure the smallest distances between blades (the throat), between blades "
+        "and walls (tip gap, hub gap) and between other boundaries, by span, before and after the "
+        "run of a case. Blades are the moving boundaries. No mesh is written.",
+    )
+    add_shared(call, "case")
+    call.add_argument(
+        "--between",
+        type=pair_of_names,
+        action="append",
+        default=[],
+        metavar="A,B",
+        help="measure between these two boundaries, too; may be repeated",
+    )
+    call.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the curves as .png, .svg or .pdf"
+    )
+    add_changes(call)
+    add_shared(call, "json")
+    add_shared(call, "zone")
+    add_shared(call, "quiet")
+    call.set_defaults(command=gap)
+
+
+def gap(arguments: argparse.Namespace) -> int:
+    """Measure the smallest distances of a case; return the exit code."""
+    with holding() as arguments.begun:
+        return _gap(arguments)
+
+
+def _gap(arguments: argparse.Namespace) -> int:
+    from slideviz import deform, gaps, quality, read
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.cli.report import print_remarks, save_json
+    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.errors import CaseError
+    from slideviz.plots.section_picture import require_picture_name
+
+    case = read_case(arguments)
+    mesh_file = require_mesh_file(arguments, case)
+    if arguments.output is not None:
+        require_picture_name(arguments.output)
+    require_output_paths(
+        arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
+    )
+    mesh = read(mesh_file, case.zone, file_format=case.mesh_format)
+    before = gaps(case, mesh, arguments.between)
+    if not before:
+        raise CaseError(
+            f"{mesh_file}: there is one blade, which does not repeat, and no gap at hub or shroud, "
+            "so there is nothing to measure; name boundaries by --between"
+        )
+    after: tuple[Gap, ...] = ()
+    warnings: tuple[str, ...] = ()
+    inverted = 0
+    if case.motions:
+        with Bar(not arguments.quiet, begun=arguments.begun) as bar:
+            *_, last = deform(case, mesh, bar)
+        after = gaps(case, last.mesh, arguments.between)
+        warnings, inverted = last.warnings, quality(last.mesh, mesh).inverted
+    report = {
+        "case": str(case.source or ""),
+        "mesh": str(mesh_file),
+        "inverted": inverted,
+        "gaps": [
+            {
+                "name": one.name,
+                "between": [one.first, one.second],
+                "along": one.along or None,
+                "places": one.places.tolist(),
+                "undeformed": one.summary(),
+                "deformed": None if other is None else other.summary(),
+            }
+            for one, other in zip_longest(before, after)
+        ],
+    }
+    if arguments.output is not None:
+        if not before[0].along:
+            raise CaseError(
+                f"{mesh_file}: without hub and shroud distances are no curves; set SPAN, or leave "
+                "out -o"
+            )
+        _draw(arguments.output, before, after)
+    if not save_json(arguments.json, report) and not arguments.quiet:
+        for one, other in zip_longest(before, after):
+            print(_lines(one, other))
+        if arguments.output is not None:
+            print(f"  {arguments.output}")
+    print_remarks(warnings, quiet=arguments.quiet)
+    return INVERTED if inverted else DONE
+
+
+def _lines(before: Gap, after: Gap | None) -> str:
+    """Return the lines on a gap: its smallest distance, and a table of those by place."""
+    from slideviz.cli.report import table
+
+    listed: list[tuple[str, int | None]] = [("smallest", None)]
+    listed += [
+        (f"{100 * place:.0f} %", int(abs(before.places - place).argmin()))
+        for place in LISTED
+        if before.along
+    ]
+    rows: list[tuple[object, ...]] = [(before.along, "before")]
+    rows[0] += ("after", "change") if after is not None else ()
+    for word, k in listed:
+        both = [
+            float(one.distance if k is None else one.distances[k])
+            for one in (before, after)
+            if one is not None
+        ]
+        change = (f"{100 * (both[1] / both[0] - 1):+.2f} %",) if len(both) > 1 and both[0] else ()
+        rows.append((word, *both, *change))
+    return f"{before.words}\n{table(rows)}"
+
+
+def _draw(path: Path, before: tuple[Gap, ...], after: tuple[Gap, ...]) -> None:
+    from slideviz.plots.figure_io import empty_figure, write_figure
+    from slideviz.plots.gap import draw_gaps
+    from slideviz.plots.session_plots import UNDEFORMED
+
+    figure = empty_figure((3.4 * len(before), 3.0), 300.0, "constrained")
+    measured = [("undeformed", UNDEFORMED, before)] + ([("deformed", 0, after)] if after else [])
+    draw_gaps(figure, measured)
+    write_figure(figure, path)

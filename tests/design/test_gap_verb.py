@@ -1,0 +1,118 @@
+"""``sv.gaps`` and ``slideviz gap``: throat, tip gap and other distances, before and after."""
+
+import json
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.design.gap import PLACES
+from slideviz.errors import CaseError, MeshError
+from tests.builders import _renamed, grid, passage, ring, sector
+
+ROLES = {"blade": "moving", "per1": "periodic", "per2": "periodic", "shroud": "sliding"}
+SHAPE = (8, 8, 8)
+NAMES = ("hub", "shroud", "per1", "per2", "inflow", "outflow", "blade")
+
+
+def tipped():
+    """An annular sector of 40° with a blade from r 0.5 to 0.9375: its gap is 0.0625."""
+    rules = _renamed(SHAPE, NAMES)
+    rules[-1] = ("blade", rules[-1][1])
+    return grid(SHAPE, [(0, 7), (3, 5), (3, 5)], place=ring(SHAPE, 0.5, 1.0, 40.0), rules=rules)
+
+
+def case_of(**changes):
+    return sv.Case(**{"roles": ROLES, "periodic_type": "rotational"} | changes)
+
+
+def chord(radius, angle_deg):
+    return 2.0 * radius * np.sin(np.radians(angle_deg) / 2.0)
+
+
+def test_throat_and_tip_gap_of_a_block():
+    throat, tip = sv.gaps(case_of(), tipped(), between=[])
+    assert (throat.name, throat.along) == ("throat", "span")
+    assert (tip.name, tip.along) == ("tip gap", "chord")
+    # The block is 10° wide in a passage of 40°: at each radius 30° are left.
+    assert throat.distance == pytest.approx(chord(0.5, 30.0), rel=1e-6)
+    assert throat.place == pytest.approx(0.0, abs=1e-9)
+    inside = PLACES < 0.86
+    expected = chord(0.5 + 0.5 * PLACES[inside], 30.0)
+    assert throat.distances[inside] == pytest.approx(expected, rel=1e-4)
+    assert np.isnan(throat.distances[PLACES > 0.88]).all()
+    # The casing's facets are chords of 5°, as the block's: they are parallel.
+    assert tip.distance == pytest.approx(0.0625 * np.cos(np.radians(2.5)), rel=1e-6)
+    assert tip.distances == pytest.approx(tip.distance, rel=1e-6)
+    assert np.hypot(*tip.start[:2]) > np.hypot(*tip.end[:2])
+    assert tip.words == "tip gap between blade and shroud"
+
+
+def test_other_distances_and_no_period():
+    mesh = tipped()
+    *_, far = sv.gaps(case_of(), mesh, between=[("inflow", "blade")])
+    assert far.words == "inflow to blade"
+    assert far.distance == pytest.approx(3.0 / 8.0)
+    alone = sv.gaps(case_of(roles={"blade": "moving"}), mesh)
+    assert [gap.name for gap in alone] == ["tip gap"]
+    # In 2D there is no span.
+    [throat] = sv.gaps(case_of(roles=ROLES | {"BLOCK": "moving", "blade": "fixed"}), sector())
+    assert throat.along == ""
+    assert throat.summary()["place"] is None
+    assert not len(throat.distances)
+
+
+def test_wrong_cases_are_refused():
+    mesh = tipped()
+    with pytest.raises(CaseError, match="no boundary moves besides hub and shroud"):
+        sv.gaps(case_of(roles={"shroud": "moving"}), mesh)
+    with pytest.raises(CaseError, match=r"SPAN: .* has no marker 'nub'; did you mean hub"):
+        sv.gaps(case_of(span=("nub", "shroud")), mesh)
+    with pytest.raises(MeshError, match="no marker 'x'"):
+        sv.gaps(case_of(), mesh, between=[("blade", "x")])
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    sv.write("mesh.su2", tipped())
+    motion = sv.Translate("blade", (0.0, 0.0, 0.05))
+    case = case_of(mesh_file=tmp_path / "mesh.su2", motions=(motion,), sliding="ps")
+    case.write(tmp_path / "case.cfg")
+    return tmp_path
+
+
+def test_the_command_reports_before_and_after(files, capsys):
+    words = ["gap", "case.cfg", "-o", "gap.svg", "--between", "inflow,blade", "--json", "gap.json"]
+    assert run(words) == 0
+    out = capsys.readouterr().out
+    assert "throat of blade\n  span" in out
+    assert "inflow to blade" in out
+    assert "+13.33 %" in out  # 0.375 + 0.05
+    report = json.loads((files / "gap.json").read_text())
+    assert [one["name"] for one in report["gaps"]] == ["throat", "tip gap", "inflow to blade"]
+    far = report["gaps"][2]
+    assert far["deformed"]["distance"] == pytest.approx(0.425, abs=1e-4)
+    assert report["gaps"][0]["undeformed"]["distances"][-1] is None
+    assert (files / "gap.svg").read_text().count("undeformed") >= 1
+
+
+def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
+    case = sv.Case.read("case.cfg")
+    case.change(motions=()).write("still.cfg")
+    assert run(["gap", "still.cfg"]) == 0
+    assert "after" not in capsys.readouterr().out
+    sv.write("full.su2", passage((2, 6, 6), 40.0))
+    roles = {"blade": "moving"}
+    case.change(mesh_file=files / "full.su2", motions=(), roles=roles).write("one.cfg")
+    assert run(["gap", "one.cfg"]) == 1
+    assert "so there is nothing to measure; name boundaries by --between" in capsys.readouterr().err
+    assert run(["gap", "one.cfg", "--between", "blade"]) == 2
+    assert "'blade' is not two boundaries, as BLADE,HUB" in capsys.readouterr().err
+    flat = sector()
+    sv.write("flat.su2", flat)
+    roles = {"BLOCK": "moving", "per1": "periodic", "per2": "periodic"}
+    case.change(mesh_file=files / "flat.su2", motions=(), roles=roles).write("flat.cfg")
+    assert run(["gap", "flat.cfg", "-o", "gap.png"]) == 1
+    assert "without hub and shroud distances are no curves" in capsys.readouterr().err

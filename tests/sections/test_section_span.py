@@ -1,0 +1,141 @@
+"""Sections of constant span: what they cut, how they lie flat, and where walls come from."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.view_keys import write_sections
+from slideviz.cli import run
+from slideviz.errors import CaseError
+from slideviz.mesh.quality import quality
+from slideviz.samples.impeller import impeller_mesh
+from slideviz.scene.axis_handle import frame_of
+from slideviz.sections.around_axis import patch_of
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.sections.span import find_walls
+from slideviz.session import changes
+from slideviz.session.opening import open_mesh
+from slideviz.session.passages import keeps
+from slideviz.session.saving import view_to_case
+from slideviz.session.section_cuts import can_cut, first_section, position_range
+from slideviz.session.state import StepFrame
+from tests.builders import cube, pair, passage
+
+HALF = Section("span", span=0.5)
+
+
+def bound(mesh, span=0.5, **others):
+    return Section("span", span=span, walls=find_walls(mesh, **others))
+
+
+def test_between_cylinders_it_is_a_cylinder():
+    mesh = passage()
+    cut = Cutter.of(mesh).cut(mesh.points, bound(mesh, 0.3))
+    same = Cutter.of(mesh).cut(mesh.points, Section("cylinder", radius=0.65))
+    assert cut.cells.tolist() == same.cells.tolist()
+    # The walls are the chords of their facets only across theta, which does not count.
+    assert cut.points == pytest.approx(same.points, abs=1e-12)
+    # m' is z over the radius there; theta is the angle.
+    section = bound(mesh, 0.3)
+    flat = section.shape.flatten(section, cut, None, None)
+    at = flat.points[flat.connectivity]
+    assert np.ptp(at[:, 0]) == pytest.approx(1.0 / 0.65, rel=1e-5)
+    assert np.ptp(at[:, 1]) == pytest.approx(np.radians(30.0), rel=1e-9)
+    assert np.abs(at[:, 2]).max() < 1e-12
+
+
+def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
+    mesh = impeller_mesh(3000)
+    section = bound(mesh, 0.37)
+    cut = Cutter.of(mesh).cut(mesh.points, section)
+    spans = section.shape.positions(section, cut.points)
+    assert len(cut) > 100
+    assert np.abs(spans - 0.37).max() < 1e-12
+    # Angles between the edges of small polygons are as in space.
+    flat = section.shape.flatten(section, cut, None, None)
+    assert len(flat.points) == len(cut.points)
+
+    def cosines(polygons):
+        first = polygons.points[polygons.connectivity[polygons.offsets[:-1]]]
+        ends = [polygons.points[polygons.connectivity[polygons.offsets[:-1] + k]] for k in (1, 2)]
+        a, b = ((end - first) / np.linalg.norm(end - first, axis=1)[:, None] for end in ends)
+        return np.sum(a * b, axis=1)
+
+    small = flat.with_points(flat.points * [1.0, 1.0, 0.0])
+    assert np.median(np.abs(cosines(small) - cosines(cut))) < 0.01
+    # Its handle: places of the surface are on the span, and the frame is around them.
+    patch = patch_of(section, cut.points)
+    on = section.shape.surface(section, patch.places[::20], 0.37)
+    assert section.shape.positions(section, on) == pytest.approx(0.37, abs=1e-9)
+    assert all(np.isfinite(line).all() for line in frame_of(section, patch))
+    assert section.shape.lever(section, 0.0) == pytest.approx(0.3, rel=0.3)
+
+
+def test_periods_about_its_axis_keep_it():
+    mesh = passage()
+    section = bound(mesh)
+    turn = pair("rotational", 3, angle=np.radians(30.0))
+    assert keeps(section, turn.matrix(1))
+    assert not keeps(section, pair("translational", 3, vector=(0.0, 0.0, 1.0)).matrix(1))
+    with pytest.raises(CaseError, match=r"repeat by .*need an axis about which they turn"):
+        find_walls(mesh, None, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
+
+
+def test_without_walls_it_cuts_nothing():
+    assert not can_cut(passage(), HALF)
+    assert HALF.needs(3) == "needs hub and shroud"
+    assert HALF.needs(2) == "needs a 3D mesh"
+    with pytest.raises(CaseError, match="needs hub and shroud: name them in SPAN"):
+        HALF.distance(np.zeros((1, 3)))
+    with pytest.raises(CaseError, match="the span 1 is not below 1; give a number between 0"):
+        replace(HALF, span=1.0)
+
+
+def session_of(mesh, case=None):
+    return open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
+
+
+def test_sessions_keep_it_with_the_walls_of_their_case():
+    mesh = passage()
+    session = session_of(mesh)
+    section = first_section("span", session)
+    assert (section.span, section.walls.hub, section.walls.shroud) == (0.5, "hub", "shroud")
+    assert position_range(section, mesh.points) == pytest.approx((0.0, 1.0))
+    session = changes.add_section(session, replace(section, flat=True))
+    case = view_to_case(session)
+    assert "(span, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, cut, unrolled)" in write_sections(
+        case.view["VIEW_SECTIONS"]
+    )
+    [again] = session_of(mesh, case).view.sections
+    assert again == replace(section, flat=True)  # the walls are cached with the mesh
+    swapped = changes.set_case(session, span=("shroud", "hub"))
+    assert swapped.view.section.walls.hub == "shroud"
+    gone = changes.set_case(session, span=("inflow", "hub"))
+    assert gone.view.section.walls is None
+    [lost] = session_of(cube(), case).view.sections
+    assert lost.walls is None
+    with pytest.raises(CaseError, match="do not say between which the span goes"):
+        first_section("span", session_of(cube()))
+
+
+def test_command_and_library_draw_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mesh = passage()
+    sv.write("mesh.su2", mesh)
+    assert run(["section", "mesh.su2", "--span", "0.9", "-o", "a.png", "--json", "a.json"]) == 0
+    report = json.loads((tmp_path / "a.json").read_text())["section"]
+    assert (report["span"], report["between"]) == (0.9, ["hub", "shroud"])
+    words = ["section", "mesh.su2", "--span", "0.9", "--between", "shroud,hub", "-o", "b.svg"]
+    assert run([*words, "--stream", "--copies", "1"]) == 0
+    assert "90 % span from shroud to hub" in capsys.readouterr().out
+    assert run(["section", "mesh.su2", "--plane", "z=0.5", *words[4:]]) == 2
+    assert "--between names the walls of --span" in capsys.readouterr().err
+    shown = sv.section("c.svg", mesh, span=0.9)
+    swapped = sv.section("d.svg", mesh, span=0.1, between=("shroud", "hub"))
+    assert shown.ids.tolist() == swapped.ids.tolist()
+    with pytest.raises(CaseError, match="give either a section or a span"):
+        sv.section("e.svg", mesh)
