@@ -26,7 +26,9 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Note, nearest
+from slideviz.mesh.zones import without_zone
 from slideviz.terms import KERNELS, ROLES, SLIDES
 
 if TYPE_CHECKING:
@@ -38,16 +40,36 @@ _LISTED = 12
 
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
+    if mesh.zone_parts:
+        return tuple(_problems_of_zones(with_marker_names(case, mesh), mesh))
     return (
         *key_problems(case),
         *_radius_problems(case, mesh),
-        *(sentence for _, sentence in contradictions(case)),
+        *(sentence for _, sentence in contradictions(case, exact=True)),
         *marker_problems(case, mesh),
         *motion_problems(case, mesh),
         *_zone_problems(case, mesh),
         *_periodic_problems(case, mesh),
         *_halo_problems(case, mesh),
     )
+
+
+def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
+    """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
+    yield from key_problems(case)
+    yield from (sentence for _, sentence in contradictions(case, exact=True))
+    yield from marker_problems(case, mesh)
+    yield from _zone_problems(case, mesh)
+    if not case.markers_with("periodic"):
+        yield from _periodic_problems(case, mesh)
+    try:
+        cases = zone_cases(case, mesh)
+    except CaseError as problem:
+        yield str(problem)
+        return
+    for number, (one, part) in enumerate(zip(cases, mesh.zone_parts, strict=True), 1):
+        if one.markers_with("moving"):
+            yield from (f"zone {number}: {text}" for text in check_case(one, part.mesh))
 
 
 def require_valid(case: Case, mesh: Mesh) -> None:
@@ -61,18 +83,19 @@ def raise_all(problems: tuple[str, ...]) -> None:
         raise CaseError("\n".join(dict.fromkeys(problems)))
 
 
-def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
+def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, ...], str]]:
     """Return the keys that contradict each other, with a sentence, whatever the mesh.
 
     What else a run needs is found by `check_case`: a case without it can be read from a file, and
-    put right with ``--set``.
+    put right with ``--set``. Unless ``exact``, 1:blade may be another spelling of blade.
     """
     problems: list[tuple[tuple[str, ...], str]] = []
     moving = case.markers_with("moving")
+    spelt = () if exact else {without_zone(name) for name in moving}
     seen: set[str] = set()
     for place, motion in enumerate(case.motions, start=1):
         for name in named(motion.marker):
-            if name in moving or name in seen:
+            if name in moving or name in seen or without_zone(name) in spelt:
                 continue
             seen.add(name)
             remedy, several = "one of the two is wrong", name.split("+")
@@ -118,8 +141,15 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
     known = mesh.marker_names
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"
+    of_zones = {
+        marker: [name for name in known if without_zone(name) == marker]
+        for marker in named
+        if mesh.zone_parts
+    }
     return [
-        f"{key}: {mesh.name} has no marker {marker!r}{nearest(marker, known) or f'; {has}'}"
+        f"{key}: several zones of {mesh.name} have a marker {marker!r}; write {joined}"
+        if (joined := " or ".join(of_zones.get(marker, ())))
+        else f"{key}: {mesh.name} has no marker {marker!r}{nearest(marker, known) or f'; {has}'}"
         for marker, key in named.items()
         if marker not in known
     ]
@@ -207,8 +237,8 @@ def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
 
 def _zone_problems(case: Case, mesh: Mesh) -> Iterator[str]:
     if case.zone is not None and case.zone != mesh.zone:
-        is_zone = f"{mesh.name} is zone {mesh.zone} of {mesh.zones}"
-        yield f"ZONE= {case.zone}, but {is_zone}; read the other zone or change ZONE"
+        is_zone = f"{mesh.name} is {f'zone {mesh.zone} of' if mesh.zone else 'all'} {mesh.zones}"
+        yield f"ZONE= {case.zone}, but {is_zone}; read that zone or change ZONE"
 
 
 def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:

@@ -203,7 +203,12 @@ def reference_displacements(
 
 
 def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
-    """Return a file's displacements of ``nodes`` (k,), which it numbers as in the whole mesh."""
+    """Return a file's displacements of ``nodes`` (k,), which it numbers as in the whole zone."""
+    for zone in mesh.zone_parts:
+        if len(nodes) and zone.points.start <= nodes[0] < zone.points.stop:
+            first = zone.points.start
+            read = _read_file(path, zone.mesh, nodes - first, of)
+            return replace(read, nodes=read.nodes + first)
     if mesh.part is None:
         return read_displacements(path, nodes, mesh.points.shape, of)
     shape = mesh.part.n_points, mesh.dim

@@ -44,9 +44,10 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
     ``mesh``: the mesh, or only its skin. ``counts`` and ``found``: counts and quality of the whole
     mesh.
     """
-    from slideviz.cli.report import info_report, save_json, table
+    from slideviz.cli.report import info_report, save_json, table, zone_words
     from slideviz.cli.terminal import DONE
     from slideviz.mesh.periodic import find_pairs
+    from slideviz.mesh.zones import marker_zones
 
     report = info_report(mesh, find_pairs(mesh), counts, found)
     boxes, fault = _boxes(mesh)
@@ -68,7 +69,7 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
         ]
     if save_json(arguments.json, report):
         return DONE
-    zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
+    zone = zone_words(mesh.zone, mesh.zones)
     print(f"{arguments.mesh}: {mesh.dim}D{zone}, {counts.points} points")
     print(table([(count, name) for name, count in report["cells_by_type"].items()]))
     extents = zip("xyz", report["extents"], strict=False)
@@ -81,8 +82,14 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
         print(f"  {remark}")
     print("markers:" if mesh.markers else "no markers")
     if mesh.markers:
-        print(table([(m["name"], m["elements"], "elements") for m in report["markers"]]))
+        rows = [(m["name"], m["elements"], "elements") for m in report["markers"]]
+        zones = [f"zone {zone}" for zone in marker_zones(mesh)]
+        more = [(*row, zone) for row, zone in zip(rows, zones, strict=True)]
+        print(table(more if mesh.zone_parts else rows))
+    zone_of = dict(zip(mesh.marker_names, marker_zones(mesh), strict=True))
     for interface in mesh.interfaces:
+        if mesh.zone_parts and zone_of[interface.marker] > interface.zone:
+            continue  # the same, seen from the other zone
         print(f"  {interface.marker} is {interface.describe()}")
     for pair in report["periodic_pairs"]:
         print(f"  {' and '.join(pair['markers'])} match: {pair['type']}, {pair['description']}")

@@ -88,18 +88,19 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
                     return read(path, zone=zone, file_format=kind)
                 return stack.enter_context(open_read_only(path, zone, tick, folder, kind))
 
-            mesh = open_one(arguments.mesh, arguments.zone)
+            zone = arguments.zone if case is None else arguments.zone or case.zone
+            mesh = open_one(arguments.mesh, zone)
             skin = _mesh_of(mesh, tick)
             base = None
             if reference is not None:
-                base = open_one(reference, arguments.zone)
+                base = open_one(reference, zone)
                 if arguments.stream and not _same_cells(mesh, base):
                     raise MeshError(
                         f"{reference} cannot be the reference of {skin.name}: it must have the "
                         "same cells; give the undeformed mesh"
                     )
             elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
-                base = open_one(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
+                base = open_one(case.mesh_file, zone, case.mesh_format)
                 base = base if _same_cells(mesh, base) else None
                 reference = None if base is None else case.mesh_file
         source = _source(stack, mesh, base, skin)

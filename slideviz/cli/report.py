@@ -23,6 +23,7 @@ from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
+from slideviz.mesh.zones import marker_zones
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
 from slideviz.solver.steps import MeshRepair, safe_fraction_of
@@ -64,6 +65,7 @@ def run_report(
     ``walls``: the layers at the boundaries; None where the mesh is in a file.
     """
     last, safe = steps[-1], safe_fraction_of(steps)
+    each = [step.relaxed for step in steps if step.relaxed is not None]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
         for phase, value in step.seconds.items():
@@ -109,7 +111,7 @@ def run_report(
             (step.periodic_misfit for step in steps if step.periodic_misfit is not None),
             default=None,
         ),
-        "relax": None if (relaxed := _relaxed(steps)) is None else asdict(relaxed),
+        "relax": None if (relaxed := Relaxed.joined(each)) is None else asdict(relaxed),
         "repair": None if (mended := _repaired(steps)) is None else mended.report(),
         "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
@@ -187,19 +189,6 @@ def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     return value, before, "met" if entry["passed"] else f"not met{place}{cells}"
 
 
-def _relaxed(steps: Sequence[Step]) -> Relaxed | None:
-    """Return how the steps were relaxed: the worst of each number, and the sum of the rounds."""
-    each = [step.relaxed for step in steps if step.relaxed is not None]
-    if not each:
-        return None
-    return Relaxed(
-        sum(one.rounds for one in each),
-        max(one.residual for one in each),
-        min(one.theta for one in each),
-        max(one.limited for one in each),
-    )
-
-
 def _repaired(steps: Sequence[Step]) -> MeshRepair | None:
     """Return the repair of the last step, with all cells and nodes of the steps before, too."""
     each = [step.repaired for step in steps if step.repaired is not None]
@@ -257,7 +246,9 @@ def info_report(
         "cells_by_type": {ELEMENTS[vtk].name: count for vtk, count in counts.types.items()},
         "extents": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
         "markers": [
-            {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)} for m in mesh.markers
+            {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)}
+            | ({"zone": zone} if mesh.zone_parts else {})
+            for zone, m in zip(marker_zones(mesh), mesh.markers, strict=True)
         ],
         "periodic_pairs": [
             {
@@ -278,6 +269,13 @@ def info_report(
         "remarks": list(mesh.remarks),
         "quality": quality.summary(),
     }
+
+
+def zone_words(zone: int | None, zones: int) -> str:
+    """Return which zone of a file a mesh is, after a comma; "" where it has only one."""
+    return f", {f'zone {zone} of' if zone else 'all'} {zones}{'' if zone else ' zones'}" * (
+        zones > 1
+    )
 
 
 def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:

@@ -95,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from slideviz.case.zones import with_marker_names
     from slideviz.cli.output_paths import REPLACED, qualities_path
     from slideviz.cli.report import metrics_report, run_report
     from slideviz.errors import CaseError
@@ -120,6 +121,7 @@ def _run(arguments: argparse.Namespace) -> int:
         save_report(arguments, known[0])
         return report_warnings(*known, quiet=arguments.quiet)
     done = (_stream if streamed else _deform)(arguments, case, output, kind)
+    case = with_marker_names(case, done.mesh)
     found, before, seconds = done.quality, done.undeformed, dict(done.seconds)
     if qualities:
         seconds["write"] -= time.perf_counter()
@@ -207,6 +209,7 @@ def _deform(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
     from slideviz import quality, read, walls, write
+    from slideviz.case.zones import with_marker_names
     from slideviz.cli.report import folded_cells
     from slideviz.formats.losses import warning_of_losses
     from slideviz.scene.overview import require_detail
@@ -215,6 +218,7 @@ def _deform(
     assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}
     mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    case = with_marker_names(case, mesh)
     say("warning", warning_of_losses(output, mesh, kind))
     if arguments.picture:
         require_detail(arguments.zoom, mesh)

@@ -166,14 +166,21 @@ def _print_run(
     report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
 ) -> None:
     from slideviz.case.words import counted
-    from slideviz.cli.report import limit_lines, metric_lines, quality_lines, table, wall_lines
+    from slideviz.cli.report import (
+        limit_lines,
+        metric_lines,
+        quality_lines,
+        table,
+        wall_lines,
+        zone_words,
+    )
     from slideviz.mesh.margin import SafeFraction
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
     auto = " (AUTO)" if report["tried"] else ""
     print(f"{report['case']}: {counted(report['steps'], 'step')}{auto}, {method}", end="")
-    zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
+    zone = zone_words(report["zone"], report["zones"])
     slides = counts["sliding_edge"] + counts["sliding_surface"]
     sliding = report["sliding"] if slides else "none"
     print(f"sliding {sliding}, periodic {report['periodic']}{zone}")

@@ -26,7 +26,8 @@ from slideviz.ffd.box import (
 )
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
+from slideviz.mesh.zones import names_in, zones_of
 
 _LETTERS = "IJK"
 _FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
@@ -300,9 +301,25 @@ _BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakK
 def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
     """Return a mesh's boxes, in the order of its file, in a coordinate system; or MeshError."""
     cache = _BOXES.setdefault(mesh, {})
+    if system not in cache and mesh.zone_parts:
+        cache[system] = tuple(
+            _in_whole(mesh, part, box)
+            for part, zone in zip(mesh.zone_parts, zones_of(mesh), strict=True)
+            for box in boxes_of(zone, system)
+        )
     if system not in cache:
         cache[system] = read_boxes(mesh, _lines(mesh), system)
     return cache[system]
+
+
+def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:
+    """Return a box of a zone with the names and nodes that its boundaries have in the mesh."""
+    name = {file: ours for ours, file in names_in(mesh, part).items()}
+    embedded = {
+        name.get(marker, marker): (nodes + part.points.start, uvw)
+        for marker, (nodes, uvw) in box.embedded.items()
+    }
+    return replace(box, embedded=embedded)
 
 
 def with_boxes(

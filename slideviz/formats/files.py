@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -28,20 +28,17 @@ from slideviz.errors import MeshError, path_error, printable
 from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.table import (
     FILE_FORMATS,
-    FORMATS,
     MESHIO,
     WriteOptions,
     format_for,
     format_of,
     holds_quality,
-    usual_ending,
 )
 from slideviz.mesh.check import check_size
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.walls import Walls
-from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import killed_at_end
 from slideviz.system.threads import Tick
 from slideviz.terms import SIZE_SKEW, WALL_VALUES, FileFormat, Metric, Quantity, field_of
@@ -203,7 +200,7 @@ def convert(
     *,
     warn: Callable[[str], object] | None = None,
 ) -> Mesh:
-    """Write a mesh in the format that the ending of ``target`` names; return its first zone.
+    """Write a mesh in the format that the ending of ``target`` names, and return it.
 
     Parameters
     ----------
@@ -220,8 +217,7 @@ def convert(
     Raises
     ------
     MeshError
-        The file cannot be read, the format cannot hold the mesh, or it has no zones and the file
-        has several.
+        The file cannot be read, the format cannot hold the mesh, or its zones are 2D and 3D.
 
     Examples
     --------
@@ -234,45 +230,19 @@ def convert(
     source, target = Path(source), Path(target)
     row, mesh = format_for(target), read(source, zone)
     alone = zone is not None and mesh.zones > 1
-    same = mesh.origin.ending == row.ending
-    keeps_zones = bool(row.zones) and zone is None
     if warn is not None:
-        for sentence in _warnings(source, target, mesh, alone):
-            warn(sentence)
-    if row.quality and cell_data is None and (alone or mesh.zones == 1):
+        if alone and mesh.origin.ending == row.ending:
+            warn(
+                f"{target} will have zone {mesh.zone} alone, and of {mesh.name} nothing but that "
+                "mesh: leave out --zone to keep FFD boxes and the rest"
+            )
+        warn(warning_of_losses(target, mesh, alone=alone))
+    if row.quality and cell_data is None:
         cell_data = quality_data(target, quality(mesh))
-    if mesh.zones == 1 or (keeps_zones and same):
-        write(target, mesh, cell_data=cell_data)  # which keeps what else the file has
-    elif alone:
-        only = replace(mesh, zone=1, zones=1, origin=Origin())
-        write(target, only, cell_data=cell_data)
-    elif not keeps_zones:
-        raise path_error(
-            target,
-            f"{source.name} has {mesh.zones} zones, for which this format has no place; "
-            "choose one with --zone",
-        )
-    else:
-        others = (read(source, number) for number in range(2, mesh.zones + 1))
-        with atomic_write(target) as file:
-            for block in row.function("zones")(mesh, *others):
-                file.write(block)
+    # One of several zones is a mesh of its own there.
+    written = replace(mesh, zone=1, zones=1, origin=Origin()) if alone else mesh
+    write(target, written, cell_data=cell_data)
     return mesh
-
-
-def _warnings(source: Path, target: Path, mesh: Mesh, alone: bool) -> Iterator[str]:
-    row = format_for(target)
-    if alone and mesh.origin.ending == row.ending:
-        yield (
-            f"{target} will have zone {mesh.zone} alone, and of {mesh.name} nothing but that mesh: "
-            "leave out --zone to keep FFD boxes and the rest"
-        )
-    # Without --zone no zone is lost.
-    yield warning_of_losses(target, mesh if alone else replace(mesh, zones=1), alone=alone)
-    if not alone and row.zones and not row.sections and FORMATS[usual_ending(mesh)].sections:
-        for zone in range(2, mesh.zones + 1):
-            other = replace(read(source, zone), zones=1, name=f"{mesh.name}, zone {zone}")
-            yield warning_of_losses(target, other)
 
 
 @check_types
@@ -289,7 +259,7 @@ def read(
     path : str or Path
         An SU2 file, text or binary, or one of a format that meshio reads (by its ending).
     zone : int, optional
-        The zone of an SU2 file, from 1; the first when left out.
+        The zone of an SU2 file, from 1; all of them, as one mesh, when left out.
     progress : callable, optional
         Called with the fraction done, 0 to 1; what it raises stops the reading and passes on.
     file_format : {"su2", "su2b"}, optional

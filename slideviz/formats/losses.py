@@ -14,9 +14,11 @@ from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.text import SEND_RECEIVE
 from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.zones import zones_of
 from slideviz.terms import FileFormat
 
 OTHER_ZONES = "its other zones"  # what a file of one zone loses
+DIVISION = "its division into zones"  # what a file without zones loses of a mesh of all
 
 
 def left_out(path: Path, mesh: Mesh) -> str:
@@ -33,7 +35,7 @@ def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
     same = mesh.origin.ending == row.ending != ""
     if same and row.copies:
         return lost
-    if same:  # the other zones are kept
+    if same or (mesh.zone_parts and row.zones):  # the other zones are kept
         mesh = replace(mesh, zones=1)
     if mesh.markers and row.boundaries == "numbers":
         lost.append("the names of the boundaries (they are numbers now)")
@@ -48,14 +50,16 @@ def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
 
 def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
     """Return what the file of a mesh has besides points, cells and boundaries, in words."""
-    document = mesh.origin
-    keys = ["FFD_NBOX"] if document.ffd else []
-    has_halo = mesh.halo is not None
-    if isinstance(document, Document):
-        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.unknown]
-        has_halo = has_halo or bool(document.sends)
+    keys, has_halo = [], mesh.halo is not None
+    for document in (zone.origin for zone in zones_of(mesh)):
+        keys += ["FFD_NBOX"] if document.ffd else []
+        if isinstance(document, Document):
+            texts = (document.raw[a:b] for a, b in document.unknown)
+            keys += [text.partition(b"=")[0].strip().decode() for text in texts]
+            has_halo = has_halo or bool(document.sends)
     halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
-    return (*halo, *lost_of_text(keys, mesh.zones))
+    lost = lost_of_text(keys, mesh.zones)
+    return *halo, *(DIVISION if mesh.zone_parts and one == OTHER_ZONES else one for one in lost)
 
 
 def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:

@@ -79,8 +79,7 @@ class MeshFormat:
     copies: bool = False
     """Whether a file can be written only as a copy of the one that the mesh was read from."""
     require: str = ""  # raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``
-    zones: str = ""
-    """Yields a file with several zones, block by block: ``blocks(*meshes)``; "" for one zone."""
+    zones: bool = False  # whether it keeps several zones apart
     content: str = ""
     """Yields a file of a mesh whose parts are made by functions: ``blocks(content, name)``."""
     series: str = ""
@@ -111,7 +110,7 @@ _ROWS = (
         isolated=False,
         solver=True,
         sections=True,
-        zones="su2.write:su2_zones",
+        zones=True,
         content="su2.write:content_blocks",
         detects="su2.read:is_su2",
         term=Term("SU2", "SU2’s text"),
@@ -124,7 +123,7 @@ _ROWS = (
         isolated=False,
         solver=True,
         require="su2b.write:require_binary",
-        zones="su2b.write:su2b_blocks",
+        zones=True,
         content="su2b.write:content_blocks",
         detects="su2b.read:is_su2b",
         term=Term("SU2B", "SU2’s binary mesh"),

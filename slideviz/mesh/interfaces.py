@@ -40,23 +40,35 @@ def find_interfaces(
             places = mesh.points[nodes]
             if not ((places >= low) & (places <= high)).all(axis=1).any():
                 continue
-            shared = np.zeros(len(mesh.points), bool)
-            shared[nodes] = np.isfinite(nearest(points, places, near, near)[0])
+            distance, partner = nearest(points, places, near, near)
+            there, shared = np.isfinite(distance), np.zeros(len(mesh.points), bool)
+            shared[nodes] = there
             if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
-                here = frozen_array(np.flatnonzero(shared), np.int64)
-                found.append(ZoneInterface(marker.name, zone, name, here))
+                here, other = (
+                    frozen_array(some, np.int64) for some in (nodes[there], partner[there])
+                )
+                found.append(ZoneInterface(marker.name, zone, name, here, other))
     return tuple(found)
 
 
 def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
-    """Return a sentence for each interface whose nodes are elsewhere in ``points`` (n, d)."""
+    """Return a sentence for each interface whose nodes no longer coincide in ``points`` (n, d).
+
+    In a mesh of one zone, those of the other zone stay.
+    """
     sentences = []
+    shift = points - mesh.points
     for each in mesh.interfaces:
-        gap = np.linalg.norm(points[each.nodes] - mesh.points[each.nodes], axis=1)
-        if gap.max(initial=0.0) > ROUNDING * mesh.extent:
-            sentences.append(
-                f"zone {each.zone} no longer fits: {each.marker}, which is an interface with its "
-                f"{each.other}, has moved by up to {gap.max():.3g}; keep it fixed, or deform zone "
-                f"{each.zone} alike"
+        apart = shift[each.nodes]
+        if mesh.zone_parts:
+            apart = apart - shift[each.partners]
+        gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
+        if gap > ROUNDING * mesh.extent:
+            said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
+            remedy = (
+                "move both alike, or let one of them be fixed, so that it follows the other"
+                if mesh.zone_parts
+                else "keep it fixed, or deform all zones (without ZONE=)"
             )
+            sentences.append(f"zone {each.zone} no longer fits: {said} {gap:.3g}; {remedy}")
     return tuple(sentences)

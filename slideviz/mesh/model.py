@@ -188,12 +188,15 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ZoneInterface:
-    """A boundary whose ``nodes`` (k,) coincide with nodes of ``other`` in another zone."""
+    """A boundary whose nodes coincide with nodes of ``other`` in another zone."""
 
     marker: str
     zone: int
     other: str
-    nodes: IntArray
+    nodes: IntArray  # (k,): its nodes that coincide
+    partners: IntArray
+    """(k,): the nodes of ``other`` there: in a mesh of all zones their indices, else their places
+    among the nodes of ``other``."""
 
     def describe(self) -> str:
         """Return the interface in words."""
@@ -221,9 +224,20 @@ class Origin:
     """Names of the boxes that other zones of the file have, and the numbers of these zones."""
 
 
+@dataclass(frozen=True, eq=False)
+class ZonePart:
+    """Where a zone is in a mesh that has all zones of its file (`slideviz.mesh.zones`)."""
+
+    mesh: Mesh  # the zone alone, as it was read
+    points: slice
+    cells: slice
+    markers: slice
+    """`points`, `cells`, `markers`: its points, cells and boundaries in the mesh of all zones."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Points, cells and boundaries of one zone."""
+    """Points, cells and boundaries of one zone, or of all zones of a file."""
 
     points: FloatArray
     """(n, d): Cartesian coordinates, d = 2 or 3, in the file's length unit."""
@@ -235,9 +249,12 @@ class Mesh:
     """What else of its file is kept, to write it back."""
     name: str = "mesh"
     """Name of its file or sample, for messages."""
-    zone: int = 1
+    zone: int | None = 1
     zones: int = 1
-    """`zone`, `zones`: number of this zone in the file (from 1) and of all its zones."""
+    """`zone`, `zones`: number of this zone in the file (from 1; None: it has all), and how many the
+    file has."""
+    zone_parts: tuple[ZonePart, ...] = ()
+    """Where each zone is, if there are several; they share no points."""
     source: Path | None = None
     """The file it was read from, which is overwritten only on request."""
     halo: Halo | None = None

@@ -7,7 +7,7 @@ found by the nodes. `slideviz.rbf.images` has the sets of nodes that are images 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from operator import itemgetter
 
@@ -16,8 +16,10 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.halo import without_halo
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.mesh.nearest import nearest
+from slideviz.mesh.zones import names_in
 from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
@@ -201,14 +203,23 @@ def pair_up(
 ) -> tuple[Pair, ...]:
     """Return the pairs that the named markers form, whatever their order.
 
-    All pairs have the same transformation or its inverse. If a marker matches several others (two
-    halves of a straight side), the partner with this transformation is chosen.
+    All pairs of a zone have the same transformation or its inverse. If a marker matches several
+    others (two halves of a straight side), the partner with this transformation is chosen.
 
     Raises
     ------
     MeshError
         A marker has no partner, or the pairs have different transformations.
     """
+    if mesh.zone_parts:
+        of_zones = [(part, names_in(mesh, part)) for part in mesh.zone_parts]
+        here = [(part, [own[n] for n in names if n in own]) for part, own in of_zones]
+        return tuple(
+            _in_whole(mesh, part, pair)
+            for part, some in here
+            if some
+            for pair in pair_up(without_halo(part.mesh)[0], some, kind, axis, origin)
+        )
     if len(names) % 2 or not names:
         raise MeshError(
             f"{mesh.name}: {len(names)} periodic markers ({', '.join(names) or 'none'}); "
@@ -225,7 +236,7 @@ def pair_up(
             except MeshError as problem:
                 reasons.append(problem)
                 continue
-            if model is not None and not _agree(model, pair):
+            if model is not None and not agree(model, pair):
                 reasons.append(_differ(mesh, model, pair))
                 continue
             others = pairs_of([name for name in rest[1:] if name != second], model or pair)
@@ -239,6 +250,13 @@ def pair_up(
         period = next((reason for reason in reasons if "one period" in str(reason)), None)
         raise period or _left_over(mesh, names, reasons[0], kind=kind, axis=axis, origin=origin)
     return pairs
+
+
+def _in_whole(mesh: Mesh, part: ZonePart, pair: Pair) -> Pair:
+    """Return a pair of a zone with the names and nodes that its boundaries have in the mesh."""
+    name = {file: ours for ours, file in names_in(mesh, part).items()}
+    nodes = frozen_array(pair.nodes + part.points.start, np.int64)
+    return replace(pair, first=name[pair.first], second=name[pair.second], nodes=nodes)
 
 
 def _left_over(
@@ -276,7 +294,7 @@ def _left_over(
     return MeshError(f"{mesh.name}: the periodic markers {pairs}, but {left} do not: {why}")
 
 
-def _agree(one: Pair, other: Pair) -> bool:
+def agree(one: Pair, other: Pair) -> bool:
     """Return whether two pairs have the same transformation or its inverse.
 
     The axes of two rotations are not compared.
@@ -311,6 +329,12 @@ def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tup
         Coordinates are too large to be computed with.
     """
     check_size(mesh)
+    if mesh.zone_parts:
+        return tuple(
+            _in_whole(mesh, part, pair)
+            for part in mesh.zone_parts
+            for pair in find_pairs(part.mesh, going_on)
+        )
     count = {name: len(mesh.marker(name).nodes) for name in mesh.marker_names}
     tries: list[tuple[PeriodicKind, tuple[float, float, float]]] = [("translational", Z_AXIS)]
     tries += [("rotational", axis) for axis in (_AXES[:1] if mesh.dim == 2 else _AXES)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import field as made_by
@@ -192,6 +192,18 @@ class Relaxed:
     residual: float  # last residual over the first, in the norm of the preconditioner
     theta: float  # the smallest part of the relaxation that the safeguard left anywhere, 0 to 1
     limited: int  # nodes where it left less than all
+
+    @classmethod
+    def joined(cls, several: Sequence[Relaxed]) -> Relaxed | None:
+        """Return the worst of each number, and the sum of the rounds; None of none."""
+        if not several:
+            return None
+        return cls(
+            sum(one.rounds for one in several),
+            max(one.residual for one in several),
+            min(one.theta for one in several),
+            max(one.limited for one in several),
+        )
 
 
 @dataclass(frozen=True, eq=False)

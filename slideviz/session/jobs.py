@@ -19,6 +19,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import displacements
+from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
@@ -29,6 +30,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.mesh.walls import Walls, walls
+from slideviz.mesh.zones import zones_of
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -155,10 +157,14 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
             return "", ""
         if not all(path.is_file() for path in files):
             return "", ""
-        moved = displacements(case, mesh)
-        asked = case, mesh, moved.nodes, moved.vectors
-        found = intersection_message(*asked) or jump_message(*asked)
-        folded = None if found else folding_message(*asked)
+        found = folded = None
+        cases = zone_cases(case, mesh) if mesh.zone_parts else (case,)
+        for one, zone in zip(cases, zones_of(mesh), strict=True):
+            if found is None and one.markers_with("moving"):
+                moved = displacements(one, zone)
+                asked = one, zone, moved.nodes, moved.vectors
+                found = intersection_message(*asked) or jump_message(*asked)
+                folded = folded or (None if found else folding_message(*asked))
     except SlidevizError as error:
         return _first_line(error, files), ""
     message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
@@ -261,6 +267,7 @@ def prepare(
     mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
 ) -> Opened:
     """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
+    case = None if case is None else with_marker_names(case, mesh)
     raise_if_cancelled(stopped)
     report(JobProgress("Finding the boundaries"))
     surfaces = find_surfaces(mesh)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.case.zones import zone_cases
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.fans import Fans, find_fans
@@ -71,6 +72,8 @@ class NodeTypes:
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
         from slideviz.solver.domain import find_classes, find_period, roles_of_copies
 
+        if mesh.zone_parts:
+            return self._of_zones(mesh, case)
         if not mesh.markers:
             return NOTHING
         case, _ = roles_of_copies(case, mesh)
@@ -97,6 +100,20 @@ class NodeTypes:
         kinds[classes.moving] = place["moving"]
         nodes = boundary.nodes
         return TypedNodes(nodes, kinds[nodes])
+
+    def _of_zones(self, mesh: Mesh, case: Case) -> TypedNodes:
+        try:
+            cases = zone_cases(case, mesh)
+        except SlidevizError:
+            return NOTHING
+        each = [
+            (part.points.start, NodeTypes()._classified(part.mesh, one))
+            for part, one in zip(mesh.zone_parts, cases, strict=True)
+        ]
+        return TypedNodes(
+            np.concatenate([typed.nodes + first for first, typed in each]),
+            np.concatenate([typed.kinds for _, typed in each]),
+        )
 
 
 def control_nodes(session: Session) -> TypedNodes:

@@ -106,9 +106,9 @@ def guess_by_name(name: str) -> Guess | None:
 def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
     """Guess the roles of boundaries from their names and from matching pairs.
 
-    Interfaces with other zones are fixed, because these zones do not move along. Boundaries that
-    match are periodic, unless a name hints at another role, or the mesh is a box that matches along
-    all axes: opposite sides of every box match.
+    Interfaces with other zones are fixed: they follow these where these move. Boundaries that match
+    are periodic, unless a name hints at another role, or the mesh is a box that matches along all
+    axes: opposite sides of every box match.
     """
     guesses = {name: found for name in mesh.marker_names if (found := guess_by_name(name))}
     guesses |= {i.marker: Guess("fixed", f"it is {i.describe()}") for i in mesh.interfaces}

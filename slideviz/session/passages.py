@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.periodic import Pair, find_pairs, pair_up
+from slideviz.mesh.periodic import Pair, agree, find_pairs, pair_up
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
@@ -20,7 +20,7 @@ from slideviz.session.opening import guess_by_name
 _SAME = 1e-9
 """A section is taken onto itself where it moves by less than this, over its size or distance."""
 
-_PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair]] = WeakKeyDictionary()
+_PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair | None]] = WeakKeyDictionary()
 """Periodic pairs found before, by mesh, and by the settings of the case that they depend on."""
 
 
@@ -31,15 +31,16 @@ def find_period(
 
     Of a case with periodic boundaries it is their first pair. Otherwise it is guessed among the
     boundaries that match (``pairs``, if known already): those with names that hint at periodicity
-    come first, then rotations; the ends of every straight duct match, too. Raises MeshError if the
-    periodic boundaries of the case do not match.
+    come first, then rotations; the ends of every straight duct match, too. None also where zones
+    have different periods. Raises MeshError if the periodic boundaries of the case do not match.
     """
     names = case.markers_with("periodic") if case is not None else ()
     if case is not None and names:
         key = names, case.periodic_type, case.axis, case.origin
         known = _PERIODS.setdefault(mesh, {})
         if key not in known:
-            known[key] = pair_up(mesh, *key)[0]
+            first, *others = pair_up(mesh, *key)
+            known[key] = first if all(agree(first, one) for one in others) else None
         return known[key]
 
     def rank(pair: Pair) -> tuple[int, bool]:
@@ -47,7 +48,16 @@ def find_period(
         named = sum(guess is not None and guess.role == "periodic" for guess in guesses)
         return -named, pair.kind != "rotational"
 
-    return min(find_pairs(mesh) if pairs is None else pairs, key=rank, default=None)
+    every = find_pairs(mesh) if pairs is None else pairs
+    if not every:
+        return None
+    best = min(every, key=rank)
+    for part in mesh.zone_parts:  # the first pair of each zone must have the same period
+        names = mesh.marker_names[part.markers]
+        alike = [pair for pair in every if pair.first in names and agree(best, pair)]
+        if not alike or min((p for p in every if p.first in names), key=rank) not in alike:
+            return None
+    return best
 
 
 def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
+from slideviz.case.zones import with_marker_names
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import IntArray, Mesh
@@ -52,7 +53,8 @@ def deform(
     case
         Roles, motions and settings. Its ``mesh_file`` is not read.
     mesh
-        The undeformed mesh.
+        The undeformed mesh. Each of several zones is deformed alone, with a period of its own;
+        where their boundaries coincide, nodes follow those of the zone that moves them.
     progress
         Called often with a ``Progress``; an exception it raises ends the run at once.
     setup
@@ -93,6 +95,12 @@ def deform(
     1 [0.   1.28 2.5 ]
     """
     report = progress or (lambda _: None)
+    case = with_marker_names(case, mesh)
+    if mesh.zone_parts:
+        from slideviz.solver.zones import deform_zones
+
+        yield from deform_zones(case, mesh, partial(deform, certify=certify), report)
+        return
     timer = PhaseTimer(
         lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction))
     )

@@ -19,6 +19,7 @@ from slideviz.case.check import key_problems, raise_all, unknown_markers
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
+from slideviz.case.zones import zone_cases
 from slideviz.elastic.conditions import conditions
 from slideviz.errors import MeshError, not_one_of
 from slideviz.mesh.cached_boundary import shell_of
@@ -29,13 +30,15 @@ from slideviz.mesh.quality import checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, is_bad
 from slideviz.mesh.repair.repair import repair as mend_cells
+from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
 from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step
-from slideviz.system.threads import Tick
+from slideviz.solver.zones import joined_repairs
+from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, RepairTarget, Role, SkewMetric
 
 _NO_IMAGES = "they are no images of each other; name two that are"
@@ -124,6 +127,8 @@ def _case_alone(
 ) -> Case:
     """Return the case of a repair without motion; CaseError with all mistakes and ``problems``."""
     roles: dict[str, Role] = {}
+    known = spellings(mesh)
+    lists = {role: [known.get(name, name) for name in names] for role, names in lists.items()}
     for role, names in lists.items():
         roles |= {name: role for name in names if name not in roles}
     twice = tuple(
@@ -147,14 +152,15 @@ def _case_alone(
             if pair.first in periodic and pair.second in periodic:
                 case = case.change(axis=pair.axis, origin=pair.origin)
         try:
-            pair_up(without_halo(mesh)[0], periodic, "auto", case.axis, case.origin)
+            alone = mesh if mesh.zone_parts else without_halo(mesh)[0]
+            pair_up(alone, periodic, "auto", case.axis, case.origin)
         except MeshError as problem:
             raise MeshError(str(problem).replace(CHECK_PERIODIC, _NO_IMAGES)) from None
     return case
 
 
 def mended_step(
-    case: Case, mesh: Mesh, setup: Setup, report: Callable[[Progress], None], step: Step
+    case: Case, mesh: Mesh, setup: Setup | None, report: Callable[[Progress], None], step: Step
 ) -> Step:
     """Return a step of a run with its bad cells mended; ``mesh`` is undeformed."""
     timer = PhaseTimer(lambda phase, part: report(Progress(step.index, step.total, phase, part)))
@@ -169,7 +175,8 @@ def mended_frame(
 ) -> Step:
     """Return the last step of a run, mended afterwards; without one, the mesh as a mended step."""
     if step is not None:
-        done = mended_step(case, mesh, make_setup(case, mesh), report, step)
+        setup = None if mesh.zone_parts else make_setup(case, mesh)
+        done = mended_step(case, mesh, setup, report, step)
     else:
         moving = dict.fromkeys(case.markers_with("moving"), "fixed")
         case = case.change(roles={**case.roles, **moving}, motions=())
@@ -197,6 +204,8 @@ def mend(
     ``reference``: the mesh whose shapes cells shall have; None: the ideal ones.
     ``setup``: that of the run, if there was one.
     """
+    if mesh.zone_parts:
+        return _mended_zones(case, mesh, now, reference, tick)
     domain, cells = without_halo(now)
     shapes = None if reference is None else without_halo(reference)[0]
     found = quality(domain, shapes, case.quality_metric)
@@ -225,6 +234,21 @@ def mend(
     bad = number[done.bad_before], number[done.bad_after]
     unmendable, warnings = unmendable_words(done.impossible, mesh, number)
     return MeshRepair(mended, *bad, moved, before, done.largest_move, unmendable, warnings)
+
+
+def _mended_zones(
+    case: Case, mesh: Mesh, now: Mesh, reference: Mesh | None, tick: Tick
+) -> MeshRepair:
+    """Return a mesh of all zones with the bad cells of each mended."""
+    shapes = (None,) * mesh.zones if reference is None else zones_of(reference)
+    each = zip(zone_cases(case, mesh), zones_of(mesh), zones_of(now), shapes, strict=True)
+    done = {}
+    for k, (one, zone, moved, shape) in enumerate(each):
+        share = progress_share(tick, k / mesh.zones, (k + 1) / mesh.zones)
+        done[k] = mend(one, zone, moved, shape, share)
+    mended = joined_repairs(mesh, with_zones(now, [one.mesh for one in done.values()]), done)
+    assert mended is not None
+    return mended
 
 
 def unmendable_words(

@@ -233,6 +233,8 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
     motions.
     """
+    if mesh.zone_parts:
+        raise CaseError(f"{mesh.name}: has {mesh.zones} zones; choose one with ZONE=")
     require_valid(case, mesh)
     domain = find_domain(case, mesh)
     return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved))

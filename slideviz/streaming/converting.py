@@ -23,9 +23,8 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
 from slideviz.streaming.source import FileSource, Scratch
-from slideviz.streaming.stream_input import progress_share
 from slideviz.system.atomic import atomic_write
-from slideviz.system.threads import Tick
+from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat
 
 NEAR = 256  # elements with at most so many others between them are read in one piece
@@ -126,7 +125,7 @@ def convert_streamed(
 
 
 def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
-    texts = [find_text(source, zone, progress_share(tick, 0.0, 0.1))]
+    texts = [find_text(source, zone or 1, progress_share(tick, 0.0, 0.1))]
     zones = texts[0].zone.bounds.zones
     if zone is None:
         texts += [find_text(source, number) for number in range(2, zones + 1)]
@@ -134,11 +133,12 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     for number, text in enumerate(texts, 1):
         name = printable(source.name) + (f", zone {number}" if number > 1 else "")
         _require_binary(text, name)
-        keys = (part.key for part in text.zone.unknown)
-        lost = lost_of_text(keys, 1 if zone is None else zones)
-        warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
         begin = layouts[-1].size if layouts else 8
         layouts.append(binary_layout(text, is_result=True, begin=begin, number=number))
+    keys = (part.key for text in texts for part in text.zone.unknown)
+    alone = zone is not None and zones > 1
+    lost = lost_of_text(keys, zones if alone else 1)
+    warn(sentence_of_lost(target, printable(source.name), lost, alone=alone))
     require_disk_space(target, target, layouts[-1].size)
     with atomic_write(target) as file:
         os.truncate(file.fileno(), layouts[-1].size)

@@ -35,7 +35,7 @@ from slideviz.streaming.skin import naming_text, read_skin, skin_of_text
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick
+from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat
 
 SCANNED, FILLED, COPIED = 0.15, 0.75, 0.8
@@ -63,11 +63,6 @@ class StreamInput:
         if self.text is None:
             return read_skin(self.path, self.zone, tick, ranks)
         return skin_of_text(self.text, self.path, progress_share(tick, COPIED), ranks)
-
-
-def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:
-    """Return a tick for a part of the work: its 0 to 1 becomes ``begin`` to ``end`` of ``tick``."""
-    return lambda done: tick(begin + (end - begin) * done)
 
 
 def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:

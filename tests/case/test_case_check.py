@@ -102,7 +102,7 @@ def test_good_cases(square, case):
         ),
         (
             good(zone=2),
-            "ZONE= 2, but square.su2 is zone 1 of 1; read the other zone or change ZONE",
+            "ZONE= 2, but square.su2 is zone 1 of 1; read that zone or change ZONE",
         ),
         (
             Case(roles={"UPPER": "moving"}, motions=(UP,), periodic="fixed"),

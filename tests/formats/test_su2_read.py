@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import slideviz.formats.su2.text as su2_text
+from slideviz.errors import MeshError
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
@@ -58,9 +59,9 @@ def test_byte_order_mark_is_skipped(tmp_path):
 @pytest.mark.parametrize("block", [1, 7, 40])
 def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     path = save(tmp_path, SAMPLES[name])
-    whole = read(path)
+    whole = read(path, 1)
     monkeypatch.setattr("slideviz.formats.su2.text.BLOCK_BYTES", block)
-    small = read(path)
+    small = read(path, 1)
     assert_same(small, whole)
     assert len(small.origin.rows) > len(whole.origin.rows)
     moved = whole.points.copy()
@@ -85,16 +86,21 @@ def test_digits_beyond_a_double_decide_the_last_bit(tmp_path):
 
 def test_zones(tmp_path):
     path = save(tmp_path, ZONES)
-    first, second = read(path), read(path, zone=2)
+    first, second = read(path, zone=1), read(path, zone=2)
     assert (first.dim, first.zone, first.zones) == (2, 1, 2)
     assert (second.dim, second.zone, second.zones) == (3, 2, 2)
     assert_same(first, read(save(tmp_path, SQUARE, "one.su2"), zone=1))
     assert_same(second, read(save(tmp_path, SOLID, "two.su2")))
 
 
+def test_zones_of_different_dimensions_are_no_mesh_together(tmp_path):
+    with pytest.raises(MeshError, match="its zones are 2D, 3D, which cannot be one mesh; choose"):
+        read(save(tmp_path, ZONES))
+
+
 def test_zones_in_any_order(tmp_path):
     text = f"NZONE= 2\nIZONE= 2\n{SOLID}IZONE= 1\n{SQUARE}"
-    assert read(save(tmp_path, text)).dim == 2
+    assert read(save(tmp_path, text), 1).dim == 2
 
 
 @pytest.mark.parametrize("head", ["NZONE= 1\n", "NZONE= 1\nIZONE= 1\n", "IZONE= 1\n"])

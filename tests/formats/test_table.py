@@ -10,7 +10,7 @@ from slideviz.formats import table
 from slideviz.formats.table import FORMATS, format_for, format_of, own_endings
 from tests.builders import square
 
-FUNCTIONS = ("reader", "writer", "require", "zones", "series", "detects")
+FUNCTIONS = ("reader", "writer", "require", "series", "detects")
 
 
 @pytest.mark.parametrize("row", FORMATS.values(), ids=str)

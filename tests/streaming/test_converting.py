@@ -61,7 +61,7 @@ def test_a_text_becomes_the_binary_that_memory_gives(capsys, kind, zones, more):
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("more", [[], ["--zone", "2"]])
 def test_a_binary_of_any_width_and_byte_order_becomes_a_text(capsys, width, order, more):
-    Path("two.su2b").write_bytes(packed([TWO_D, THREE_D], width, order))
+    Path("two.su2b").write_bytes(packed([THREE_D, THREE_D], width, order))
     code, _, err, _ = check_alike(capsys, "two.su2b", ".su2", *more)
     said = "will not have its other zones of two.su2b; leave out --zone to keep them"
     assert (code, said in err) == (0, bool(more))

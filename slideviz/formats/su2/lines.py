@@ -76,7 +76,7 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
     """Return the lines of a zone.
 
     Raises MeshError if this is no SU2 mesh, there is no such zone, or the zones are not numbered 1,
-    2, and so on. ``number``: the zone, from 1; None for the first.
+    2, and so on. ``number``: the zone, from 1; None for the only one.
     """
     if not any(section.key in KNOWN for section in sections):
         raise MeshError(
@@ -85,17 +85,37 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
         )
     heads = _zone_heads(lines, sections)
     zones = max(len(heads), 1)
-    chosen = 1 if number is None else number
-    if not 1 <= chosen <= zones:
-        has = "one zone" if zones == 1 else f"the zones 1 to {zones}"
-        raise MeshError(
-            f"{lines.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
-        )
+    chosen = chosen_zone(lines.name, number, zones)
     if zones == 1:
         return Bounds(chosen, zones, 0, len(lines))
     begin = heads[chosen].line
     later = [head.line for head in heads.values() if head.line > begin]
     return Bounds(chosen, zones, begin + 1, min(later, default=len(lines)))
+
+
+def chosen_zone(name: str, number: int | None, zones: int) -> int:
+    """Return the number of the zone of a file, called ``name``, with so many ``zones``.
+
+    Raises MeshError if there is no such zone, or ``number`` is None and there are several.
+    """
+    if number is None and zones > 1:
+        raise MeshError(
+            f"{name}: has {zones} zones, of which only one at a time can be streamed; choose it "
+            "with ZONE= in a case, or --zone"
+        )
+    chosen = 1 if number is None else number
+    if not 1 <= chosen <= zones:
+        has = "one zone" if zones == 1 else f"the zones 1 to {zones}"
+        raise MeshError(
+            f"{name}: there is no zone {chosen}, for the file has {has}; choose one of these"
+        )
+    return chosen
+
+
+def count_zones(sections: list[KeywordBlock]) -> int:
+    """Return how many zones a file has by its lines ``IZONE=``."""
+    several = any(section.key == "NZONE" for section in sections)
+    return max(1, sum(section.key == "IZONE" for section in sections) if several else 1)
 
 
 def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:

@@ -13,9 +13,11 @@ import numpy as np
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
 from slideviz.formats.su2.lines import (
+    KeywordBlock,
     Lines,
     Rows,
     boxes_elsewhere,
+    count_zones,
     find_blocks,
     find_bounds,
     number_of,
@@ -25,7 +27,8 @@ from slideviz.formats.su2.text import SendRows, TextZone, boundaries_elsewhere, 
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin
-from slideviz.system.threads import Tick
+from slideviz.mesh.zones import join_zones
+from slideviz.system.threads import Tick, progress_share
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
 """The halo, None if there is none or it cannot be used; and remarks, a sentence each."""
@@ -204,20 +207,38 @@ def is_su2(path: Path) -> bool:
 
 
 def read_su2_file(path: Path, zone: int | None, progress: Tick) -> Mesh:
-    """Return one zone of an SU2 file, as `read_su2` does."""
+    """Return one zone of an SU2 file, or all of them, as `read_su2` does."""
     return read_su2(open_source(path), zone, progress)
 
 
 def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
-    """Return one zone of an SU2 file.
+    """Return one zone of an SU2 file, or all of them as one mesh.
 
     Raises MeshError if the file has a mistake; the message has the line. ``raw``: the file.
-    ``zone``: the zone, from 1; None for the first. ``progress``: called with the fraction done; may
-    raise to stop.
+    ``zone``: the zone, from 1; None for all. ``progress``: called with the fraction done; may raise
+    to stop.
     """
     lines = scan(raw, lambda done: progress(_SCANNED * done))
     sections = find_blocks(lines)
-    text_zone = find_zone(lines, sections, find_bounds(lines, sections, zone))
+    count = count_zones(sections) if zone is None else 1
+    if count == 1:
+        return _read_zone(lines, sections, zone, progress)
+    shares = (progress_share(progress, k / count, (k + 1) / count) for k in range(count))
+    read = (_read_zone(lines, sections, k, share, alone=False) for k, share in enumerate(shares, 1))
+    return join_zones(list(read))
+
+
+def _read_zone(
+    lines: Lines,
+    sections: list[KeywordBlock],
+    number: int | None,
+    progress: Tick,
+    *,
+    alone: bool = True,
+) -> Mesh:
+    """Return a zone, with its interfaces to the others if it is read ``alone``."""
+    raw = lines.raw
+    text_zone = find_zone(lines, sections, find_bounds(lines, sections, number))
     n_points = number_of(text_zone.points)
     sizes = [
         rows[-1].end - rows[0].begin if rows else 0
@@ -255,7 +276,7 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
         source=raw.path.resolve(),
     )
     halo, remarks = find_halo(lines, text_zone, mesh)
-    others = boundaries_elsewhere(lines, sections, text_zone, progress)
+    others = boundaries_elsewhere(lines, sections, text_zone, progress) if alone else ()
     return replace(
         mesh,
         halo=halo,
@@ -268,8 +289,4 @@ def _shares(sizes: list[int], progress: Tick) -> list[Tick]:
     """Return a function for each part that turns its progress (0 to 1) into that of all parts."""
     total = max(sum(sizes), 1)
     edges = [_SCANNED + (1.0 - _SCANNED) * sum(sizes[:k]) / total for k in range(len(sizes) + 1)]
-
-    def share(begin: float, end: float) -> Tick:
-        return lambda done: progress(begin + done * (end - begin))
-
-    return [share(begin, end) for begin, end in pairwise(edges)]
+    return [progress_share(progress, *ends) for ends in pairwise(edges)]

@@ -20,6 +20,7 @@ from slideviz.formats.su2.text import BLOCK_BYTES, SEND_RECEIVE
 from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
+from slideviz.mesh.zones import zones_of
 from slideviz.system.threads import ordered_map
 
 _BLOCK_ROWS = 20_000  # most elements or points in a block of text
@@ -33,14 +34,6 @@ def write_su2(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     write_blocks(path, su2_blocks(mesh), options)
 
 
-def su2_zones(*meshes: Mesh) -> Iterator[bytes]:
-    """Yield an SU2 file with a zone for each mesh, block by block; errors as `su2_blocks`."""
-    yield f"NZONE= {len(meshes)}\n".encode()
-    for number, mesh in enumerate(meshes, 1):
-        yield f"IZONE= {number}\n".encode()
-        yield from su2_blocks(mesh)
-
-
 def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     """Yield the SU2 file of a mesh, block by block.
 
@@ -49,33 +42,47 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     of its file that slideviz does not know follow at the end of its zone. Raises MeshError if the
     mesh cannot be used, or a marker's name cannot stand in an SU2 file.
     """
-    document, boxes = mesh.origin, mesh.origin.ffd
-    if isinstance(document, Document) and _only_points_differ(mesh, document):
-        check_points(mesh)
-        yield from _patched(document, mesh.points)
-        return
+    zones = zones_of(mesh)
+    document = mesh.origin
+    if all(_only_points_differ(zone) for zone in zones):
+        for zone in zones:
+            check_points(zone)
+        yield from _patched(zones)
+    elif len(zones) > 1:
+        yield f"NZONE= {len(zones)}\n".encode()
+        for number, zone in enumerate(zones, 1):
+            yield f"IZONE= {number}\n".encode()
+            yield from _zone_text(zone)
+    elif not isinstance(document, Document):
+        yield from _zone_text(mesh)
+    else:
+        raw, (begin, end) = document.raw, document.zone
+        raw.require_same()
+        yield from (raw[a:b] for a, b in _ranges(0, begin))
+        yield from _zone_text(mesh)
+        yield from (raw[a:b] for a, b in _ranges(end, raw.size))
+        raw.require_same()
+
+
+def _zone_text(mesh: Mesh) -> Iterator[bytes]:
+    """Yield the lines of a zone, with the other sections that its file has."""
     check_mesh(mesh)
     require_text_names(mesh.name, mesh.marker_names)
-    if not isinstance(document, Document):
-        yield from _whole_zone(mesh)
-        yield from _markers(mesh.markers, 0)
-        yield boxes or b""
-        return
-    raw, (begin, end) = document.raw, document.zone
-    raw.require_same()
-    yield from (raw[a:b] for a, b in _ranges(0, begin))
+    document, boxes = mesh.origin, mesh.origin.ffd
+    kept: list[bytes] = []
+    if isinstance(document, Document):
+        places = (*document.sends, *document.unknown)
+        kept = [_with_line_break(document.raw[a:b]) for a, b in places]
     yield from _whole_zone(mesh)
-    yield from _markers(mesh.markers, len(document.sends))
-    sections = (_with_line_break(raw[a:b]) for a, b in (*document.sends, *document.unknown))
-    yield from (text for text in sections if boxes is None or not is_ffd(text))
+    yield from _markers(mesh.markers, len(document.sends) if isinstance(document, Document) else 0)
+    yield from (text for text in kept if boxes is None or not is_ffd(text))
     yield boxes or b""
-    yield from (raw[a:b] for a, b in _ranges(end, raw.size))
-    raw.require_same()
 
 
-def _only_points_differ(mesh: Mesh, document: Document) -> bool:
-    """Return whether a mesh has the cells and markers, and as many points, as its file."""
-    if mesh.points.shape != document.points.shape:
+def _only_points_differ(mesh: Mesh) -> bool:
+    """Return whether a mesh has the cells and markers, and as many points, as its SU2 text."""
+    document = mesh.origin
+    if not isinstance(document, Document) or mesh.points.shape != document.points.shape:
         return False
     if mesh.cells is not document.cells and not mesh.cells.same_as(document.cells):
         return False
@@ -85,16 +92,28 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
     )
 
 
-def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
-    """Yield the file with all coordinates replaced that differ in any bit, and with new boxes."""
+def _patched(zones: Sequence[Mesh]) -> Iterator[bytes]:
+    """Yield the file of zones with all coordinates replaced that differ in any bit, and new boxes.
+
+    Each zone has a `Document`.
+    """
+    pieces: list[tuple[Piece, Mesh, Document]] = []
+    edits: list[Edit] = []
+    for zone in zones:
+        document = zone.origin
+        assert isinstance(document, Document)
+        pieces += [(piece, zone, document) for piece in document.rows]
+        if document.ffd is not None:
+            edits += box_edits(document.raw, document.unknown, document.zone[1], document.ffd)
+    at = {piece.begin: (zone, document) for piece, zone, document in pieces}
 
     def text(piece: Piece) -> bytes:
+        zone, document = at[piece.begin]
         mine = slice(piece.row, piece.row + piece.rows)
-        return moved_rows(raw, piece, document.points[mine], points[mine])
+        return moved_rows(document.raw, piece, document.points[mine], zone.points[mine])
 
-    raw, ffd = document.raw, document.ffd
-    edits = [] if ffd is None else box_edits(raw, document.unknown, document.zone[1], ffd)
-    yield from patched_blocks(raw, document.rows, text, edits)
+    rows = tuple(sorted((each[0] for each in pieces), key=lambda piece: piece.begin))
+    yield from patched_blocks(pieces[0][2].raw, rows, text, sorted(edits))
 
 
 def patched_blocks(

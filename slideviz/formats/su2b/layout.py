@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from slideviz.errors import MeshError, printable
+from slideviz.formats.su2.lines import chosen_zone
 
 NAME_BYTES = 33  # bytes of the name of a marker, padded with zeros
 SEND_RECEIVE = "SEND_RECEIVE"
@@ -179,14 +180,12 @@ def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
 
 
 def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
-    """Return where a zone is (from 1; None: the first); MeshError as `find_zones`, or if none."""
-    zones, chosen = find_zones(source), 1 if number is None else number
-    if not 1 <= chosen <= len(zones):
-        has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"
-        raise MeshError(
-            f"{source.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
-        )
-    return zones[chosen - 1]
+    """Return where a zone is (from 1; None: the only one).
+
+    Raises MeshError as `find_zones` and `chosen_zone`.
+    """
+    zones = find_zones(source)
+    return zones[chosen_zone(source.name, number, len(zones)) - 1]
 
 
 @contextmanager

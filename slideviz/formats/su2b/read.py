@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -22,13 +23,14 @@ from slideviz.formats.su2b.layout import (
     ElementTable,
     ZonePlace,
     find_zone,
-    open_zone,
+    find_zones,
 )
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
-from slideviz.system.threads import Tick
+from slideviz.mesh.zones import join_zones
+from slideviz.system.threads import Tick, progress_share
 
 BLOCK = 1 << 18  # most elements or points that are read at a time
 
@@ -189,7 +191,8 @@ class BinaryForm(Origin):
     byte_order: Literal["<", ">"]  # little or big endian
     before: bytes
     after: bytes
-    """`before`, `after`: the file before and after the zone: its head and the other zones."""
+    """`before`, `after`: the file before and after the zone: its head and the other zones; empty
+    where all zones were read."""
     order: IntArray | None
     """(m,): index of the cell at each place of the file; None where each is at its place."""
     names: tuple[bytes, ...]  # names of the markers with the bytes that pad them
@@ -197,37 +200,51 @@ class BinaryForm(Origin):
 
 
 def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
-    """Return one zone of an SU2 binary mesh.
+    """Return one zone of an SU2 binary mesh, or all of them as one mesh.
 
     Raises MeshError if the file has a mistake; the message has its byte; and OSError if it cannot
-    be read. ``zone``: the zone, from 1; None for the first. ``progress``: called with the fraction
-    done; may raise to stop.
+    be read. ``zone``: the zone, from 1; None for all. ``progress``: called with the fraction done;
+    may raise to stop.
     """
-    with open_zone(path, zone) as (source, place):
-        whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
-        done = 0
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        places = find_zones(source) if zone is None else (find_zone(source, zone),)
+        share = [k / len(places) for k in range(len(places) + 1)]
+        alone = len(places) == 1
+        meshes = [
+            _read_zone(source, place, path, progress_share(progress, *ends), alone=alone)
+            for place, ends in zip(places, pairwise(share), strict=True)
+        ]
+    return join_zones(meshes)
 
-        def tick(count: int) -> None:
-            nonlocal done
-            done += count
-            progress(min(1.0, done / max(whole, 1)))
 
-        cells, order = read_elements(source, place, place.cells, place.dim, tick)
-        points = np.empty((place.n_points, place.dim))
-        for first, block in point_blocks(source, place):
-            points[first : first + len(block)] = block
-            tick(len(block))
-        markers = read_markers(source, place, tick)
-        form = BinaryForm(
-            source.width,
-            source.order,
-            source.bytes(0, place.begin),
-            source.bytes(place.end, source.size),
-            order,
-            tuple(marker.raw for marker in place.markers),
-            cells,
-        )
-        others = list(boundaries_elsewhere(source, place))
+def _read_zone(
+    source: BinaryFile, place: ZonePlace, path: Path, progress: Tick, *, alone: bool
+) -> Mesh:
+    """Return a zone; ``alone``: with its interfaces to the other zones, and these themselves."""
+    whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
+    done = 0
+
+    def tick(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(min(1.0, done / max(whole, 1)))
+
+    cells, order = read_elements(source, place, place.cells, place.dim, tick)
+    points = np.empty((place.n_points, place.dim))
+    for first, block in point_blocks(source, place):
+        points[first : first + len(block)] = block
+        tick(len(block))
+    markers = read_markers(source, place, tick)
+    form = BinaryForm(
+        source.width,
+        source.order,
+        source.bytes(0, place.begin) if alone else b"",
+        source.bytes(place.end, source.size) if alone else b"",
+        order,
+        tuple(marker.raw for marker in place.markers),
+        cells,
+    )
     points.flags.writeable = False
     mesh = Mesh(
         points=points,
@@ -239,6 +256,7 @@ def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
         source=path.resolve(),
         origin=form,
     )
+    others = list(boundaries_elsewhere(source, place)) if alone else []
     return replace(mesh, interfaces=find_interfaces(mesh, others))
 
 

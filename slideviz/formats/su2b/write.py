@@ -22,6 +22,7 @@ from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.zones import zones_of
 
 SORTED = (3, 5, 9, 10, 12, 13, 14)  # SU2's order of the types of elements
 LARGEST_4 = 2**32 - 1
@@ -32,35 +33,35 @@ def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     write_blocks(path, su2b_blocks(mesh), options)
 
 
-def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
-    """Yield the SU2 binary file of a mesh, or of several as its zones, block by block.
+def su2b_blocks(mesh: Mesh) -> Iterator[bytes]:
+    """Yield the SU2 binary file of a mesh, block by block.
 
-    For a single mesh that is one zone of a ``.su2b`` file, the other zones are written, too. Raises
+    For a mesh that is one zone of a ``.su2b`` file, the other zones are written, too. Raises
     MeshError if a mesh cannot be used, has a halo, or has a name that cannot stand in such a file.
     """
-    for mesh in meshes:
-        check_mesh(mesh)
-        require_binary(mesh)
-    form = meshes[0].origin
-    if len(meshes) > 1 or not isinstance(form, BinaryForm):
-        yield from file_head(len(meshes))
-        for number, mesh in enumerate(meshes, 1):
-            yield from zone_blocks(_zone(mesh, _by_type(mesh.cells)), number)
-        return
-    mesh = meshes[0]
-    same = mesh.cells is form.cells or mesh.cells.same_as(form.cells)
-    yield form.before
-    yield from zone_blocks(
-        _zone(mesh, form.order if same else _by_type(mesh.cells)), mesh.zone, form
-    )
-    yield form.after
+    zones = zones_of(mesh)
+    for zone in zones:
+        check_mesh(zone)
+        require_binary(zone)
+    form = zones[0].origin if isinstance(zones[0].origin, BinaryForm) else None
+    around = form if len(zones) == 1 and form is not None and form.before else None
+    yield b"".join(file_head(len(zones), form)) if around is None else around.before
+    for number, zone in enumerate(zones, 1):
+        own = zone.origin if form is not None and isinstance(zone.origin, BinaryForm) else None
+        same = own is not None and (zone.cells is own.cells or zone.cells.same_as(own.cells))
+        order = own.order if own is not None and same else _by_type(zone.cells)
+        yield from zone_blocks(
+            _zone(zone, order), number if around is None else zone.zone or 1, own
+        )
+    yield b"" if around is None else around.after
 
 
 def require_binary(mesh: Mesh, _path: Path | None = None) -> None:
     """Raise MeshError for a halo, or a marker's name that an SU2 binary file cannot hold."""
-    if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
-        raise halo_error(mesh.name)
-    require_binary_names(mesh.name, mesh.marker_names)
+    for zone in zones_of(mesh):
+        if zone.halo is not None or (isinstance(zone.origin, Document) and zone.origin.sends):
+            raise halo_error(zone.name)
+        require_binary_names(zone.name, zone.marker_names)
 
 
 def halo_error(name: str) -> MeshError:

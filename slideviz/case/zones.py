@@ -1,0 +1,120 @@
+"""Cases for meshes with several zones: the names of boundaries, and the case of each zone alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from slideviz.case.boxes import boxes_for
+from slideviz.case.model import (
+    BoxMotion,
+    Case,
+    FromFile,
+    Motion,
+    Prescribed,
+    Rotate,
+    Scale,
+    applies_to,
+    named,
+)
+from slideviz.errors import CaseError
+from slideviz.mesh.model import Mesh, ZonePart
+from slideviz.mesh.zones import names_in, spellings
+
+
+def with_marker_names(case: Case, mesh: Mesh) -> Case:
+    """Return a case that has the names of the boundaries as the mesh has them.
+
+    A case may name each with the number of its zone, as ``1:blade``; a mesh does so only where
+    another zone has a boundary of that name.
+    """
+    return _renamed(case, spellings(mesh))
+
+
+def _renamed(case: Case, names: Mapping[str, str]) -> Case:
+    if not any(name in names for name in (*case.roles, *(limit.marker for limit in case.limits))):
+        return case
+    motions = []
+    for motion in case.motions:
+        several = tuple(names.get(name, name) for name in named(motion.marker))
+        one = isinstance(motion.marker, str)
+        motions.append(replace(motion, marker=several[0] if one and several else several or ""))
+    return case.change(
+        roles={names.get(name, name): role for name, role in case.roles.items()},
+        motions=tuple(motions),
+        limits=tuple(
+            replace(limit, marker=names.get(limit.marker, limit.marker)) for limit in case.limits
+        ),
+    )
+
+
+def zone_cases(case: Case, mesh: Mesh) -> tuple[Case, ...]:
+    """Return the case of each zone of a mesh: its roles and motions, named as in the file.
+
+    Raises CaseError if a motion is about the common centroid of boundaries of several zones, or a
+    displacement file is for several: it numbers the nodes of one.
+    """
+    case = with_marker_names(case, mesh)
+    moving = case.markers_with("moving")
+    problems = [
+        f"motion {place}: {problem}"
+        for place, motion in enumerate(case.motions, start=1)
+        if (problem := _shared(motion, mesh, [name for name in moving if applies_to(motion, name)]))
+    ]
+    if problems:
+        raise CaseError("\n".join(problems))
+    return tuple(_zone_case(case, mesh, part) for part in mesh.zone_parts)
+
+
+def _shared(motion: Motion, mesh: Mesh, moved: list[str]) -> str:
+    """Return why a motion cannot be of the boundaries of several zones together, or ""."""
+    zones = [
+        str(number)
+        for number, part in enumerate(mesh.zone_parts, 1)
+        if not names_in(mesh, part).keys().isdisjoint(moved)
+    ]
+    if len(zones) < 2:
+        return ""
+    where = f"of the zones {' and '.join(zones)}"
+    if isinstance(motion, Rotate | Scale) and motion.point == "centroid":
+        return f"boundaries {where} have no common centroid; give the point, or a motion for each"
+    if isinstance(motion, FromFile):
+        return (
+            f"{motion.path} is for boundaries {where}, but numbers the nodes of one zone; give a "
+            "file for each"
+        )
+    return ""
+
+
+def _zone_case(case: Case, mesh: Mesh, part: ZonePart) -> Case:
+    names = names_in(mesh, part)
+    roles = {names[name]: role for name, role in case.roles.items() if name in names}
+    periodic = "periodic" in roles.values()
+    zone = case.change(
+        roles=roles,
+        motions=(),
+        limits=(),
+        zone=None,
+        warnings=(),
+        periodic=case.periodic if periodic else "none",
+    )
+    moved = [_zone_motion(case, motion, part, names, zone) for motion in case.motions]
+    return zone.change(motions=tuple(motion for motion in moved if motion is not None))
+
+
+def _zone_motion(
+    case: Case, motion: Motion, part: ZonePart, names: Mapping[str, str], zone: Case
+) -> Motion | None:
+    """Return the motion of those boundaries of a zone that it moves; None if it moves none."""
+    moving = case.markers_with("moving")
+    moved = [names[name] for name in moving if name in names and applies_to(motion, name)]
+    if not moved:
+        return None
+    box = motion.box if isinstance(motion, BoxMotion) and not motion.marker else None
+    if box is not None and box not in boxes_for(zone, part.mesh):
+        return None  # that of another zone
+    if isinstance(motion, Prescribed):
+        nodes = motion.nodes - part.points.start
+        here = (nodes >= 0) & (nodes < len(part.mesh.points))
+        motion = replace(motion, nodes=nodes[here], vectors=motion.vectors[here])
+    return replace(motion, marker=moved[0] if len(moved) == 1 else tuple(moved))

@@ -1,0 +1,187 @@
+"""Zones: the meshes of a file with several, as one mesh, and each of them alone again.
+
+They share no points, even where these coincide (`slideviz.mesh.interfaces`). A boundary keeps its
+name where no other zone has one of that name; else the number of its zone comes first: ``1:blade``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from slideviz.errors import MeshError
+from slideviz.mesh.halo import Halo
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh, ZoneInterface, ZonePart, sealed
+
+
+def numbered(zone: int, name: str) -> str:
+    """Return the name of a boundary with the number of its zone: ``1:blade``."""
+    return f"{zone}:{name}"
+
+
+def without_zone(name: str) -> str:
+    """Return the name of a boundary without the number of its zone, if it has one."""
+    number, _, alone = name.partition(":")
+    return alone if number.isdecimal() and alone else name
+
+
+def join_zones(zones: Sequence[Mesh]) -> Mesh:
+    """Return the mesh of all zones of a file; of a single one, that.
+
+    Raises MeshError if they have different dimensions.
+    """
+    first = zones[0]
+    if len(zones) == 1:
+        return first
+    if len({zone.dim for zone in zones}) > 1:
+        dims = ", ".join(f"{zone.dim}D" for zone in zones)
+        raise MeshError(
+            f"{first.name}: its zones are {dims}, which cannot be one mesh; choose one with ZONE= "
+            "in a case, or --zone"
+        )
+    uses = Counter(name for zone in zones for name in zone.marker_names)
+    names = [
+        [numbered(k, name) if uses[name] > 1 else name for name in zone.marker_names]
+        for k, zone in enumerate(zones, 1)
+    ]
+    points, cells, markers = (
+        [slice(*ends) for ends in pairwise(accumulate(map(len, parts), initial=0))]
+        for parts in (
+            [zone.points for zone in zones],
+            [zone.cells for zone in zones],
+            [zone.markers for zone in zones],
+        )
+    )
+    coords = sealed(np.concatenate([zone.points for zone in zones]))
+    alone = [
+        replace(zone, points=coords[part], interfaces=())
+        for zone, part in zip(zones, points, strict=True)
+    ]
+    mesh = Mesh(
+        points=coords,
+        cells=_joined([_shifted(z.cells, p.start) for z, p in zip(zones, points, strict=True)]),
+        markers=tuple(
+            Marker(name, _shifted(marker.cells, part.start))
+            for zone, part, own in zip(zones, points, names, strict=True)
+            for name, marker in zip(own, zone.markers, strict=True)
+        ),
+        origin=first.origin,
+        name=first.name,
+        zone=None,
+        zones=len(zones),
+        zone_parts=tuple(map(ZonePart, alone, points, cells, markers)),
+        source=first.source,
+        remarks=tuple(f"zone {zone.zone}: {text}" for zone in zones for text in zone.remarks),
+    )
+    return replace(mesh, halo=_halo(mesh), interfaces=tuple(_interfaces(mesh)))
+
+
+def zones_of(mesh: Mesh) -> tuple[Mesh, ...]:
+    """Return each zone of a mesh alone, its boundaries with their names in the file."""
+    if not mesh.zone_parts:
+        return (mesh,)
+    out = []
+    for part in mesh.zone_parts:
+        points, before = mesh.points[part.points], part.mesh.points
+        same = points.ctypes.data == before.ctypes.data
+        out.append(part.mesh if same else replace(part.mesh, points=points))
+    return tuple(out)
+
+
+def with_zones(mesh: Mesh, zones: Sequence[Mesh]) -> Mesh:
+    """Return a mesh with the points and the origins of its zones as in ``zones``."""
+    parts = [
+        replace(part, mesh=replace(part.mesh, origin=zone.origin))
+        for part, zone in zip(mesh.zone_parts, zones, strict=True)
+    ]
+    points = sealed(np.concatenate([zone.points for zone in zones]))
+    return replace(mesh, points=points, origin=zones[0].origin, zone_parts=tuple(parts))
+
+
+def names_in(mesh: Mesh, part: ZonePart) -> dict[str, str]:
+    """Return the names that the boundaries of a zone have in its file, by those in the mesh."""
+    names = mesh.marker_names[part.markers]
+    return dict(zip(names, part.mesh.marker_names, strict=True))
+
+
+def marker_zones(mesh: Mesh) -> list[int]:
+    """Return the number of the zone of each boundary, in their order."""
+    if not mesh.zone_parts:
+        return [mesh.zone or 1] * len(mesh.markers)
+    return [
+        number
+        for number, part in enumerate(mesh.zone_parts, 1)
+        for _ in range(part.markers.start, part.markers.stop)
+    ]
+
+
+def spellings(mesh: Mesh) -> Mapping[str, str]:
+    """Return the names of the boundaries by all that may be written for them, as ``1:blade``."""
+    out: dict[str, str] = {}
+    for number, part in enumerate(mesh.zone_parts, 1):
+        out |= {numbered(number, file): name for name, file in names_in(mesh, part).items()}
+    if mesh.zones > 1 and mesh.zone is not None:
+        out = {numbered(mesh.zone, name): name for name in mesh.marker_names}
+    return out
+
+
+def _shifted(cells: Cells, by: int) -> Cells:
+    return Cells(cells.types, cells.offsets, sealed(cells.connectivity + by))
+
+
+def _joined(cells: Sequence[Cells]) -> Cells:
+    return Cells.from_types(
+        sealed(np.concatenate([some.types for some in cells])),
+        sealed(np.concatenate([some.connectivity for some in cells])),
+    )
+
+
+def _halo(mesh: Mesh) -> Halo | None:
+    """Return the halos of all zones as one."""
+    halos = [(part, part.mesh.halo) for part in mesh.zone_parts if part.mesh.halo is not None]
+    if not halos:
+        return None
+    cells = np.zeros(len(mesh.cells), bool)
+    sides = []
+    for part, halo in halos:
+        cells[part.cells] = halo.cells
+        name = {file: ours for ours, file in names_in(mesh, part).items()}
+        sides += [(name[one], name[other]) for one, other in halo.sides]
+
+    def nodes(field: str) -> IntArray:
+        each = [getattr(halo, field) + part.points.start for part, halo in halos]
+        return sealed(np.concatenate(each))
+
+    return Halo(
+        nodes("receivers"),
+        nodes("donors"),
+        sealed(np.concatenate([halo.rotations for _, halo in halos])),
+        nodes("outer"),
+        sealed(cells),
+        tuple(sides),
+        sealed(np.concatenate([halo.mismatch for _, halo in halos])),
+    )
+
+
+def _interfaces(mesh: Mesh) -> Iterator[ZoneInterface]:
+    places = [
+        (number, marker.name, mesh.points[marker.nodes])
+        for number, part in enumerate(mesh.zone_parts, 1)
+        for marker in mesh.markers[part.markers]
+        if len(marker.cells)
+    ]
+    for number, part in enumerate(mesh.zone_parts, 1):
+        pairs = zip(names_in(mesh, part), part.mesh.markers, strict=True)
+        markers = tuple(Marker(name, marker.cells) for name, marker in pairs)
+        others = [each for each in places if each[0] != number]
+        for each in find_interfaces(replace(part.mesh, markers=markers), others):
+            yield replace(
+                each,
+                nodes=sealed(each.nodes + part.points.start),
+                partners=sealed(mesh.marker(each.other).nodes[each.partners]),
+            )

@@ -1,0 +1,264 @@
+"""Deforming several zones of a mesh: each by its case alone, with what coincides kept together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from math import isfinite, nan
+
+import numpy as np
+
+from slideviz.case.check import require_valid
+from slideviz.case.model import Case, Prescribed
+from slideviz.case.motion import displacements
+from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.errors import Note, SlidevizError
+from slideviz.mesh.interfaces import ROUNDING, torn_interfaces
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
+from slideviz.mesh.zones import names_in, with_zones
+from slideviz.rbf.layers import KeptLayers
+from slideviz.rbf.problem import Relaxed
+from slideviz.solver.steps import MeshRepair, Progress, Step
+from slideviz.terms import Role
+
+Report = Callable[[Progress], None]
+Run = Callable[[Case, Mesh, Report], Iterator[Step]]
+"""Deforms one zone."""
+FOLLOWING = ("fixed", "sliding", "internal")  # roles of boundaries that follow another zone's
+
+
+class InterfaceMotion:
+    """The cases of zones, in which nodes of interfaces follow nodes of the zone that moves them.
+
+    A boundary that is asked to move leads those of other zones that coincide with it and are not;
+    and one that slides, those of zones that are deformed after it. What follows has the role
+    moving.
+    """
+
+    def __init__(self, case: Case, mesh: Mesh) -> None:
+        self.mesh, self.roles = mesh, case.roles
+        self.cases = list(zone_cases(case, mesh))
+        """The case of each zone."""
+        self.led = np.zeros(len(mesh.points), bool)
+        """(n,) bool: the nodes that follow others."""
+        self.leader = np.arange(len(mesh.points))
+        """(n,): the node that each of them follows."""
+        self._vectors = np.zeros_like(mesh.points)
+        self._alone = tuple(self.cases)
+        self._names: list[set[str]] = [set() for _ in self.cases]
+        self._zone = {n: k for k, part in enumerate(mesh.zone_parts) for n in names_in(mesh, part)}
+        for index in self.moving(range(len(self.cases))):
+            moved = displacements(self._alone[index], mesh.zone_parts[index].mesh)
+            shift = np.zeros_like(mesh.points)
+            shift[mesh.zone_parts[index].points][moved.nodes] = moved.vectors
+            self._lead(index, shift, ("moving",), range(len(self.cases)))
+
+    def moving(self, zones: Collection[int]) -> list[int]:
+        """Return those of some zones that move."""
+        return [index for index in zones if self.cases[index].markers_with("moving")]
+
+    def first(self, zones: list[int]) -> int:
+        """Return the zone to deform first: the one whose fixed boundaries fewest others lead."""
+
+        def led(index: int) -> int:
+            return sum(
+                self._zone[each.marker] == index
+                and each.zone - 1 in zones
+                and self.roles.get(each.marker, "fixed") == "fixed"
+                and self.roles.get(each.other, "fixed") == "sliding"
+                for each in self.mesh.interfaces
+            )
+
+        return min(zones, key=led)
+
+    def slid(self, index: int, points: FloatArray, zones: Collection[int]) -> None:
+        """Let ``zones`` follow a zone that has come to ``points`` (m, d)."""
+        part = self.mesh.zone_parts[index]
+        shift = np.zeros_like(self.mesh.points)
+        shift[part.points] = points - part.mesh.points
+        self._lead(index, shift, ("fixed", "sliding", "internal", "periodic"), zones)
+
+    def _lead(
+        self, index: int, shift: FloatArray, roles: Collection[str], zones: Collection[int]
+    ) -> None:
+        for each in self.mesh.interfaces:
+            mine, other = (self.roles.get(name, "fixed") for name in (each.marker, each.other))
+            moves = mine in roles and (mine == "moving" or shift[each.nodes].any())
+            concerned = self._zone[each.marker] == index and each.zone - 1 in zones
+            if concerned and moves and other in FOLLOWING:
+                self._follow(each, shift)
+
+    def _follow(self, each: ZoneInterface, shift: FloatArray) -> None:
+        new = ~self.led[each.partners]
+        nodes, leaders = each.partners[new], each.nodes[new]
+        self.led[nodes], self.leader[nodes] = True, leaders
+        self._vectors[nodes] = shift[leaders]
+        index = each.zone - 1
+        part, alone = self.mesh.zone_parts[index], self._alone[index]
+        self._names[index] |= {names_in(self.mesh, part)[each.other]}
+        here = np.flatnonzero(self.led[part.points])
+        vectors = self._vectors[part.points][here]
+        names = tuple(name for name in part.mesh.marker_names if name in self._names[index])
+        roles: dict[str, Role] = {**alone.roles, **dict.fromkeys(names, "moving")}
+        motions = *alone.motions, Prescribed(here, vectors, names)
+        self.cases[index] = alone.change(roles=roles, motions=motions)
+
+    def together(self, points: FloatArray) -> FloatArray:
+        """Return points (n, d) in which followers are where their leaders are, to the bit.
+
+        That is where both were so at first, and are apart by rounding only.
+        """
+        nodes = np.flatnonzero(self.led)
+        leaders, start = self.leader[nodes], self.mesh.points
+        alike = (start[nodes] == start[leaders]).all(axis=1)
+        gap = np.abs(points[nodes] - points[leaders]).max(axis=1, initial=0.0)
+        alike &= gap <= ROUNDING * self.mesh.extent
+        out = points.copy()
+        out[nodes[alike]] = points[leaders[alike]]
+        return out
+
+
+def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[Step]:
+    """Yield the steps of a mesh of all zones, each of which ``run`` deforms alone.
+
+    Where zones have different numbers of steps (STEPS= auto), the steps are those of the zone with
+    the most, and the others have come as far as their latest step. Raises CaseError if the case
+    does not fit the mesh.
+    """
+    case = with_marker_names(case, mesh)
+    require_valid(case, mesh)
+    motion = InterfaceMotion(case, mesh)
+    ahead, runs = set(range(len(motion.cases))), dict[int, list[Step]]()
+    while moving := motion.moving(sorted(ahead)):
+        index = motion.first(moving)
+        ahead.remove(index)
+        done, part = len(runs), mesh.zone_parts[index]
+
+        def zone_report(now: Progress, done: int = done, count: int = len(moving)) -> None:
+            step, total = done * now.total + now.step, (done + count) * now.total
+            report(replace(now, step=step, total=total))
+
+        try:
+            runs[index] = list(run(motion.cases[index], part.mesh, zone_report))
+        except SlidevizError as problem:
+            problem.args = (f"zone {index + 1}: {problem}",)
+            raise
+        motion.slid(index, runs[index][-1].mesh.points, ahead)
+    longest = max(runs.values(), key=len)
+    before: dict[int, Step] = {}
+    for leader in longest:
+        steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
+        fresh = {k: step for k, step in steps.items() if before.get(k) is not step}
+        zones = [
+            steps[k].mesh if k in steps else part.mesh for k, part in enumerate(mesh.zone_parts)
+        ]
+        now = with_zones(mesh, zones)
+        now = now.with_points(sealed(motion.together(now.points)))
+        torn = torn_interfaces(mesh, now.points)
+        yield replace(
+            joined_step(mesh, now, steps, fresh),
+            index=leader.index,
+            total=len(longest),
+            part=leader.part,
+            warnings=(*case.warnings, *_warnings(steps), *torn),
+        )
+        before = steps
+
+
+def _warnings(steps: Mapping[int, Step]) -> Iterator[str]:
+    for index, step in steps.items():
+        for text in step.warnings:
+            said = f"zone {index + 1}: {text}"
+            yield Note(said) if isinstance(text, Note) else said
+
+
+def joined_step(
+    mesh: Mesh, now: Mesh, steps: Mapping[int, Step], fresh: Mapping[int, Step]
+) -> Step:
+    """Return the steps of zones as one of the mesh of all, which is ``now`` then.
+
+    ``fresh`` are those that are no step of the round before.
+    """
+    each, new = list(steps.values()), list(fresh.values())
+    counts: Counter[str] = Counter()
+    spent: Counter[str] = Counter()
+    for step in each:
+        counts.update(step.node_counts)
+    for step in new:
+        spent.update(step.seconds)
+    relaxed = [step.relaxed for step in new if step.relaxed is not None]
+    first = {index: part.points.start for index, part in enumerate(mesh.zone_parts)}
+    safe = [
+        step.safe if step.safe.cell is None else replace(step.safe, cell=cell)
+        for index, step in fresh.items()
+        if step.safe is not None
+        for cell in [mesh.zone_parts[index].cells.start + (step.safe.cell or 0)]
+    ]
+    return Step(
+        index=1,
+        total=1,
+        mesh=now,
+        control_nodes=sum(step.control_nodes for step in each),
+        max_error=max(step.max_error for step in each),
+        condition=max((s.condition for s in each if isfinite(s.condition)), default=nan),
+        node_counts=counts,
+        seconds=spent,
+        warnings=(),
+        history=tuple(cycle for step in new for cycle in step.history),
+        tried=tuple(trial for step in new for trial in step.tried),
+        control=np.concatenate([step.control + first[k] for k, step in steps.items()]),
+        candidates=sum(step.candidates for step in each),
+        tolerance=_largest(step.tolerance for step in each),
+        layers=max(step.layers for step in each),
+        periodic_misfit=_largest(step.periodic_misfit for step in each),
+        support_radius=_largest(step.support_radius for step in each),
+        relaxed=Relaxed.joined(relaxed),
+        repaired=joined_repairs(mesh, now, {k: step.repaired for k, step in fresh.items()}),
+        kept_layers=_kept_layers(mesh, steps),
+        safe=min(safe, key=lambda one: one.fraction, default=None),
+    )
+
+
+def _largest(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _kept_layers(mesh: Mesh, steps: Mapping[int, Step]) -> KeptLayers | None:
+    walls, nodes = [], 0
+    for index, step in steps.items():
+        if step.kept_layers is None:
+            continue
+        name = {file: ours for ours, file in names_in(mesh, mesh.zone_parts[index]).items()}
+        nodes += step.kept_layers.nodes
+        walls += [
+            (tuple(name[one] for one in boundaries), thickness)
+            for boundaries, thickness in step.kept_layers.walls
+        ]
+    return KeptLayers(tuple(walls), nodes) if walls else None
+
+
+def joined_repairs(
+    mesh: Mesh, now: Mesh, repairs: Mapping[int, MeshRepair | None]
+) -> MeshRepair | None:
+    """Return the repairs of zones, by the place of each, as one of the mesh; None of none."""
+    done = [(mesh.zone_parts[k], one) for k, one in repairs.items() if one is not None]
+    if not done:
+        return None
+
+    def numbers(name: str, start: str) -> IntArray:
+        each = [getattr(one, name) + getattr(part, start).start for part, one in done]
+        return sealed(np.concatenate(each))
+
+    return MeshRepair(
+        mesh=now,
+        cells=numbers("cells", "cells"),
+        left=numbers("left", "cells"),
+        nodes=numbers("nodes", "points"),
+        points=sealed(np.concatenate([one.points for _, one in done])),
+        largest_move=max(one.largest_move for _, one in done),
+        unmendable=tuple(
+            (cell + part.cells.start, why) for part, one in done for cell, why in one.unmendable
+        ),
+        warnings=tuple(text for _, one in done for text in one.warnings),
+    )

@@ -1,0 +1,263 @@
+"""Several zones of a file deformed together: each as alone, and coincident nodes together."""
+
+import json
+import lzma
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run as command
+from slideviz.errors import CaseError
+from slideviz.formats.su2.write import su2_blocks
+from slideviz.mesh.zones import zones_of
+from slideviz.session.opening import guess_roles
+from tests.builders import sector
+from tests.mesh.test_interfaces import zones
+
+SHARED = Path(__file__).parents[3] / "shared" / "meshes" / "su2"
+SLIDES = {"sliding": "ps", "periodic": "moving", "steps": 2}
+
+
+def stage(folder):
+    """Write two sectors of different pitch, whose boundaries have the same names, as zones."""
+    texts = [b"".join(su2_blocks(mesh)).decode() for mesh in (sector(6), sector(5, 20.0, low=0.7))]
+    path = folder / "stage.su2"
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{texts[0]}IZONE= 2\n{texts[1]}")
+    return path
+
+
+def last(case, mesh):
+    *_, step = sv.deform(case, mesh)
+    return step
+
+
+def roles_of(zone):
+    roles = {"BLOCK": "moving", "per1": "periodic", "per2": "periodic", "inner": "sliding"}
+    return {f"{zone}{name}": role for name, role in roles.items()}
+
+
+def turn(zone):
+    return sv.Rotate(f"{zone}BLOCK", 1.0, (0.0, 0.0))
+
+
+def both():
+    roles = roles_of("1:") | roles_of("2:")
+    return sv.Case(roles=roles, motions=(turn("1:"), turn("2:")), **SLIDES)
+
+
+@pytest.mark.parametrize("steps", [2, 0])
+def test_each_zone_is_deformed_as_alone_to_the_bit(tmp_path, steps):
+    path = stage(tmp_path)
+    mesh = sv.read(path)
+    step = last(both().change(steps=steps), mesh)
+    assert "1:BLOCK" in mesh.marker_names
+    assert (step.index, step.part) == (step.total, 1.0)
+    controls = 0
+    for number, points in enumerate((zone.points for zone in zones_of(step.mesh)), 1):
+        case = sv.Case(roles=roles_of(""), motions=(turn(""),), **SLIDES | {"steps": steps})
+        alone = last(case, sv.read(path, number))
+        assert np.array_equal(points, alone.mesh.points)
+        controls += alone.control_nodes
+    assert step.control_nodes == controls == len(step.control)
+    assert step.periodic_misfit < 1e-14
+
+
+def test_a_zone_without_motion_keeps_every_bit_and_zone_selects_one(tmp_path):
+    path = stage(tmp_path)
+    case = sv.Case(roles=roles_of("2:"), motions=(turn("2:"),), **SLIDES)
+    mesh = sv.read(path)
+    one, two = zones_of(last(case, mesh).mesh)
+    assert np.array_equal(one.points, zones_of(mesh)[0].points)
+    alone = last(case.change(zone=2), sv.read(path, 2))
+    assert np.array_equal(two.points, alone.mesh.points)
+    with pytest.raises(
+        CaseError, match=r"ZONE= 2, but stage\.su2 is all 2; read that zone or chang"
+    ):
+        last(case.change(zone=2), mesh)
+
+
+def test_a_name_of_several_zones_needs_its_number(tmp_path):
+    case = sv.Case(roles={"BLOCK": "moving"}, motions=(turn(""),))
+    with pytest.raises(CaseError, match="have a marker 'BLOCK'; write 1:BLOCK or 2:BLOCK"):
+        last(case, sv.read(stage(tmp_path)))
+
+
+def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
+    (tmp_path / "d.txt").write_text("1 0 0\n")
+    several = ("1:BLOCK", "2:BLOCK")
+    for motion, message in (
+        (sv.Rotate(several, 1.0), "motion 1: boundaries of the zones 1 and 2 have no common cent"),
+        (sv.FromFile(tmp_path / "d.txt", several), "numbers the nodes of one zone; give a file"),
+    ):
+        with pytest.raises(CaseError, match=message):
+            last(both().change(motions=(motion,)), sv.read(stage(tmp_path)))
+
+
+def test_errors_and_warnings_name_the_zone(tmp_path):
+    mesh = sv.read(stage(tmp_path))
+    case = both().change(motions=(turn("1:"), sv.Translate("2:BLOCK", (5.0, 0.0))))
+    with pytest.raises(CaseError, match="zone 2: "):
+        last(case, mesh)
+    step = last(both().change(reduction=sv.Reduction(tolerance=1.0)), mesh)
+    assert {text.partition(":")[0] for text in step.warnings} == {"zone 1", "zone 2"}
+
+
+def pair(folder):
+    """Return the mesh of a square around a core, with the core as its second zone."""
+    return sv.read(zones(folder))
+
+
+MOVE = (0.02, 0.01)
+
+
+@pytest.mark.parametrize("lead", ["BLOCK", "2:core"])
+@pytest.mark.parametrize("steps", [1, 3])
+def test_an_interface_follows_the_zone_that_moves_it(tmp_path, lead, steps):
+    mesh = pair(tmp_path)
+    assert guess_roles(mesh)["core"].role == "fixed"
+    case = sv.Case(roles={lead: "moving"}, motions=(sv.Translate(lead, MOVE),), steps=steps)
+    step = last(case, mesh)
+    for each in mesh.interfaces:
+        gap = step.mesh.points[each.nodes] - step.mesh.points[each.partners]
+        before = mesh.points[each.nodes] - mesh.points[each.partners]
+        assert np.abs(gap - before).max() < 1e-15
+    assert not [text for text in step.warnings if "no longer fits" in text]
+    shift = zones_of(step.mesh)[1].points - zones_of(mesh)[1].points
+    np.testing.assert_allclose(shift, np.tile(MOVE, (9, 1)), atol=0.002)  # the middle overshoots
+
+
+def test_both_moved_apart_is_warned_of(tmp_path):
+    mesh = pair(tmp_path)
+    roles = dict.fromkeys(("BLOCK", "core"), "moving")
+    motions = sv.Translate("BLOCK", MOVE), sv.Translate("core", (0.0, 0.0))
+    told = last(sv.Case(roles=roles, motions=motions), mesh).warnings
+    assert any(
+        "zone 2 no longer fits: BLOCK" in text and "move both alike" in text for text in told
+    )
+
+
+def test_nodes_that_slide_take_the_other_zone_along(tmp_path):
+    """Two squares share the side x = 1, along which the first one's nodes slide."""
+    from tests.builders import grid
+
+    left = grid((4, 4), place=lambda p: p / 4.0)
+    right = grid((4, 4), place=lambda p: p / 4.0 + [1.0, 0.0])
+    texts = [b"".join(su2_blocks(mesh)).decode() for mesh in (left, right)]
+    path = tmp_path / "m.su2"
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{texts[0]}IZONE= 2\n{texts[1]}")
+    mesh = sv.read(path)
+    roles = {"1:x_m": "moving", "1:x_p": "sliding", "1:y_m": "sliding", "1:y_p": "sliding"}
+    roles |= {"2:y_m": "fixed", "2:y_p": "fixed"}
+    motions = (sv.Scale("1:x_m", (1.0, 0.9), (0.0, 0.0)),)
+    case = sv.Case(roles={"1:x_m": "moving", "1:x_p": "sliding"}, motions=motions, sliding="ps")
+    step = last(case, mesh)
+    (here,) = [each for each in mesh.interfaces if each.marker == "1:x_p"]
+    moved = step.mesh.points - mesh.points
+    assert np.abs(moved[here.nodes]).max() > 1e-3
+    assert np.array_equal(step.mesh.points[here.nodes], step.mesh.points[here.partners])
+
+
+@pytest.mark.parametrize("name", ["out.su2", "out.su2b", "out.vtu"])
+def test_the_command_writes_all_zones_together(tmp_path, name, capsys):
+    path = stage(tmp_path)
+    both().change(mesh_file=path).write(tmp_path / "c.cfg")
+    words = ["run", str(tmp_path / "c.cfg"), "-o", str(tmp_path / name)]
+    assert command([*words, "--json", str(tmp_path / "r.json")]) == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert (report["zone"], report["zones"]) == (None, 2)
+    assert "periodic moving, all 2 zones" in capsys.readouterr().out
+    points = last(both(), sv.read(path)).mesh.points
+    assert np.array_equal(sv.read(tmp_path / name).points, points)
+    assert command(["info", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "2:BLOCK" in out
+    assert "match: rotational, 30° about z" in out
+    assert "match: rotational, 20° about z" in out
+
+
+def test_a_stream_takes_one_zone(tmp_path, capsys):
+    both().change(mesh_file=stage(tmp_path)).write(tmp_path / "c.cfg")
+    words = ["run", str(tmp_path / "c.cfg"), "--stream", "-o", str(tmp_path / "out.su2")]
+    assert command(words) != 0
+    assert "has 2 zones, of which only one at a time can be streamed; choose" in (
+        capsys.readouterr().err
+    )
+
+
+def test_a_setup_is_of_one_zone(tmp_path):
+    from slideviz.solver.setup import make_setup
+
+    with pytest.raises(CaseError, match=r"stage\.su2: has 2 zones; choose one with ZONE="):
+        make_setup(both(), sv.read(stage(tmp_path)))
+
+
+def test_bad_cells_of_all_zones_are_mended(tmp_path):
+    mesh = sv.read(stage(tmp_path))
+    points = mesh.points.copy()
+    centre = np.flatnonzero(np.isin(np.arange(len(points)), mesh.cells.nodes))
+    inner = np.setdiff1d(centre, np.concatenate([m.nodes for m in mesh.markers]))
+    first, second = inner[0], inner[-1]
+    points[[first, second]] += 0.15
+    folded = mesh.with_points(points)
+    assert sv.quality(folded).inverted > 1
+    mended = sv.repair(folded, mesh, fixed=("1:inner",))
+    assert len(mended.left) == 0
+    assert sv.quality(mended.mesh).inverted == 0
+    assert {first, second} <= set(mended.nodes.tolist())
+
+
+# Real meshes ----------------------------------------------------------------------------
+
+
+def real(folder, name):
+    packed = SHARED / f"{name}.su2.xz"
+    if not packed.exists():
+        return SHARED / f"{name}.su2"
+    path = folder / f"{name}.su2"
+    path.write_bytes(lzma.decompress(packed.read_bytes()))
+    return path
+
+
+MIXER = {
+    "sliding_interface_channel_2D_channel_2D": ("wall", "internal_interface", "inner_interface"),
+    "turbomachinery_centrifugal_stage_su2mesh_periodic": ("wall1", "wall3"),
+    "coupled_cht_disc_adj_unsteadyCHT_cylinder_MeshCHT": ("farfield", "inner_pin"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SHARED.exists(), reason="the real meshes are not here")
+@pytest.mark.parametrize("name", MIXER)
+def test_zones_of_real_meshes_move_as_alone(tmp_path, name):
+    path = real(tmp_path, name)
+    mesh = sv.read(path)
+    far = 1e-3 * mesh.extent
+    motions = [sv.Translate(marker, (far, far)) for marker in MIXER[name]]
+    case = sv.Case(roles=dict.fromkeys(MIXER[name], "moving"), motions=tuple(motions))
+    found = zones_of(last(case, mesh).mesh)
+    for number, (marker, motion) in enumerate(zip(MIXER[name], motions, strict=True), 1):
+        one = case.change(roles={marker: "moving"}, motions=(motion,))
+        alone = last(one, sv.read(path, number))
+        assert np.array_equal(found[number - 1].points, alone.mesh.points)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SHARED.exists(), reason="the real meshes are not here")
+@pytest.mark.parametrize("name", ["2d_two_zones", "3d_coarse"])
+def test_pins_of_a_real_mesh_take_the_solid_along(tmp_path, name):
+    mesh = sv.read(real(tmp_path, f"incomp_chtPinArray_{name}"))
+    pin = next(marker for marker in mesh.marker_names if marker.startswith("fluid_pin2"))
+    sides = [m for m in mesh.marker_names if "sym" in m or "inner" in m or "walls" in m]
+    roles = {pin: "moving"} | dict.fromkeys(sides, "sliding")
+    shift = (1e-3 * mesh.extent, *[0.0] * (mesh.dim - 1))
+    if mesh.dim == 3:
+        free = "fluid_bottom_interface", "fluid_top", "solid_pins_top"
+        roles |= dict.fromkeys(free, "sliding")
+    case = sv.Case(roles=roles, motions=(sv.Translate(pin, shift),), sliding="ps", steps=2)
+    step = last(case, mesh)
+    for each in mesh.interfaces:
+        here, there = (step.mesh.points[nodes] for nodes in (each.nodes, each.partners))
+        assert np.array_equal(here, there)
+    assert sv.quality(step.mesh, mesh).inverted == 0
