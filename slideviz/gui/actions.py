@@ -127,7 +127,7 @@ class ToolBar(QToolBar):
         self.addSeparator()
 
     def _add_zone(self, open_zone: Callable[[int], object]) -> None:
-        self.zone = Choice({}, "Which zone of the file is open.", "zone")
+        self.zone = Choice({}, "Which zones of the file are open: all, or one.", "zone")
         self.zone.chosen.connect(open_zone)
         self.zone_label = self.addWidget(QLabel(" Zone "))
         self.zone_shown = self.addWidget(self.zone)
@@ -139,10 +139,11 @@ class ToolBar(QToolBar):
         self.range.setEnabled(colored_by_value(now))
         self.color.show_value(session.view.color_by)
         zones = mesh.zones if mesh is not None else 1
-        if self.zone.count() != zones:
+        if self.zone.count() != zones + 1:
             self.zone.clear()
+            self.zone.addItem(f"all {zones}", 0)
             for zone in range(1, zones + 1):
                 self.zone.addItem(f"{zone} of {zones}", zone)
-        self.zone.show_value(mesh.zone if mesh is not None else 1)
+        self.zone.show_value((mesh.zone or 0) if mesh is not None else 0)
         for shown in (self.zone_label, self.zone_shown):
             shown.setVisible(zones > 1)

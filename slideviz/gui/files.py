@@ -98,10 +98,11 @@ class Files(QObject):
             )
 
     def open_zone(self, zone: int) -> None:
+        """Open a zone of the file, from 1; or with 0 all of them."""
         session = self.window.store.session
-        if session.mesh is None or session.path is None or zone == session.mesh.zone:
+        if session.mesh is None or session.path is None or zone == (session.mesh.zone or 0):
             return
-        self.open_path(session.path, zone)
+        self.open_path(session.path, zone or None)
         self.window.sync_actions()
 
     def ask_and_open_sample(self) -> None:

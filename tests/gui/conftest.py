@@ -14,6 +14,7 @@ else:
     from slideviz.gui.viewport.canvas import View3D
     from slideviz.gui.widgets import plot_canvas, questions
     from slideviz.gui.window import MainWindow
+    from slideviz.mesh.zones import marker_zones
     from slideviz.samples.table import write_sample
     from slideviz.scene.pick import to_display
     from slideviz.session import changes, jobs
@@ -246,7 +247,9 @@ class Driver:
         QTest.mouseClick(widget, Qt.MouseButton.LeftButton)
 
     def row(self, name):
-        return self.session.mesh.marker_names.index(name)
+        mesh = self.session.mesh
+        place = mesh.marker_names.index(name)
+        return place + (marker_zones(mesh)[place] if mesh.zone_parts else 0)
 
     def click_row(self, name, modifier=None):
         table = self.window.boundaries.table

@@ -572,7 +572,8 @@ def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path
 
 def test_a_saved_mesh_that_no_longer_fits_another_zone_is_told(driver, answers, tmp_path):
     path = zones(tmp_path)
-    driver.open(path)
+    driver.window.files.open_path(path, 1)
+    driver.settle()
     assert driver.session.case.roles["BLOCK"] == "fixed"
     panel = driver.window.dock_manager.panel(BoundariesPanel)
     row = driver.session.mesh.marker_names.index("BLOCK")

@@ -158,12 +158,27 @@ def test_zones_can_be_chosen(driver, tmp_path, passage_file):
     two = one.replace("airfoil", "vane")
     both.write_text(f"NZONE= 2\nIZONE= 1\n{one}\nIZONE= 2\n{two}\n")
     driver.open(both)
-    bar = driver.window.actions_table.bar
+    bar, table = driver.window.actions_table.bar, driver.window.boundaries.table
     assert bar.zone_shown.isVisible()
-    assert "airfoil" in driver.session.mesh.marker_names
+    assert bar.zone.currentText() == "all 2"
+    names = driver.session.mesh.marker_names
+    assert {"airfoil", "vane", "1:inflow", "2:inflow"} <= set(names)
+    half = len(names) // 2
+    heads = [table.item(row, 0).text() for row in (0, half + 1)]
+    assert heads == ["Zone 1", "Zone 2"]
+    assert table.item(half + 2, 0).text() == names[half]
+    table.item(half + 1, 0).setCheckState(Qt.CheckState.Unchecked)
+    assert driver.session.view.hidden == frozenset(names[half:])
+    assert table.item(half + 2, 0).checkState() == Qt.CheckState.Unchecked
+    table.role_wanted.emit(0)  # a zone has no role
     driver.choose(bar.zone, 2)
     driver.settle()
     assert "vane" in driver.session.mesh.marker_names
+    assert "airfoil" not in driver.session.mesh.marker_names
+    assert table.item(0, 0).text() == driver.session.mesh.marker_names[0]
+    driver.choose(bar.zone, 0)
+    driver.settle()
+    assert driver.session.mesh.zone is None
     driver.open(passage_file)
     assert not bar.zone_shown.isVisible()
 

@@ -1,4 +1,4 @@
-"""The boundaries panel: a row per marker with visibility, elements and role."""
+"""The boundaries panel: a row per marker with visibility, elements and role, below its zone."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
+from slideviz.mesh.zones import marker_zones
 from slideviz.session import changes
 from slideviz.session.run_messages import idle_text
 from slideviz.session.state import Session
@@ -79,8 +80,8 @@ class BoundariesPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._names: tuple[str, ...] = ()
-        self._choices: list[Choice] = []
+        self._rows: tuple[tuple[str, int], ...] = ()  # name of each row and its zone; "" of a zone
+        self._choices: list[Choice | None] = []
         self.table = self._make_table()
         self.guess_text = hint_label()
         self.keep = push_button(
@@ -119,19 +120,24 @@ class BoundariesPanel(Panel):
         table.itemSelectionChanged.connect(self._selection_changed)
         table.itemChanged.connect(self._item_changed)
         table.menu_wanted.connect(self._menu_wanted)
-        table.role_wanted.connect(lambda row: self._choices[row].showPopup())
+        table.role_wanted.connect(self._role_wanted)
         return table
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
         names = session.mesh.marker_names if session.mesh else ()
         with QSignalBlocker(self.table):
-            if names != self._names or len(self._choices) != len(names):
-                self._fill(session, names)
+            rows = _rows_of(session)
+            if rows != self._rows or len(self._choices) != len(rows):
+                self._fill(session, rows)
             elif session.mesh is not None:
                 self._count(session)
-            for row, name in enumerate(names):
-                self._sync_row(session, row, name)
+            for row, (name, _) in enumerate(rows):
+                if name:
+                    self._sync_row(session, row, name)
+                else:
+                    hidden = session.view.hidden.issuperset(self._boundaries(row))
+                    self._show_checked(self.table.item(row, NAME), not hidden)
             self._sync_selection(session)
         self.idle_text.setText("\n".join(idle_text(session.case)))
         self.idle_text.setVisible(bool(self.idle_text.text()))
@@ -144,14 +150,26 @@ class BoundariesPanel(Panel):
             else "This mesh has no named boundaries."
         )
 
-    def _fill(self, session: Session, names: tuple[str, ...]) -> None:
-        self._names, self._choices = names, []
+    def _fill(self, session: Session, rows: tuple[tuple[str, int], ...]) -> None:
+        self._rows, self._choices = rows, []
         self.table.setRowCount(0)
-        self.table.setRowCount(len(names))
-        for row, name in enumerate(names):
-            item = QTableWidgetItem(name)
+        self.table.clearSpans()
+        self.table.setRowCount(len(rows))
+        for row, (name, zone) in enumerate(rows):
+            item = QTableWidgetItem(name or f"Zone {zone}")
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             self.table.setItem(row, NAME, item)
+            if not name:
+                font = item.font()
+                font.setBold(True)
+                item.setFont(font)
+                item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsSelectable)
+                item.setToolTip(
+                    wrapped("The check mark shows or hides the boundaries of the zone.")
+                )
+                self.table.setSpan(row, NAME, 1, 3)
+                self._choices.append(None)
+                continue
             count = QTableWidgetItem()
             count.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.table.setItem(row, COUNT, count)
@@ -170,16 +188,16 @@ class BoundariesPanel(Panel):
         self._count(session)
 
     def _count(self, session: Session) -> None:
-        for row, name in enumerate(self._names):
-            text = f"{len(session.mesh.marker(name).cells):,}"
-            self.table.item(row, COUNT).setText(text)
+        for row, (name, _) in enumerate(self._rows):
+            if name:
+                text = f"{len(session.mesh.marker(name).cells):,}"
+                self.table.item(row, COUNT).setText(text)
 
     def _sync_row(self, session: Session, row: int, name: str) -> None:
         role, guess = session.role(name), session.guesses.get(name)
         item, choice = self.table.item(row, NAME), self._choices[row]
-        shown = name not in session.view.hidden
-        item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
-        item.setForeground(QBrush() if shown else self.palette().placeholderText())
+        assert choice is not None
+        self._show_checked(item, name not in session.view.hidden)
         about = "".join(
             f"\nIt is {each.describe()}." for each in session.mesh.interfaces if each.marker == name
         )
@@ -195,6 +213,11 @@ class BoundariesPanel(Panel):
             tip += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
         choice.setToolTip(wrapped(tip))
 
+    def _show_checked(self, item: QTableWidgetItem | None, shown: bool) -> None:
+        assert item is not None
+        item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
+        item.setForeground(QBrush() if shown else self.palette().placeholderText())
+
     def _sync_selection(self, session: Session) -> None:
         wanted = set(session.view.selected)
         if wanted == set(self.selected()):
@@ -202,7 +225,7 @@ class BoundariesPanel(Panel):
         model = self.table.selectionModel()
         model.clearSelection()
         flags = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
-        for row, name in enumerate(self._names):
+        for row, (name, _) in enumerate(self._rows):
             if name in wanted:
                 index = self.table.model().index(row, 0)
                 if not model.selectedRows():
@@ -214,7 +237,7 @@ class BoundariesPanel(Panel):
     # Widgets to state ------------------------------------------------------------------
     def selected(self) -> tuple[str, ...]:
         rows = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
-        return tuple(self._names[row] for row in rows)
+        return tuple(self._rows[row][0] for row in rows if self._rows[row][0])
 
     def _selection_changed(self) -> None:
         self.store.change(changes.select, self.selected())
@@ -223,11 +246,22 @@ class BoundariesPanel(Panel):
         if item.column() != NAME:
             return
         shown = item.checkState() == Qt.CheckState.Checked
-        names = self._with_selected(self._names[item.row()])
+        names = self._boundaries(item.row())
         self.store.change(changes.show_boundaries, names, shown)
 
     def _role_chosen(self, name: str, role: object) -> None:
         self.store.change(changes.set_role, self._with_selected(name), role)
+
+    def _role_wanted(self, row: int) -> None:
+        if (choice := self._choices[row]) is not None:
+            choice.showPopup()
+
+    def _boundaries(self, row: int) -> tuple[str, ...]:
+        """Return the boundaries of a row: one, with those selected with it, or all of a zone."""
+        name, zone = self._rows[row]
+        if name:
+            return self._with_selected(name)
+        return tuple(name for name, other in self._rows if name and other == zone)
 
     def _with_selected(self, name: str) -> tuple[str, ...]:
         """Return the selected boundaries if one is among them; else only this one."""
@@ -235,7 +269,21 @@ class BoundariesPanel(Panel):
         return chosen if name in chosen else (name,)
 
     def _menu_wanted(self, row: int, where: QPoint) -> None:
-        boundary_menu(self, self.store, self._with_selected(self._names[row])).popup(where)
+        boundary_menu(self, self.store, self._boundaries(row)).popup(where)
+
+
+def _rows_of(session: Session) -> tuple[tuple[str, int], ...]:
+    """Return name and zone of each row: the boundaries, below their zone if there are several."""
+    mesh = session.mesh
+    if mesh is None:
+        return ()
+    zones = marker_zones(mesh)
+    rows: list[tuple[str, int]] = []
+    for name, zone in zip(mesh.marker_names, zones, strict=True):
+        if mesh.zone_parts and (not rows or rows[-1][1] != zone):
+            rows.append(("", zone))
+        rows.append((name, zone))
+    return tuple(rows)
 
 
 def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:
