@@ -183,19 +183,32 @@ def section(window: MainWindow, place: Path) -> None:
     _look(window, 25.0, -10.0)
 
 
+def _near_hub(window: MainWindow, other: int, zoom: float) -> None:
+    """Show the last run beside another one, on a cylindrical section near the hub, magnified."""
+    window.store.change(changes.add_section, Section("cylinder", radius=NEAR_HUB))
+    window.store.change(changes.show_boundaries, ("BLADE", "HUB", *OUTER), False)
+    window.store.change(changes.show_beside, other)
+    settle(window)
+    window.viewing.look_from("+x")
+    settle(window)
+    (_, (view, scene)) = window.viewing.views_and_scenes()
+    scene.camera.zoom_at(0.62 * view.width(), 0.4 * view.height(), zoom)
+
+
 def beside(window: MainWindow, place: Path) -> None:
     """Show two methods side by side, on a cylindrical section near the hub."""
     _open(window, _stator(place))
     _run(window, sliding="none", periodic="none")
     _run(window, **SLIDING)
-    window.store.change(changes.add_section, Section("cylinder", radius=NEAR_HUB))
-    window.store.change(changes.show_boundaries, ("BLADE", "HUB", *OUTER), False)
-    window.store.change(changes.show_beside, 1)
-    settle(window)
-    window.viewing.look_from("+x")
-    settle(window)
-    (_, (view, scene)) = window.viewing.views_and_scenes()
-    scene.camera.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
+    _near_hub(window, 1, 1.06)
+
+
+def repaired(window: MainWindow, place: Path) -> None:
+    """Show the held passage of `beside` with and without its repair, near the folded cells."""
+    _open(window, _stator(place))
+    _run(window, sliding="none", periodic="none", repair="no")
+    _run(window, repair="auto")
+    _near_hub(window, 1, 5.0)
 
 
 def dark(window: MainWindow, place: Path) -> None:
@@ -216,6 +229,7 @@ STATES = (
     ShotState("wheel", wheel),
     ShotState("section", section),
     ShotState("side-by-side", beside),
+    ShotState("repaired", repaired),
     ShotState("dark", dark),
 )
 

@@ -138,7 +138,7 @@ def _repair(arguments: argparse.Namespace) -> int:
         "warnings": list(done.warnings),
     }
     if not save_json(arguments.json, report) and not arguments.quiet:
-        _print(report, done.words(), found, before)
+        _print(report, f"{done.words()}, {done.moves}", found, before)
     print_remarks(done.warnings, quiet=arguments.quiet)
     if found.inverted:
         print(f"slideviz: {_inverted(found)}", file=sys.stderr)

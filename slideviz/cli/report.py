@@ -197,6 +197,7 @@ def _repaired(steps: Sequence[Step]) -> MeshRepair | None:
     return replace(
         each[-1],
         cells=np.unique(np.concatenate([one.cells for one in each])),
+        folded=np.unique(np.concatenate([one.folded for one in each])),
         nodes=np.unique(np.concatenate([one.nodes for one in each])),
         largest_move=max(one.largest_move for one in each),
     )

@@ -201,7 +201,11 @@ def _print_run(
             words += f", held back at {counted(relax['limited'], 'node')}"
         rows.append(("relaxation", words))
     if (mended := report["repair"]) is not None and mended["cells_before"]:
-        counts = f"{mended['cells_before']} bad cells before, {mended['cells_after']} after"
+        counts = "; ".join(
+            f"{counted(mended[f'{key}_before'], what)} before, {mended[f'{key}_after']} after"
+            for key, what in (("folded", "folded cell"), ("cells", "bad cell"))
+            if mended[f"{key}_before"]
+        )
         far = f"up to {mended['largest_move']:.3g}"
         rows.append(("repair", f"{counts}; {counted(mended['nodes_moved'], 'node')} moved, {far}"))
     elif mended is not None:

@@ -26,7 +26,7 @@ from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
-from slideviz.mesh.quality import checked_reference, quality
+from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, is_bad
 from slideviz.mesh.repair.repair import repair as mend_cells
@@ -214,7 +214,7 @@ def mend(
         limit = min(limit, quality(shapes, metric=case.quality_metric).min)
     if not is_bad(found, limit).any():
         none = np.empty(0, np.int64)
-        return MeshRepair(now, none, none, none, now.points[none], 0.0)
+        return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
     done = mend_cells(
         domain,
@@ -231,9 +231,19 @@ def mend(
     moved = np.flatnonzero((points != now.points).any(axis=1))
     number = np.arange(len(now.cells)) if cells is None else cells
     mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
-    bad = number[done.bad_before], number[done.bad_after]
     unmendable, warnings = unmendable_words(done.impossible, mesh, number)
-    return MeshRepair(mended, *bad, moved, before, done.largest_move, unmendable, warnings)
+    return MeshRepair(
+        mended,
+        number[done.bad_before],
+        number[done.bad_after],
+        number[found.status != VALID],
+        number[done.folded_after],
+        moved,
+        before,
+        done.largest_move,
+        unmendable,
+        warnings,
+    )
 
 
 def _mended_zones(

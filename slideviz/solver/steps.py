@@ -59,6 +59,9 @@ class MeshRepair:
     left: IntArray
     """`cells`, `left` (k,), (l,): the numbers of the bad cells before and after: those that are not
     proved valid, or below the limit."""
+    folded: IntArray
+    folded_left: IntArray
+    """`folded`, `folded_left` (f,), (g,): those of them that are not proved valid."""
     nodes: IntArray  # (m,): the numbers of the nodes that were moved
     points: FloatArray  # (m, d): where they were
     largest_move: float  # the farthest that one was moved, in the mesh's length unit
@@ -71,19 +74,29 @@ class MeshRepair:
         return {
             "cells_before": len(self.cells),
             "cells_after": len(self.left),
+            "folded_before": len(self.folded),
+            "folded_after": len(self.folded_left),
             "nodes_moved": len(self.nodes),
             "largest_move": self.largest_move,
             "unmendable": [{"cell": cell, "reason": why} for cell, why in self.unmendable],
         }
 
     def words(self) -> str:
-        """Return what was mended in words: ``303 cells mended by moving 2,968 nodes``."""
-        mended = len(self.cells) - len(self.left)
+        """Return what was mended in words: ``303 of 303 folded cells mended, 66 are poor``."""
+        before, after = len(self.folded), len(self.folded_left)
+        poor = len(self.left) - after
+        if before:
+            left = f", {poor:,} {'is' if poor == 1 else 'are'} poor" * bool(poor)
+            return f"{before - after:,} of {before:,} folded cells mended{left}"
         if not len(self.cells):
             return "no cell needs repair"
-        count = f"{mended:,} of {len(self.cells):,} bad cells mended"
+        return f"{len(self.cells) - poor:,} of {len(self.cells):,} poor cells mended"
+
+    @property
+    def moves(self) -> str:
+        """How many nodes were moved, and how far, in words."""
         nodes = f"{len(self.nodes):,} node{'' if len(self.nodes) == 1 else 's'}"
-        return f"{count}, {nodes} moved by up to {self.largest_move:.3g}"
+        return f"{nodes} moved by up to {self.largest_move:.3g}"
 
 
 @dataclass(frozen=True, eq=False)

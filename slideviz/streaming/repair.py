@@ -191,15 +191,12 @@ def mend_file(
         Of all cells, undeformed and deformed.
     """
     below, count = min(case.repair_below, before.min), source.n_cells
-    bad = np.concatenate(
-        [
-            first + np.flatnonzero((after.status[here] != VALID) | (after.values[here] < below))
-            for first in range(0, count, CELLS)
-            for here in [slice(first, first + CELLS)]
-        ]
-    )
+    parts = [slice(first, first + CELLS) for first in range(0, count, CELLS)]
+    folded = np.concatenate([p.start + np.flatnonzero(after.status[p] != VALID) for p in parts])
+    poor = np.concatenate([p.start + np.flatnonzero(after.values[p] < below) for p in parts])
+    bad = np.union1d(folded, poor)
     if not len(bad):
-        return MeshRepair(skin, bad, bad, bad, points[bad], 0.0)
+        return MeshRepair(skin, bad, bad, bad, bad, bad, points[bad], 0.0)
     done = 0.0
 
     def report(fraction: float) -> None:
@@ -210,10 +207,11 @@ def mend_file(
     freedom = find_freedom(case, skin, points, setup)
     facets = setup.boundary.facets
     regions = FileRegions(source, file, skin, freedom, facets, lambda: tick(done))
-    left, impossible = mend_cells(regions, bad, below, case.quality_metric, report)
+    left, still, impossible = mend_cells(regions, bad, below, case.quality_metric, report)
     if regions.bad is None:
         none = bad[:0]
-        return MeshRepair(skin, bad, left, none, points[none], 0.0, warnings=regions.warnings)
+        same = bad, bad, folded, folded
+        return MeshRepair(skin, *same, none, points[none], 0.0, warnings=regions.warnings)
     nodes = np.union1d(regions.bad.nodes, regions.nodes)
     cells = Cells.from_types(regions.bad.types, np.searchsorted(nodes, regions.bad.connectivity))
     part = Part(sealed(nodes), sealed(bad), source.n_points, count)
@@ -227,6 +225,8 @@ def mend_file(
         mesh,
         bad,
         left,
+        folded,
+        still,
         regions.nodes[kept],
         regions.before[kept],
         float(way.max(initial=0.0)),

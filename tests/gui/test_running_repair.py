@@ -31,7 +31,7 @@ def test_a_folded_run_is_mended_by_the_button_of_its_message(driver, window, tmp
     run = driver.session.run_shown
     assert run.number == 2
     assert not run.last.quality.inverted
-    assert "bad cells mended" in window.run_panel.text.text()
+    assert "folded cells mended" in window.run_panel.text.text()
     assert not driver.session.outdated
     again = last(run.case, mesh)
     np.testing.assert_array_equal(run.last.mesh.points, again.mesh.points)

@@ -261,7 +261,7 @@ def test_the_command_mends_a_file_and_reports(tmp_path, capsys):
     assert said["target"] == "reference"
     assert said["quality"]["inverted"] == 0 < said["quality"]["before"]["inverted"]
     assert not sv.quality(sv.read(out), mesh).inverted
-    assert "bad cells mended" in capsys.readouterr().out
+    assert "folded cells mended" in capsys.readouterr().out
     assert run([*words, "--sliding", "wall"]) == 1
     assert "no marker 'wall'" in capsys.readouterr().err
     assert run([*words[:2], "-o", str(tmp_path / "bad.su2")]) == 1

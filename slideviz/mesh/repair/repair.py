@@ -49,6 +49,9 @@ LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
 """Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
 over the largest 1 / quality, and the least relative gain, of which two rounds may bring less."""
 
+TREND = 5
+"""Rounds of a lift after which it ends if it will not reach the limit."""
+
 SHAPE = 10.0
 """Weight of the energy of shape beside that of the lift, which does not see short edges."""
 
@@ -108,6 +111,8 @@ class Repaired:
     bad_after: IntArray
     """`bad_before`, `bad_after` (k,): the cells, ascending, that are not proved valid, or whose
     quality is too low."""
+    folded_after: IntArray
+    """(f,): those of `bad_after` that are not proved valid."""
     moved: IntArray
     """(m,): the nodes that were moved, ascending."""
     largest_move: float
@@ -168,13 +173,14 @@ def repair(
     shapes = None if reference is None else checked_reference(reference, mesh)
     before = np.flatnonzero(is_bad(quality(mesh, shapes, metric), below))
     whole = _Whole(mesh, shapes, freedom)
-    after, impossible = mend_cells(whole, before, below, metric, report)
+    after, folded, impossible = mend_cells(whole, before, below, metric, report)
     points = whole.points
     way = np.linalg.norm(points - mesh.points, axis=1)
     return Repaired(
         points=sealed(points),
         bad_before=sealed(before),
         bad_after=sealed(after),
+        folded_after=sealed(folded),
         moved=sealed(np.flatnonzero((points != mesh.points).any(axis=1))),
         largest_move=float(way.max(initial=0.0)),
         impossible=impossible,
@@ -201,13 +207,14 @@ class _Whole:
 
 def mend_cells(
     regions: Regions, bad: IntArray, below: float, metric: SkewMetric, report: Report
-) -> tuple[IntArray, tuple[Impossible, ...]]:
-    """Mend the bad cells (k,) of a mesh; return those that are bad then, and the hopeless ones.
+) -> tuple[IntArray, IntArray, tuple[Impossible, ...]]:
+    """Mend the bad cells (k,) of a mesh.
 
-    The rest as of `repair`.
+    Return those that are bad then, those that are not proved valid, and those that cannot be
+    mended. The rest as of `repair`.
     """
     report(0.0)
-    after, impossible = bad, tuple[Impossible, ...]()
+    after, folded, impossible = bad, bad, tuple[Impossible, ...]()
     with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
         for stage, rings in enumerate(RINGS):
             if not len(bad):
@@ -232,8 +239,10 @@ def mend_cells(
             found = quality(mesh.with_points(points), reference, metric)
             still = is_bad(found, below)
             after = np.union1d(np.setdiff1d(after, region.cells), region.cells[still])
+            unproved = region.cells[found.status != VALID]
+            folded = np.union1d(np.setdiff1d(folded, region.cells), unproved)
             bad = region.cells[wanted & (still if stage + 1 < POOR else found.status != VALID)]
-    return after, impossible
+    return after, folded, impossible
 
 
 def is_bad(found: Quality, below: float) -> NDArray[np.bool_]:
@@ -450,9 +459,9 @@ class _Mending:
         self, best_points: FloatArray, best: tuple[int, float]
     ) -> tuple[FloatArray, tuple[int, float]]:
         """Return the best points (k, d) and their score, after rounds that lift the worst cells."""
-        patch, work, vain = self.patch, self.work, 0
+        patch, work, vain, first = self.patch, self.work, 0, best[1]
         sized = work.reference is not None
-        for _ in range(ROUNDS):
+        for count in range(1, ROUNDS + 1):
             patch.start = best_points
             beta = BETA / best[1]
             inverse, edges = patch.curvature(LIFTED), self._edges(patch)
@@ -484,7 +493,9 @@ class _Mending:
             vain = 0 if score[1] > best[1] * (1 + GAIN) else vain + 1
             if score > best:
                 best_points, best = points, score
-            if self.good(best) or vain >= 2:
+            # The lowest quality after all rounds, if it rises as it did so far.
+            end = first * (best[1] / first) ** (ROUNDS / count)
+            if self.good(best) or vain >= 2 or (count >= TREND and end < work.below):
                 break
         return best_points, best
 
