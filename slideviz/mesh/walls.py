@@ -36,6 +36,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.argument_types import check_types
+from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
@@ -112,11 +113,11 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
     boundary, cells = boundary_of(mesh), mesh.cells
     facets, owner = boundary.facets, boundary.owner
     use = np.ones(len(cells), bool) if mesh.halo is None else ~mesh.halo.cells
-    begin, cells_at = _cells_at_nodes(cells.offsets, cells.connectivity, use, len(mesh.points))
+    near = cells_around(cells, len(mesh.points))
     chain = np.full((*facets.shape, layers + 1), -1)
     off, depth = np.full((len(facets), 2), -1), np.zeros(len(facets), np.int64)
-    table = cells.types, cells.offsets, cells.connectivity
-    _climb(facets, owner, *table, begin, cells_at, _EDGES, chain, depth, off)
+    table, around = (cells.types, cells.offsets, cells.connectivity), (near.offsets, near.cells)
+    _climb(facets, owner, table, around, use, _EDGES, chain, depth, off)
     deep = depth > 0
     if facets.shape[1] == 4:
         triangle = facets[:, 2] == facets[:, 3]
@@ -137,29 +138,6 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
 
 
 @njit(nogil=True, cache=True)
-def _cells_at_nodes(offsets, connectivity, use, count):  # type: ignore[no-untyped-def]
-    """Return begins (count + 1,) and, from there on for each node, the cells that have it.
-
-    Only cells of the mask ``use`` (m,) are listed.
-    """
-    begin = np.zeros(count + 2, np.int64)
-    for cell in range(len(use)):
-        if use[cell]:
-            for k in range(offsets[cell], offsets[cell + 1]):
-                begin[connectivity[k] + 2] += 1
-    for node in range(count):
-        begin[node + 2] += begin[node + 1]
-    cells = np.empty(begin[count + 1], np.int32)
-    for cell in range(len(use)):
-        if use[cell]:
-            for k in range(offsets[cell], offsets[cell + 1]):
-                node = connectivity[k]
-                cells[begin[node + 1]] = cell
-                begin[node + 1] += 1
-    return begin[:-1], cells
-
-
-@njit(nogil=True, cache=True)
 def _has(nodes, node):  # type: ignore[no-untyped-def]
     """Return 1 if ``node`` is one of ``nodes`` (w,), else 0."""
     for other in nodes:
@@ -169,11 +147,13 @@ def _has(nodes, node):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _climb(facets, owner, types, offsets, connectivity, begin, cells_at, edges, chain, depth, off):  # type: ignore[no-untyped-def]
+def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type: ignore[no-untyped-def]
     """Write the nodes of the columns at the corners (f, w, k + 1) of facets, and the depths (f,).
 
-    Also the nodes ``off`` (f, 2) the facet of cells in which no column begins: one or two.
+    Also the nodes ``off`` (f, 2) the facet of cells in which no column begins: one or two. Columns
+    lead only through cells of the mask ``use`` (m,).
     """
+    types, offsets, connectivity = cells
     for f in range(len(facets)):
         width = facets.shape[1]
         if width == 4 and facets[f, 2] == facets[f, 3]:
@@ -186,7 +166,7 @@ def _climb(facets, owner, types, offsets, connectivity, begin, cells_at, edges, 
                 break
             depth[f] = layer + 1
             side = chain[f, :width, layer + 1]
-            cell = _neighbour(side, cell, offsets, connectivity, begin, cells_at)
+            cell = _neighbour(side, cell, offsets, connectivity, *around, use)
             if cell < 0:
                 break
         if depth[f] == 0:
@@ -219,11 +199,11 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _neighbour(side, cell, offsets, connectivity, begin, cells_at):  # type: ignore[no-untyped-def]
-    """Return the cell beyond a side (w,) of ``cell``, -1 if there is none."""
+def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type: ignore[no-untyped-def]
+    """Return the cell of ``use`` beyond a side (w,) of ``cell``, -1 if there is none."""
     for at in range(begin[side[0]], begin[side[0] + 1]):
         other = cells_at[at]
-        if other != cell:
+        if other != cell and use[other]:
             shared = 0
             for k in range(offsets[other], offsets[other + 1]):
                 shared += _has(side, connectivity[k])
