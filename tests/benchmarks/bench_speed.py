@@ -96,6 +96,13 @@ def test_quality(benchmark, cube):
     benchmark.extra_info["cells_per_second"] = len(cube.cells) / benchmark.stats["min"]
 
 
+def test_metrics(benchmark, cube):
+    """All metrics of a mesh whose neighbours are known, as of every mesh after the first one."""
+    anew = lambda: ((cube.with_points(cube.points),), {})  # noqa: E731
+    benchmark.pedantic(sv.metrics, setup=anew, rounds=3, warmup_rounds=1)
+    benchmark.extra_info["cells_per_second"] = len(cube.cells) / benchmark.stats["min"]
+
+
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0], ids=lambda share: f"{share:.0%}-limited")
 def test_margins_beside_the_proof(benchmark, cube, share):
     """Margins up to 10 times a motion that shakes a part of the cells, beside their quality."""
