@@ -51,24 +51,30 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
 
 def end_message(run: Run) -> str:
     """Return the end of a run in a few words."""
+    return "".join(end_parts(run))
+
+
+def end_parts(run: Run) -> tuple[str, str]:
+    """Return the end of a run in a few words, and how far its motion may go, perhaps ""."""
     step = run.last_step
     if run.last is None or step is None:
-        return "Ready."
+        return "Ready.", ""
     heights = heights_words(run.last, run.case)
     heights = f"first heights {heights}" if heights else ""
     bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
     if step.index < step.total:
-        return f"Stopped after step {step.index} of {step.total}" + (f": {bad}." if bad else ".")
+        bad = f": {bad}" if bad else ""
+        return f"Stopped after step {step.index} of {step.total}{bad}.", ""
     done, reach = "; ".join(filter(None, (bad, repair_words(run)))), ""
     if run.safe is not None and run.safe.fraction > 0:
         reach = f"the motion {reach_words(run.safe.fraction)}"
-        if ending := path_ending(run):
-            reach += f", until a cell folds{ending}"
+        if path_ending(run):
+            reach += ", and valid again at its end"
         if run.safe.cell is None:
             reach = run.safe.words
     if done:
-        return f"Done: {done}; {reach}." if reach else f"Done: {done}."
-    return f"Done. {reach[:1].upper()}{reach[1:]}." if reach else "Done."
+        return (f"Done: {done}; ", f"{reach}.") if reach else (f"Done: {done}.", "")
+    return ("Done. ", f"{reach[:1].upper()}{reach[1:]}.") if reach else ("Done.", "")
 
 
 def path_ending(run: Run) -> str:

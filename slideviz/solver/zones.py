@@ -254,6 +254,8 @@ def joined_repairs(
         mesh=now,
         cells=numbers("cells", "cells"),
         left=numbers("left", "cells"),
+        folded=numbers("folded", "cells"),
+        folded_left=numbers("folded_left", "cells"),
         nodes=numbers("nodes", "points"),
         points=sealed(np.concatenate([one.points for _, one in done])),
         largest_move=max(one.largest_move for _, one in done),

@@ -28,6 +28,7 @@ from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
 from slideviz.session.motion_scale import can_scale, factor_of
 from slideviz.session.reach import reach_of, reach_run
+from slideviz.session.run_messages import Requirement
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 
@@ -132,6 +133,11 @@ class CurvesPanel(Panel):
             choice.chosen.connect(lambda _: self._other_plot())
         self.span_row = as_widget(in_row(*both, wide=both))
         return self.span_row
+
+    def focus_requirement(self, _missing: Requirement) -> None:
+        """Show how far the motion of the shown run may go."""
+        self.kind.show_value("reach")
+        self._other_plot()
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:

@@ -17,9 +17,10 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
 from slideviz.session.jobs import JobProgress
+from slideviz.session.reach import reach_run
 from slideviz.session.run_messages import (
     Requirement,
-    end_message,
+    end_parts,
     exact_cost,
     inverted_words,
     limits_words,
@@ -32,8 +33,9 @@ from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
-SETTINGS, NOTES = "settings", "notes"
-"""Targets of links in the text: take the settings of the shown run, show its notes."""
+SETTINGS, NOTES, REACH = "settings", "notes", "reach"
+"""Targets of links in the text: take the settings of the shown run, show its notes, show the curve
+of how far its motion may go."""
 
 
 class RunPanel(Panel):
@@ -113,7 +115,10 @@ class RunPanel(Panel):
             self._show_ready("Ready.", session)
         elif not session.outdated:
             bad = inverted_words(run)
-            text, notes = html.escape(end_message(run)), notes_of(run)
+            text, reach = map(html.escape, end_parts(run))
+            if reach_run(session):
+                reach = f"<a href='{REACH}'>{reach}</a>"
+            text, notes = text + reach, notes_of(run)
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
@@ -149,6 +154,8 @@ class RunPanel(Panel):
             if run is not None:
                 text = "\n".join(f"Note: {note}" for note in notes_of(run))
                 main_window(self).banner.show_message(text)
+        elif target == REACH:
+            self.requirement_clicked.emit(Requirement("", "curves"))
         elif target == SETTINGS:
             self.store.change(changes.adopt_settings, self.store.session.shown)
         else:
