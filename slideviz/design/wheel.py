@@ -140,6 +140,11 @@ def _repeated(
     case: Case, mesh: Mesh, passages: int | Literal["all"]
 ) -> tuple[Mesh, tuple[Pair, ...], int]:
     """Return the passage without halo, its periodic sides, and the number of its copies."""
+    if mesh.zone_parts:
+        raise CaseError(
+            f"{mesh.name}: has {mesh.zones} zones, and each makes a wheel of its own; choose one "
+            "with ZONE= in a case, or --zone"
+        )
     names = case.markers_with("periodic")
     if not names:
         raise CaseError("the case has no periodic boundaries; passages are merged at these")

@@ -132,7 +132,8 @@ _FILE = Menu("file", "&File", entries=(
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
             lambda window: window.exports.wheel(), enabled=in_memory(has_wheel),
             tip_now=why_not(in_memory(has_wheel), "The mesh is no passage of a wheel: two "
-                            "boundaries must be periodic, by a whole part of a turn.")),
+                            "boundaries of its only zone must be periodic, by a whole part of a "
+                            "turn.")),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
             lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", has_mesh),

@@ -233,9 +233,11 @@ def machine_axis(session: Session) -> Axis | None:
 
 
 def wheel_passages(session: Session) -> int | None:
-    """Return how many passages make the wheel; None without periodic sides of such an angle."""
-    pair = machine_pair(session)
-    return None if pair is None else pair.around
+    """Return how many passages make the wheel; None where there is none, or for several zones."""
+    pair, mesh = machine_pair(session), session.mesh
+    if pair is None or mesh is None or mesh.zone_parts:
+        return None
+    return pair.around
 
 
 def box_names(session: Session) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.zones import join_zones
 from tests.builders import passage, square
 
 MOVED = sv.Rotate("blade", 4.0, (0.75, 0.2, 0.5), (1.0, 0.3, 0.0))
@@ -57,6 +58,8 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
     path = tmp_path / "wheel.su2"
     with pytest.raises(CaseError, match="no periodic boundaries; passages are merged at these"):
         sv.wheel(path, sv.Case(), square(4))
+    with pytest.raises(CaseError, match="has 2 zones, and each makes a wheel of its own; choose"):
+        sv.wheel(path, sv.Case(), join_zones([square(4), square(6)]))
     with pytest.raises(MeshError, match="do not match: with the best rotational"):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "x_p": "periodic"}), square(4))
     with pytest.raises(CaseError, match=r"35°, which is no whole part of a turn; give the number"):

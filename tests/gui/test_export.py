@@ -516,7 +516,7 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
     act.trigger()
     driver.window.store.change(changes.set_role, ["per1"], "fixed")
     assert not act.isEnabled()
-    assert "two boundaries must be periodic" in " ".join(act.toolTip().split())
+    assert "must be periodic, by a whole part of a turn" in " ".join(act.toolTip().split())
 
 
 def test_steps_that_exist_are_asked_about(ran, answers, tmp_path):

@@ -81,7 +81,7 @@ class WheelDialog(QDialog):
         shown = -1 if self.count == "all" else self.count // 2
         sides = self._session.case.markers_with("periodic")  # inside of the wheel
         bare = changes.show_boundaries(self._session, sides, False)
-        self.renderer.session = changes.set_view(bare, passages=shown)
+        self.renderer.session = changes.set_view(bare, passages=shown, sections=())
         size = drawn_for(self.renderer, PREVIEW)
         options = PictureOptions(size, background="shown", legend=False, both=False, edges=False)
         pixels = yield from self.renderer.render_steps(options)
