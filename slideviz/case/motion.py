@@ -192,7 +192,7 @@ def reference_displacements(
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"
             try:
-                read = _read_file(motion.path, mesh, nodes, of)
+                read = read_file(motion.path, mesh, nodes, of)
             except CaseError as problem:
                 problems.append(str(problem))
             else:
@@ -202,12 +202,12 @@ def reference_displacements(
     return files
 
 
-def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
+def read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
     """Return a file's displacements of ``nodes`` (k,), which it numbers as in the whole zone."""
     for zone in mesh.zone_parts:
         if len(nodes) and zone.points.start <= nodes[0] < zone.points.stop:
             first = zone.points.start
-            read = _read_file(path, zone.mesh, nodes - first, of)
+            read = read_file(path, zone.mesh, nodes - first, of)
             return replace(read, nodes=read.nodes + first)
     if mesh.part is None:
         return read_displacements(path, nodes, mesh.points.shape, of)

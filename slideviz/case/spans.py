@@ -12,6 +12,7 @@ from slideviz.machine.span import SpanField, find_span
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
+from slideviz.mesh.zones import require_one_zone
 
 HUBS, SHROUDS = ("hub",), ("shroud", "casing")
 """Words in the names of boundaries, by which SPAN= AUTO finds hub and shroud."""
@@ -55,6 +56,7 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
     key = case.span, sides, case.periodic_type, case.axis, case.origin
     cache = _FIELDS.setdefault(mesh, {})
     if key not in cache:
+        require_one_zone(mesh, "a span")
         hub, shroud = span_ends(case, mesh)
         axis, origin, period = case.axis, case.origin, 2.0 * np.pi
         if sides and mesh.dim == 3:

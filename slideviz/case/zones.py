@@ -39,7 +39,9 @@ def _renamed(case: Case, names: Mapping[str, str]) -> Case:
         several = tuple(names.get(name, name) for name in named(motion.marker))
         one = isinstance(motion.marker, str)
         motions.append(replace(motion, marker=several[0] if one and several else several or ""))
+    hub, shroud = (names.get(name, name) for name in case.span or ("", ""))
     return case.change(
+        span=(hub, shroud) if case.span else None,
         roles={names.get(name, name): role for name, role in case.roles.items()},
         motions=tuple(motions),
         limits=tuple(
@@ -90,11 +92,15 @@ def _zone_case(case: Case, mesh: Mesh, part: ZonePart) -> Case:
     names = names_in(mesh, part)
     roles = {names[name]: role for name, role in case.roles.items() if name in names}
     periodic = "periodic" in roles.values()
+    span = None
+    if case.span is not None and all(name in names for name in case.span):
+        span = names[case.span[0]], names[case.span[1]]
     zone = case.change(
         roles=roles,
         motions=(),
         limits=(),
         zone=None,
+        span=span,
         warnings=(),
         periodic=case.periodic if periodic else "none",
     )

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_shared, read_case, require_mesh_file
+from slideviz.cli.options import add_shared, read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
@@ -62,7 +62,6 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
 
 def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
-    from slideviz import read
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.terminal import DONE
     from slideviz.errors import CaseError
@@ -81,7 +80,7 @@ def compare(arguments: argparse.Namespace) -> int:
     mesh_file = require_mesh_file(arguments, case)
     wanted = _wanted(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
-    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
+    case, mesh = read_mesh(case, mesh_file)
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
     require_output_paths(

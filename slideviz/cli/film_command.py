@@ -15,6 +15,7 @@ from slideviz.cli.options import (
     add_zoom,
     changed,
     read_case,
+    read_mesh,
     require_mesh_file,
     size,
 )
@@ -116,14 +117,14 @@ def film(arguments: argparse.Namespace) -> int:
 
 def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
-    from slideviz import quality, read
+    from slideviz import quality
     from slideviz.errors import CaseError
     from slideviz.scene.overview import require_detail
     from slideviz.session.state import Run, StepFrame
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     mesh_file = require_mesh_file(arguments, case)
-    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
+    case, mesh = read_mesh(case, mesh_file)
     require_detail(arguments.zoom, mesh)
 
     def undeformed(one: Case) -> StepFrame:

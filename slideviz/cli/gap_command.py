@@ -7,7 +7,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_shared, read_case, require_mesh_file
+from slideviz.cli.options import add_changes, add_shared, read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
 from slideviz.cli.section_options import pair_of_names
 from slideviz.cli.terminal import holding
@@ -53,7 +53,7 @@ def gap(arguments: argparse.Namespace) -> int:
 
 
 def _gap(arguments: argparse.Namespace) -> int:
-    from slideviz import deform, gaps, quality, read
+    from slideviz import deform, gaps, quality
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.cli.terminal import DONE, INVERTED
@@ -67,7 +67,7 @@ def _gap(arguments: argparse.Namespace) -> int:
     require_output_paths(
         arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
     )
-    mesh = read(mesh_file, case.zone, file_format=case.mesh_format)
+    case, mesh = read_mesh(case, mesh_file)
     before = gaps(case, mesh, arguments.between)
     if not before:
         raise CaseError(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
     from slideviz.scene.overview import Zoom
     from slideviz.terms import Role
 
@@ -114,6 +115,15 @@ def read_case(arguments: argparse.Namespace) -> Case:
     case = case if arguments.zone is None else case.change(zone=arguments.zone)
     add_case_inputs(arguments, case)
     return case
+
+
+def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
+    """Return the case with the names of the boundaries as its mesh has them, and the mesh."""
+    from slideviz import read
+    from slideviz.case.zones import with_marker_names
+
+    mesh = read(path, zone=case.zone, file_format=case.mesh_format)
+    return with_marker_names(case, mesh), mesh
 
 
 def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:

@@ -17,6 +17,7 @@ from slideviz.cli.options import (
     add_shared,
     add_zoom,
     read_case,
+    read_mesh,
     require_mesh_file,
     size,
 )
@@ -208,8 +209,7 @@ def _about(case: Case) -> str:
 def _deform(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
-    from slideviz import quality, read, walls, write
-    from slideviz.case.zones import with_marker_names
+    from slideviz import quality, walls, write
     from slideviz.cli.report import folded_cells
     from slideviz.formats.losses import warning_of_losses
     from slideviz.scene.overview import require_detail
@@ -217,8 +217,7 @@ def _deform(
 
     assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}
-    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
-    case = with_marker_names(case, mesh)
+    case, mesh = read_mesh(case, case.mesh_file)
     say("warning", warning_of_losses(output, mesh, kind))
     if arguments.picture:
         require_detail(arguments.zoom, mesh)

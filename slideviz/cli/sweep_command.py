@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared, integer, read_case, require_mesh_file
+from slideviz.cli.options import add_shared, integer, read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
 
 def sweep(arguments: argparse.Namespace) -> int:
     """Deform a mesh by many designs, and write the table of results; return the exit code."""
-    from slideviz import read
     from slideviz import sweep as sweep_of
     from slideviz.case.words import counted
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
@@ -82,7 +81,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     designs = read_designs(case, arguments.table)
     mesh_file = require_mesh_file(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_swept")
-    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
+    case, mesh = read_mesh(case, mesh_file)
     make_folder(folder)
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with _executor(arguments) as executor:

@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Literal
 
-from slideviz.cli.options import add_changes, add_shared, integer, read_case, require_mesh_file
+from slideviz.cli.options import (
+    add_changes,
+    add_shared,
+    integer,
+    read_case,
+    read_mesh,
+    require_mesh_file,
+)
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
 
@@ -71,7 +78,6 @@ def wheel(arguments: argparse.Namespace) -> int:
 def _wheel(arguments: argparse.Namespace) -> int:
     from dataclasses import fields
 
-    from slideviz import read
     from slideviz import wheel as wheel_of
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
@@ -85,7 +91,7 @@ def _wheel(arguments: argparse.Namespace) -> int:
         OutputPath(arguments.output, "-o", is_mesh=True),
         OutputPath(arguments.json, "--json"),
     )
-    mesh = read(mesh_file, case.zone, file_format=case.mesh_format)
+    case, mesh = read_mesh(case, mesh_file)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         made = wheel_of(
             arguments.output,

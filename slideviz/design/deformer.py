@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial, reduce
 
 import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case import motion
+from slideviz.case.check import require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case, Translate
+from slideviz.case.zones import with_marker_names
 from slideviz.design.checks import (
     Checks,
     facets_of,
@@ -25,6 +28,7 @@ from slideviz.design.checks import (
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
+from slideviz.design.zones import ZoneDesign, zone_designs
 from slideviz.errors import CaseError, DeformError, Note, not_one_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
@@ -32,7 +36,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR
 from slideviz.rbf.loops import to_points
-from slideviz.rbf.tape import Array, Tape, Variable, value
+from slideviz.rbf.tape import Array, Tape, Variable, put, value
 from slideviz.solver.deform import Progress
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import make_setup
@@ -157,12 +161,26 @@ class Deformer:
         case, left_out = without_repair(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
+        case = with_marker_names(case, mesh)
         asked = motion.displacements(case, mesh)
         self.mesh, self.case = mesh, case
         self.nodes, self.displacement = asked.nodes, asked.vectors
         designs = asked.vectors if displacements is None else displacements
         designs = self._checked(designs, "displacements")
         references = designs.reshape(-1, *asked.vectors.shape)
+        report = progress or (lambda _: None)
+        self._zones: tuple[ZoneDesign, ...] = ()
+        self.warnings: tuple[str, ...]
+        """About case and mesh, zones that no longer fit at the reference, and systems that are
+        solved with twice the digits (a note)."""
+        if mesh.zone_parts:
+            require_valid(case, mesh)
+            make = partial(Deformer, progress=report)
+            self._zones = zone_designs(case, mesh, asked.nodes, references, make)
+            points = self.deform(references[0])
+            said = [f"zone {z.number}: {text}" for z in self._zones for text in z.deformer.warnings]
+            self.warnings = (*case.warnings, *left_out, *said, *torn_interfaces(mesh, points))
+            return
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
         held = case
@@ -180,10 +198,7 @@ class Deformer:
         self._setup, self._input = setup, known_node_map(mesh, setup, asked)
         self._references = references
         self.warnings = (*case.warnings, *left_out, *setup.warnings)
-        """About case and mesh, zones that no longer fit at the reference, and systems that are
-        solved with twice the digits (a note)."""
         targets = [value(self._input.target(reference)) for reference in references]
-        report = progress or (lambda _: None)
         self._steps: tuple[FrozenStep, ...]
         self._steps, points = choose_steps(case, mesh, setup, targets, report)
         refined = any(step.refined for step in self._steps)
@@ -226,6 +241,8 @@ class Deformer:
         """
         design = self.displacement if displacement is None else displacement
         design = self._checked(design, "displacement")
+        if self._zones:
+            return value(self._joined(lambda zone: zone.deformer.deform(value(zone.of(design)))))
         points, errors, error_estimate = self._deformed(design)
         warn_of_error_estimate(self._steps, error_estimate)
         reduced = self._setup.reduction is not None
@@ -243,7 +260,12 @@ class Deformer:
         are set exactly; or the distance of a sliding node from its boundary, because it left the
         plane of the facet that it was on at the reference. The larger of both.
         """
-        error = self._deformed(self._checked(displacement, "displacement"))[1]
+        design = self._checked(displacement, "displacement")
+        if self._zones:
+            each = (zone.deformer.max_error(value(zone.of(design))) for zone in self._zones)
+            largest: float | FloatArray = reduce(np.maximum, each)
+            return largest
+        error = self._deformed(design)[1]
         return float(error) if error.ndim == 0 else error
 
     @check_types
@@ -257,7 +279,7 @@ class Deformer:
         direction : (m, d) or (k, m, d)
             Changes of the displacement, all of them at this one.
         """
-        _, start, end = self._taped(displacement)
+        start, end = self._taped(displacement)
         return np.array(start.tape.push(start, self._checked(direction, "direction"), end))
 
     @check_types
@@ -272,7 +294,7 @@ class Deformer:
             Sensitivities of a function with respect to all points, such as those of an adjoint
             solver: the result is its gradient with respect to the displacement of the moving nodes.
         """
-        _, start, end = self._taped(displacement)
+        start, end = self._taped(displacement)
         adjoint = self._shaped(weights, self.mesh.points.shape, "weights")
         return np.array(start.tape.pull(end, adjoint, start))
 
@@ -303,8 +325,8 @@ class Deformer:
         design = self.displacement if displacement is None else displacement
         if name not in CONSTRAINTS:
             raise CaseError(f"constraint: {not_one_of(name, CONSTRAINTS)}")
-        states, start, end = self._taped(design)
-        mesh = self.mesh.with_points(value(states[-1].points))
+        start, end = self._taped(design)
+        mesh = self.mesh.with_points(value(end))
         if name == "margin":
             margin = smooth_margin(mesh, self.mesh, p)
             return Constraint(margin.value, margin.of_points, start, end)
@@ -329,7 +351,14 @@ class Deformer:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.
 
         None where a system is nearly singular: the deformer solves it with more digits than a run.
+        Of several zones, nodes that follow others are equal to them up to rounding.
         """
+        if self._zones:
+            runs = ((zone.number, zone.deformer.as_run()) for zone in self._zones)
+            known = {number: points for number, points in runs if points is not None}
+            if len(known) < len(self._zones):
+                return None
+            return value(self._joined(lambda zone: known[zone.number]))
         return self._as_run
 
     @check_types
@@ -410,15 +439,27 @@ class Deformer:
             self._checks.require_alike(points)
         return np.stack([errors, np.broadcast_to(state.error_estimate, errors.shape)])
 
-    def _taped(self, displacement: FloatArray) -> tuple[list[StepState], Variable, Variable]:
-        """Return the states of a design (m, d), and its input and points as variables of a tape."""
+    def _joined(self, points_of: Callable[[ZoneDesign], Array]) -> Array:
+        """Return the points (..., n, d) of all zones; those of a zone that stays are undeformed."""
+        out: Array = self.mesh.points
+        for zone in self._zones:
+            out = put(out, zone.points, points_of(zone))
+        return out
+
+    def _points(self, design: Array) -> Array:
+        """Return the points (n, d) of a design (m, d)."""
+        if self._zones:
+            return self._joined(lambda zone: zone.deformer._points(zone.of(design)))
+        return self._run(self._input.target(design))[-1].points
+
+    def _taped(self, displacement: FloatArray) -> tuple[Variable, Variable]:
+        """Return a design (m, d) and its points as variables of a tape."""
         design = self._shaped(displacement, self.displacement.shape, "displacement")
         if design.ndim == 3:
             raise CaseError(
                 "derivatives are taken at one displacement; call it for each of several"
             )
         start = Tape().variable(design)
-        states = self._run(self._input.target(start))
-        end = states[-1].points
+        end = self._points(start)
         assert isinstance(end, Variable)
-        return states, start, end
+        return start, end

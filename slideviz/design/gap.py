@@ -24,6 +24,7 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.surfaces import find_surfaces
+from slideviz.mesh.zones import require_one_zone
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
 from slideviz.sections.cut import transformed
@@ -120,6 +121,7 @@ def gaps(
     >>> round(throat.distance, 3)
     0.008
     """
+    require_one_zone(mesh, "a gap")
     return tuple(_Measure(case, without_halo(mesh)[0], np.asarray(places, float)).all(between))
 
 

@@ -22,6 +22,7 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.quality import quality
+from slideviz.mesh.zones import require_one_zone
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
 
@@ -140,11 +141,7 @@ def _repeated(
     case: Case, mesh: Mesh, passages: int | Literal["all"]
 ) -> tuple[Mesh, tuple[Pair, ...], int]:
     """Return the passage without halo, its periodic sides, and the number of its copies."""
-    if mesh.zone_parts:
-        raise CaseError(
-            f"{mesh.name}: has {mesh.zones} zones, and each makes a wheel of its own; choose one "
-            "with ZONE= in a case, or --zone"
-        )
+    require_one_zone(mesh, "a wheel")
     names = case.markers_with("periodic")
     if not names:
         raise CaseError("the case has no periodic boundaries; passages are merged at these")

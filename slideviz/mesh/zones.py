@@ -120,6 +120,15 @@ def marker_zones(mesh: Mesh) -> list[int]:
     ]
 
 
+def require_one_zone(mesh: Mesh, what: str) -> None:
+    """Raise MeshError if a mesh has several zones; ``what`` is of one, for the message."""
+    if mesh.zone_parts:
+        raise MeshError(
+            f"{mesh.name}: has {mesh.zones} zones, but {what} is of one; choose it with ZONE= in a "
+            "case, or --zone"
+        )
+
+
 def spellings(mesh: Mesh) -> Mapping[str, str]:
     """Return the names of the boundaries by all that may be written for them, as ``1:blade``."""
     out: dict[str, str] = {}

@@ -22,6 +22,7 @@ from slideviz.errors import CaseError
 from slideviz.machine.span import SpanCurves, find_span
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.zones import require_one_zone
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
 from slideviz.sections.shape import Label
 
@@ -246,6 +247,7 @@ def find_walls(
             f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant span "
             "need an axis about which they turn: set PERIODIC_TYPE= rotational and PERIODIC_AXIS"
         )
+    require_one_zone(mesh, "a span")
     hub, shroud = between or span_ends(case, mesh)
     axis, origin = about or ((case.axis, case.origin) if pair is None else (pair.axis, pair.origin))
     period = 2.0 * np.pi if pair is None else pair.period

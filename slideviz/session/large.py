@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.formats.su2b.layout import open_zone
+from slideviz.formats.su2b.layout import BinaryFile, find_zone, find_zones
 from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import QualityTotals, quality
@@ -33,9 +33,11 @@ def is_large(path: Path, zone: int | None) -> bool:
     """
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
-    with open_zone(path, zone) as (_, place):
-        cells = place.cells.count
-    if place.dim == 2:  # all of its cells are what is drawn
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        places = find_zones(source) if zone is None else (find_zone(source, zone),)
+    cells = sum(place.cells.count for place in places)
+    if places[0].dim == 2:  # all of its cells are what is drawn
         return False
     return cells > LARGE_CELLS or NEEDED["su2b"] * path.stat().st_size > free_memory()
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.boxes import box_definition, boxes_for
-from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
+from slideviz.case.displacement import Displacements, parse_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import (
     Bump,
@@ -32,7 +32,13 @@ from slideviz.case.model import (
     applies_to,
     named,
 )
-from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
+from slideviz.case.motion import (
+    displacements,
+    key_of,
+    moved_together,
+    placed_displacements,
+    read_file,
+)
 from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -361,9 +367,9 @@ class Ghosts:
             return None
         if key not in self._files:
             wanted = np.unique(np.concatenate([on[name] for name in names]))
-            shape, of = self.mesh.points.shape, f"boundaries {', '.join(names)}"
+            of = f"boundaries {', '.join(names)}"
             try:
-                self._files[key] = read_displacements(motion.path, wanted, shape, of)
+                self._files[key] = read_file(motion.path, self.mesh, wanted, of)
             except SlidevizError:
                 self._files[key] = None
         return self._files[key]

@@ -15,6 +15,7 @@ from slideviz.case.model import Case
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.zones import require_one_zone
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, hold_on_axis
@@ -233,8 +234,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
     motions.
     """
-    if mesh.zone_parts:
-        raise CaseError(f"{mesh.name}: has {mesh.zones} zones; choose one with ZONE=")
+    require_one_zone(mesh, "a setup")
     require_valid(case, mesh)
     domain = find_domain(case, mesh)
     return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved))

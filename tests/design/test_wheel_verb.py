@@ -58,7 +58,7 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
     path = tmp_path / "wheel.su2"
     with pytest.raises(CaseError, match="no periodic boundaries; passages are merged at these"):
         sv.wheel(path, sv.Case(), square(4))
-    with pytest.raises(CaseError, match="has 2 zones, and each makes a wheel of its own; choose"):
+    with pytest.raises(MeshError, match="has 2 zones, but a wheel is of one; choose it with ZONE="):
         sv.wheel(path, sv.Case(), join_zones([square(4), square(6)]))
     with pytest.raises(MeshError, match="do not match: with the best rotational"):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "x_p": "periodic"}), square(4))

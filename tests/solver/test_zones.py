@@ -9,7 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run as command
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.zones import zones_of
 from slideviz.session.opening import guess_roles
@@ -189,7 +189,7 @@ def test_a_stream_takes_one_zone(tmp_path, capsys):
 def test_a_setup_is_of_one_zone(tmp_path):
     from slideviz.solver.setup import make_setup
 
-    with pytest.raises(CaseError, match=r"stage\.su2: has 2 zones; choose one with ZONE="):
+    with pytest.raises(MeshError, match=r"stage\.su2: has 2 zones, but a setup is of one; choose"):
         make_setup(both(), sv.read(stage(tmp_path)))
 
 
