@@ -7,12 +7,13 @@ the wall nodes i near it (at X_i, displaced by d_i, turned by M_i) would carry i
     u = sum_i w_i (d_i + (M_i - 1)(X - X_i)),    w_i ~ s_i |X - X_i|^-6,    sum_i w_i = 1
     x <- x + b (X + u - x),                      b = 1 - smooth((distance - h) / delta)
 
-where h is the height of the wall's first layer, smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the
-`NEAREST` nodes of the wall that see the node: s_i rises from 0 to 1 with the cosine of the angle
-between the wall's normal and X - X_i, so that the two sides of a thin body do not mix. Of several
-walls k, j whose zones overlap each has the weight b / distance^6, 1 - b is the product of theirs,
-and b_k is (1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap thinner than
-the zones the nodes between are left to the radial functions.
+where h is the height of the first layer at the nearest wall node,
+smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the `NEAREST` nodes of the wall that see the node:
+s_i rises from 0 to 1 with the cosine of the angle between the wall's normal and X - X_i, so that
+the two sides of a thin body do not mix. Of several walls k, j whose zones overlap each has the
+weight b / distance^6, 1 - b is the product of theirs, and b_k is
+(1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap thinner than the zones the
+nodes between are left to the radial functions.
 All of this is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
 the map of the directions of the facets at the wall node (lines in 2D, normals and edges in 3D).
 """
@@ -57,6 +58,8 @@ if TYPE_CHECKING:
 
 NEAREST = 12  # wall nodes that carry a node
 
+ALIKE = 4  # wall nodes that may be nearest, at one distance, as the corners of a facet
+
 CANDIDATES = 2 * NEAREST  # nearest wall nodes among which those that see the node are looked for
 
 POWER = 6
@@ -84,10 +87,9 @@ class Wall:
 
     names: tuple[str, ...]  # the boundaries that it consists of
     facets: IntArray  # (f, 2 or 4): its facets, nodes ordered so that normals point out of the mesh
-    thickness: float
-    first: float
-    """`thickness`, `first`: of its zone, and of the first layer of cells, which is wholly in it, in
-    the mesh's length unit."""
+    thickness: float  # of its zone, in the mesh's length unit
+    first: FloatArray
+    """(w,): at its nodes, ascending, the height of the first layer, which is wholly in the zone."""
     moves: bool  # whether its nodes are moving ones; others stay
 
 
@@ -211,20 +213,26 @@ class WallNodes:
     def _reached(self, k: int, targets: FloatArray) -> Reached:
         """Return the points (m, d) in the zone of wall k; weights without shares."""
         wall, (tree, closest) = self.walls[k][0], self._trees[k]
-        limit, near = wall.first + wall.thickness, np.zeros(len(targets), bool)
+        images, count = tree.n // len(wall.first), min(ALIKE, tree.n)
+        heights, height = np.append(np.tile(wall.first, images), 0.0), np.full(len(targets), -1.0)
         size = np.linalg.norm(np.ptp(closest.corners, axis=1), axis=1).max(initial=0.0)
-        reach = float(np.hypot(limit, CORNER * size))
+        reach = float(np.hypot(heights.max() + wall.thickness, CORNER * size))
 
         def find(part: slice) -> None:
-            near[part] = np.isfinite(tree.query(targets[part], distance_upper_bound=reach)[0])
+            found = tree.query(targets[part], k=count, distance_upper_bound=reach)
+            gap, index = (np.reshape(x, (-1, count)) for x in found)
+            alike = gap <= (1.0 + 1e-9) * gap[:, :1]
+            highest = np.where(alike, heights[index], 0.0).max(axis=1)
+            height[part] = np.where(np.isfinite(gap[:, 0]), highest, -1.0)
 
         in_parts(find, len(targets))
-        some = np.flatnonzero(near)
+        some = np.flatnonzero(height >= 0.0)
         gap = np.linalg.norm(closest.query(targets[some]) - targets[some], axis=1)
-        some, gap = some[gap < limit], gap[gap < limit]
-        share = 1.0 - smooth((gap - wall.first) / wall.thickness)
-        least = max(1e-9 * limit, TINY)
-        gap = np.maximum(gap, least)
+        inside = gap < height[some] + wall.thickness
+        some, gap = some[inside], gap[inside]
+        share = 1.0 - smooth((gap - height[some]) / wall.thickness)
+        limit = height[some] + wall.thickness
+        gap = np.maximum(gap, np.maximum(1e-9 * limit, TINY))
         return some, gap, share, (limit / gap) ** POWER
 
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -11,12 +11,13 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import facet_vectors
-from slideviz.mesh.walls import find_columns
+from slideviz.mesh.walls import Columns, find_columns
 from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
 from slideviz.solver.domain import Domain
 
+STEEP = 3.0  # largest first height that is kept, over the median of the wall
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
@@ -39,8 +40,9 @@ def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> Layer
 
 
 def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
-    boundary, points = domain.boundary, mesh.points
-    height = find_columns(mesh, 1).stack_thickness(points)
+    boundary, points, columns = domain.boundary, mesh.points, find_columns(mesh, 1)
+    height, edges = columns.stack_thickness(points), points[columns.nodes]
+    rise = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
     length = size if mesh.dim == 2 else np.sqrt(size / 2)
     walls = []
@@ -66,8 +68,26 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
                     boundary.facets[some],
                     min(case.layer_thickness, mesh.extent)
                     or min(SIZE * float(extent), float(thickness)),
-                    float(np.median(height[flat])) if len(flat) else 0.0,
+                    _first_heights(columns, rise, some, height[flat]),
                     role == "moving",
                 )
             )
     return walls
+
+
+def _first_heights(
+    columns: Columns, rise: FloatArray, some: IntArray, flat: FloatArray
+) -> FloatArray:
+    """Return the heights (w,) of the first layer at the nodes of facets ``some``, ascending.
+
+    Those of the columns there, whose first edges are ``rise`` (c,) long, but at most `STEEP` times
+    the median of ``flat``, the heights of flat cells; this median where there are no columns, and 0
+    where no cell is flat.
+    """
+    facets = columns.boundary.facets[some]
+    nodes, usual = np.unique(facets), float(np.median(flat)) if len(flat) else 0.0
+    first = np.zeros(len(nodes))
+    column = np.unique(columns.corner[some])
+    column = column[column < len(rise)]
+    np.maximum.at(first, np.searchsorted(nodes, columns.nodes[column, 0]), rise[column])
+    return np.where(first > 0.0, np.minimum(first, STEEP * usual), usual)

@@ -18,16 +18,19 @@ pytestmark = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarnin
 
 
 def around(shape, rings, count, first=1e-4, far=20.0):
-    """An O-mesh of quadrilaterals about a closed curve; ``shape`` maps angles to points."""
+    """An O-mesh of quadrilaterals about a closed curve; ``shape`` maps angles to points.
+
+    ``first``: the height of the first layer, or the heights (count,).
+    """
     angle = np.arange(count) * 2 * np.pi / count
     wall = shape(angle)
     ring = 10.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     along = np.roll(wall, -1, axis=0) - np.roll(wall, 1, axis=0)
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    height = first * (1.2 ** np.arange(rings) - 1.0) / 0.2
-    straight = wall + height[:, None, None] * normal
-    part = np.clip((height / height[-1])[:, None, None], 0.0, 1.0) ** 2
+    height = np.multiply.outer((1.2 ** np.arange(rings) - 1.0) / 0.2, np.full(count, first))
+    straight = wall + height[:, :, None] * normal
+    part = np.clip(height / height[-1], 0.0, 1.0)[:, :, None] ** 2
     points = ((1 - part) * straight + part * ring).reshape(-1, 2)
     node = np.arange(rings * count).reshape(rings, count)
     near, beyond = np.roll(node, -1, axis=1)[:-1], np.roll(node, -1, axis=1)[1:]
@@ -79,6 +82,15 @@ def test_first_heights_and_angles_stay(shape, motion):
         assert walls["first_height"]["ratio"]["max"] < 1.001
         assert walls["angle"]["change"]["max"] < 0.5
         assert sv.quality(last.mesh, mesh).inverted == 0
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_first_heights_that_differ_along_the_wall_stay(motion):
+    first = 8e-3 * (1.5 + np.cos(np.arange(160) * np.pi / 80))
+    mesh = around(ellipse, 22, 160, first=first)
+    _, last = deformed(mesh, MOTIONS[motion])
+    ratio = sv.walls(last.mesh, mesh).summary()["w"]["first_height"]["ratio"]
+    assert 0.99 < ratio["min"] <= ratio["max"] < 1.01
 
 
 def test_a_wall_that_only_turns_takes_its_zone_along_exactly():
