@@ -208,7 +208,8 @@ def repaired(window: MainWindow, place: Path) -> None:
     _open(window, _stator(place))
     _run(window, sliding="none", periodic="none", repair="no")
     _run(window, repair="auto")
-    _near_hub(window, 1, 5.0)
+    _near_hub(window, 1, 1.06)
+    window.store.change(changes.set_view, repaired=True)
 
 
 def dark(window: MainWindow, place: Path) -> None:

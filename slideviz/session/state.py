@@ -113,8 +113,9 @@ IN_FILE = (
 )
 """The message where something cannot be done with a mesh too large for memory."""
 
-PanelPlace = Literal["open", "boundaries", "motion", "method"]
-"""The panel where a requirement of a run is met; "open" is the dialog that opens a file."""
+PanelPlace = Literal["open", "boundaries", "motion", "method", "curves"]
+"""The panel where a requirement of a run is met, or that has more about its end; "open" is the
+dialog that opens a file."""
 
 
 @dataclass(frozen=True)

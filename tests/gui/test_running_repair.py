@@ -7,6 +7,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.gui.commands import COMMANDS
+from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.widgets.command import CommandState
 from slideviz.session import changes
 from tests import builders
@@ -25,6 +26,10 @@ def test_a_folded_run_is_mended_by_the_button_of_its_message(driver, window, tmp
     driver.settle()
     first = driver.session.run_shown
     assert first.last.quality.inverted
+    window.run_panel.text.linkActivated.emit("reach")
+    driver.settle()
+    assert window.dock_manager.panel(CurvesPanel).kind.currentData() == "reach"
+    assert not window.dock_manager.panel(CurvesPanel).area.shows_text
     assert COMMANDS["repair"].enabled(CommandState(driver.session))
     window.banner.answers["Repair"].click()
     driver.settle()

@@ -815,7 +815,7 @@ def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(rea
     assert "24 nodes are no control nodes" in describe_run(ready.session.runs[-1])
     text = ready.window.run_panel.text
     assert DONE in text.text()
-    assert text.text().endswith(" times as far. <a href='notes'>1 note</a>")
+    assert text.text().endswith(" times as far.</a> <a href='notes'>1 note</a>")
     assert "24 nodes are no control nodes" in text.toolTip()
     text.linkActivated.emit("notes")
     assert ready.window.banner.text.text() == f"Note: {note}"
