@@ -212,6 +212,26 @@ def repaired(window: MainWindow, place: Path) -> None:
     window.store.change(changes.set_view, repaired=True)
 
 
+def zones(window: MainWindow, place: Path) -> None:
+    """Show two rows of blades, with pitches of their own, as the zones of one file."""
+    import slideviz as sv
+
+    write_sample("passage", place / "row", 24)
+    first = place / "row" / "mesh.su2"
+    row, case = sv.read(first), Case.read(place / "row" / "passage.cfg")
+    low, high = row.bounds
+    second = place / "second.su2"
+    sv.write(second, row.with_points(row.points * [1.0, 0.75] + [high[0] - low[0], 0.0]))
+    texts = "".join(f"IZONE= {k}\n{one.read_text()}" for k, one in enumerate((first, second), 1))
+    (place / "stage.su2").write_text(f"NZONE= 2\n{texts}")
+    roles = {f"{k}:{name}": role for k in (1, 2) for name, role in case.roles.items()}
+    turns = (Rotate("1:airfoil", -8.0), Rotate("2:airfoil", 6.0))
+    case = case.change(mesh_file=place / "stage.su2", roles=roles, motions=turns)
+    case.write(place / "stage.cfg")
+    _open(window, place / "stage.cfg")
+    _run(window)
+
+
 def dark(window: MainWindow, place: Path) -> None:
     """Show a run of the 2D passage and its curves, in the dark theme."""
     window.set_theme("dark")
@@ -231,6 +251,7 @@ STATES = (
     ShotState("section", section),
     ShotState("side-by-side", beside),
     ShotState("repaired", repaired),
+    ShotState("zones", zones),
     ShotState("dark", dark),
 )
 

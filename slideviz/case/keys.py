@@ -181,7 +181,11 @@ _ROWS = (
         "SU2's text or binary, whatever the ending of the file.",
     ),
     setting(
-        "ZONE", FILES, integer(1), "zone", "The zone to deform, from 1, of a mesh with several."
+        "ZONE",
+        FILES,
+        integer(1),
+        "zone",
+        "The zone to deform alone, from 1, of a mesh with several; without it all.",
     ),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
     role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay, as do those in no list."),
