@@ -208,8 +208,7 @@ def repaired(window: MainWindow, place: Path) -> None:
     _open(window, _stator(place))
     _run(window, sliding="none", periodic="none", repair="no")
     _run(window, repair="auto")
-    _near_hub(window, 1, 1.06)
-    window.store.change(changes.set_view, repaired=True)
+    _near_hub(window, 1, 2.0)
 
 
 def zones(window: MainWindow, place: Path) -> None:
