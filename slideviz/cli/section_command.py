@@ -55,11 +55,17 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         where.add_argument(
             f"--{name}", type=section_reader(row), dest="asked", metavar=metavar, help=row.option
         )
+    where.add_argument(
+        "--meridional",
+        action="store_true",
+        help="instead of a section: the mean quality of the cells around the axis, by z and r",
+    )
     add(
         "--between",
         type=pair_of_names,
         metavar="HUB,SHROUD",
-        help="the walls of --span; by default those of the case, or by their names",
+        help="the walls of --span and --meridional; by default those of the case, or by their "
+        "names",
     )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(
@@ -130,6 +136,8 @@ def section(arguments: argparse.Namespace) -> int:
     require_output_paths(
         arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
     )
+    if arguments.meridional:
+        return _meridional(arguments, case)
     scene = _scene(arguments, case)
     style = SectionStyle(
         size=arguments.size or SectionStyle.size,
@@ -212,14 +220,71 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
     return INVERTED if summary["inverted"] else DONE
 
 
+def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
+    """Draw the meridional view of a mesh to a file; return the exit code."""
+    import numpy as np
+
+    from slideviz.cli.mesh_source import open_mesh
+    from slideviz.cli.report import save_json
+    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.plots.figure_io import empty_figure, write_figure
+    from slideviz.plots.meridional import draw_meridional, meridional_bins
+    from slideviz.plots.section_paint import paint
+    from slideviz.sections.span import find_walls
+    from slideviz.session.passages import find_period
+
+    with open_mesh(arguments, case) as opened:
+        mesh, reference = opened.source.mesh, opened.reference
+        base, quality = opened.read_base(), opened.quality(arguments)
+    undeformed = base or mesh
+    walls = find_walls(undeformed, case, find_period(undeformed, case), arguments.between)
+    painted = paint(mesh, quality, arguments.color, base)
+    painted = painted.within(*arguments.range) if arguments.range else painted
+    bins = meridional_bins(undeformed, walls)
+    means = bins.means(np.where(painted.inverted, 0.0, painted.values))
+    wide, high = arguments.size or (1600, 1000)
+    figure = empty_figure((8.0, 8.0 * high / wide), wide / 8.0, "constrained")
+    label = f"mean {QUANTITIES[painted.label].axis}"
+    draw_meridional(figure, bins, means, label, painted.limits, color_map=arguments.map)
+    if not arguments.axes:
+        figure.axes[0].set_axis_off()
+    summary = painted.summary(np.arange(len(mesh.cells)))
+    name = Path(mesh.name).name
+    facts = f"{painted.label}: {painted.worst} {summary[painted.worst]:.4g}, "
+    facts += f"mean {summary['mean']:.4g}; {summary['cells']:,} cells"
+    if arguments.title:
+        figure.suptitle(f"{name}: from {walls.hub} to {walls.shroud}\n{facts}", fontsize=10.0)
+    write_figure(figure, arguments.output, figure.dpi)
+    report: dict[str, Any] = {
+        "mesh": mesh.name,
+        "between": [walls.hub, walls.shroud],
+        "color": painted.label,
+        "reference": str(reference) if reference else None,
+        "picture": str(arguments.output),
+        "places": bins.places.tolist(),
+        "means": [[None if np.isnan(x) else x for x in row] for row in means.tolist()],
+        **summary,
+    }
+    if not save_json(arguments.json, report):
+        print(f"{name}: from {walls.hub} to {walls.shroud}\n  {facts}")
+        print(f"  {reference_words(reference)}\n  {arguments.output}")
+    return INVERTED if summary["inverted"] else DONE
+
+
 def _check_usage(arguments: argparse.Namespace) -> None:
     if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
+    if arguments.meridional:
+        for option in ("stream", "copies", "unrolled", "in_space", "whole"):
+            if getattr(arguments, option):
+                name = "3d" if option == "in_space" else option
+                arguments.wrong_usage(f"--meridional shows no section, so leave out --{name}")
+        return
     if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":
         able = (f"--{name}" for name, row in SECTION_SHAPES.items() if row.flat == "unrolled")
         arguments.wrong_usage(f"--unrolled is for a {' or '.join(able)}; a plane is flat already")
     if arguments.between and arguments.asked.section.kind != "span":
-        arguments.wrong_usage("--between names the walls of --span, which is not given")
+        arguments.wrong_usage("--between names the walls of --span and --meridional; give one")
 
 
 def _section_and_passages(

@@ -311,6 +311,10 @@ class SpanCurves:
             m_prime = m_prime + gap / self._value(span, m_prime, 2, 1)
         return m_prime
 
+    def traced(self, plane: FloatArray) -> FloatArray:
+        """Return z and r (n, 2) of (m', theta, span), (n, 3), on the spline: beyond walls, too."""
+        return self._at(plane[:, 2], plane[:, 0], 0)
+
     def coords(self, plane: FloatArray) -> FloatArray:
         """Return meridional coordinates (n, 3) of (m', theta, span), (n, 3)."""
         return self.coords_and_slopes(plane)[0]

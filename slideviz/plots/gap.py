@@ -39,5 +39,5 @@ def draw_gaps(
                 *[[at] for at in (place if by_span else place[::-1])], "o", ms=4, color=look.color
             )
             ends.append(gap.distance)
-        axes.locator_params(axis="x", nbins=5)
+        axes.locator_params(axis="x", nbins=4)
         add_legend(axes, style, loc="best")

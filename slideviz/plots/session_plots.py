@@ -10,17 +10,22 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.motion_words import deformation
+from slideviz.design.gap import Gap, gaps
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE, INVERTED
+from slideviz.plots.gap import Measured
 from slideviz.plots.histogram import draw_distribution
+from slideviz.plots.meridional import MeridionalBins, draw_meridional, meridional_bins
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
-from slideviz.plots.spanwise import Profile, along, along_radius
+from slideviz.plots.spanwise import Profile, along, along_radius, along_span
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
+from slideviz.sections.span import SpanWalls, find_walls
 from slideviz.session.changes import show_frame
+from slideviz.session.passages import find_period
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.terms import (
@@ -37,7 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Coordinate = Literal["r", "x", "y", "z"]
+Coordinate = Literal["r", "x", "y", "z", "span"]
 
 UNDEFORMED = 4  # series number of the undeformed mesh, which no run has
 
@@ -117,12 +122,16 @@ class Profiles:
         case, mesh = session.case, session.mesh
         assert mesh is not None
         label = "undeformed" if run is None else run.label
-        key = coordinate, case.axis, case.origin, label
+        key = coordinate, case.axis, case.origin, case.span, label
         cache = self._made.setdefault(frame, {})
         if key not in cache:
             # In layers of the undeformed mesh, so that layers of cells stay together.
             values = frame.quality.values
-            if coordinate == "r":
+            if coordinate == "span":
+                field = walls_in(session).curves.field
+                span = field.span(field.meridional(mesh.points))[0]
+                made = along_span(mesh, values, span, label=label)
+            elif coordinate == "r":
                 made = along_radius(mesh, values, case.axis, case.origin, label=label)
             else:
                 made = along(mesh, values, coordinate, label=label)
@@ -134,7 +143,8 @@ def coordinates(session: Session) -> dict[Coordinate, str]:
     """Return in words the coordinates that curves along the span can have; no z in 2D."""
     if session.mesh is None or session.mesh.dim == 2:
         return {"y": "along y", "x": "along x", "r": "along the radius"}
-    return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
+    words: dict[Coordinate, str] = {"r": "along the radius", "span": "from hub to shroud"}
+    return words | {"z": "along z", "y": "along y", "x": "along x"}
 
 
 def usual_coordinate(session: Session) -> Coordinate:
@@ -146,6 +156,57 @@ def usual_coordinate(session: Session) -> Coordinate:
         return "r"
     extent = np.ptp(session.mesh.points, axis=0)
     return "y" if session.mesh.dim == 2 else ("x", "y", "z")[int(extent.argmax())]
+
+
+def walls_in(session: Session) -> SpanWalls:
+    """Return hub and shroud of a session; CaseError or MeshError if there are none."""
+    mesh, case = session.mesh, session.case
+    assert mesh is not None
+    return find_walls(mesh, case, find_period(mesh, case, session.pairs))
+
+
+_BINS: WeakKeyDictionary[SpanWalls, MeridionalBins] = WeakKeyDictionary()
+_GAPS: WeakKeyDictionary[StepFrame, dict[object, tuple[Gap, ...]]] = WeakKeyDictionary()
+"""Caches of `draw_meridional_view` and of `gaps_of`."""
+
+
+def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None:
+    """Draw the mean of the quantity of the colors by meridional place, in the view's colors.
+
+    Raises CaseError or MeshError if there is no hub and shroud.
+    """
+    frame, mesh, walls = session.frame, session.mesh, walls_in(session)
+    assert frame is not None
+    assert mesh is not None
+    if walls not in _BINS:
+        _BINS[walls] = meridional_bins(mesh, walls)
+    what = quantity_drawn(session)
+    limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
+    means = _BINS[walls].means(frame.shown_values(what, mesh))
+    label, color_map = f"mean {QUANTITIES[what].axis}", session.view.color_map
+    draw_meridional(figure, _BINS[walls], means, label, limits, color_map=color_map, style=style)
+
+
+def gaps_of(session: Session) -> list[Measured]:
+    """Return throat and gaps of the undeformed mesh and of the shown step; cached with these.
+
+    Raises CaseError or MeshError if they cannot be measured.
+    """
+    case, run = session.case, session.run_shown
+    key = tuple(case.roles.items()), case.span, case.axis, case.origin, case.periodic_type
+    measured: list[Measured] = []
+    for frame in dict.fromkeys((session.first, session.frame)):
+        if frame is None:
+            continue
+        cache = _GAPS.setdefault(frame, {})
+        if key not in cache:
+            cache[key] = gaps(case, frame.mesh)
+        first = frame is session.first or run is None
+        label, series = (
+            ("undeformed", UNDEFORMED) if first or run is None else (run.label, series_of(run))
+        )
+        measured.append((label, series, cache[key]))
+    return measured
 
 
 class CurveRows:

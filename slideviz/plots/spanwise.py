@@ -30,7 +30,8 @@ class Profile:
     label: str
     """Name of the run."""
     coordinate: str
-    """The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, or ``s`` for another direction."""
+    """The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, ``span``, or ``s`` for another
+    direction."""
     edges: FloatArray
     """(k + 1,): borders of the layers, in the mesh's length unit."""
     minimum: FloatArray
@@ -97,6 +98,16 @@ def along(
     return _profile(
         mesh, values, mesh.points @ axis / length, coordinate=name, layers=layers, label=label
     )
+
+
+def along_span(
+    mesh: Mesh, values: FloatArray, span: FloatArray, layers: int | None = None, label: str = ""
+) -> Profile:
+    """Return the quality in layers of equal span; as `along_radius`. ``span`` (n,): of each node.
+
+    Raises SlidevizError if there is not a value for each cell, or no layer.
+    """
+    return _profile(mesh, values, span, coordinate="span", layers=layers, label=label)
 
 
 def _profile(

@@ -45,9 +45,7 @@ class SpanWalls:
     @cached_property
     def lean(self) -> float:
         """The angle in radians between the curves and the axis, where m is 0 at mid-span."""
-        (z, r) = np.diff(
-            self.curves.coords(np.array([[-1e-3, 0, 0.5], [1e-3, 0, 0.5]]))[:, :2], axis=0
-        )[0]
+        (z, r) = np.diff(self.curves.traced(np.array([[-1e-3, 0, 0.5], [1e-3, 0, 0.5]])), axis=0)[0]
         return float(np.arctan2(r, z))
 
     @cached_property
@@ -200,7 +198,8 @@ class ConstantSpan(AboutAxis):
         curves = walls_of(section).curves
         span = np.full(len(places), size)
         plane = np.column_stack([curves.at_length(places[:, 1], span), places[:, 0], span])
-        return curves.field.points(curves.coords(plane))
+        # The spline, not `SpanCurves.coords`: a frame goes beyond the rims of the walls.
+        return curves.field.points(np.column_stack([curves.traced(plane), plane[:, 1]]))
 
     def lean(self, section: Section) -> float:
         return walls_of(section).lean

@@ -1,4 +1,4 @@
-"""The curves: quality by step and by fraction of the motion, convergence, quality by span."""
+"""The curves: quality by step, by fraction of the motion and by span, convergence, gaps."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
+from slideviz.plots.gap import draw_gaps
 from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
@@ -37,6 +38,8 @@ KINDS = {
     "reach": "How far may I go",
     "greedy": "Convergence",
     "span": "Along the span",
+    "meridional": "Meridional view",
+    "gaps": "Throat and gaps",
 }
 """The plots that can be chosen."""
 
@@ -46,6 +49,8 @@ TIPS = {
     "are proved valid. Drag to scale the motion.",
     "greedy": "Largest error against control nodes, as the greedy selection adds them.",
     "span": "Quality in layers from hub to shroud, or along an axis.",
+    "meridional": "Mean of the cells around the axis, by their place in the plane of z and r.",
+    "gaps": "Smallest distance between neighbouring blades by span, and between blades and walls.",
 }
 WHAT = {"minimum": "minimum", "mean": "mean"}
 
@@ -94,7 +99,7 @@ class CurveCanvas(PlotCanvas):
 
 
 class CurvesPanel(Panel):
-    """The panel with one of three plots: quality by step, convergence, quality along the span."""
+    """The panel with one of the plots of `KINDS`."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -145,7 +150,7 @@ class CurvesPanel(Panel):
         missing = self._missing(session, kind)
         self.kind.setToolTip(TIPS[kind])
         self.span_row.setVisible(kind == "span" and not missing)
-        self.whole.setVisible(kind != "greedy" and not missing)
+        self.whole.setVisible(kind in ("steps", "reach", "span") and not missing)
         self.save.setEnabled(not missing)
         run = session.run_shown
         self.canvas.draggable = kind == "reach" and run is not None and can_scale(run.case.motions)
@@ -169,7 +174,7 @@ class CurvesPanel(Panel):
         """Return why the session has no plot of a kind; an empty text if it has one."""
         if session.mesh is None:
             return "Open a mesh first. Then this panel shows the curves of its runs."
-        if kind in ("span", "reach") and session.in_file:
+        if kind in ("span", "reach", "meridional", "gaps") and session.in_file:
             return IN_FILE
         if kind == "reach" and reach_run(session) is None:
             return "Run the case to see how far its motion may go."
@@ -198,9 +203,13 @@ class CurvesPanel(Panel):
             return partial(draw_steps, session, whole)
         if kind == "reach":
             return partial(draw_reach, session, whole)
+        if kind == "meridional":
+            return partial(draw_or_say, partial(curves.draw_meridional_view, session))
+        if kind == "gaps":
+            return partial(draw_or_say, partial(draw_measured, session))
         coordinate, what = self.coordinate.currentData(), self.what.currentData()
         find = partial(self._profiles.of, session, coordinate)
-        return partial(draw_span, find, coordinate, what, whole)
+        return partial(draw_or_say, partial(draw_span, find, coordinate, what, whole))
 
     # What the user does ----------------------------------------------------------------
     def _other_plot(self) -> None:
@@ -221,7 +230,9 @@ class CurvesPanel(Panel):
 
 def _shown(session: Session) -> object:
     case = session.case
-    return session.frame, session.runs, session.shown, case.axis, case.origin, case.motions
+    view = session.view.color_by, session.view.color_map, session.view.color_range
+    of_case = case.axis, case.origin, case.motions, case.span, case.roles
+    return session.frame, session.runs, session.shown, view, of_case
 
 
 def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
@@ -273,6 +284,35 @@ def draw_reach(session: Session, whole: bool, figure: Figure, style: Style) -> N
         )  # fmt: skip
 
 
+def draw_or_say(draw: Draw, figure: Figure, style: Style) -> None:
+    """Call ``draw(figure, style)``; if it raises SlidevizError, draw the text of that instead."""
+    try:
+        draw(figure, style)
+    except SlidevizError as error:
+        say(str(error), figure, style)
+
+
+def say(text: str, figure: Figure, style: Style) -> None:
+    """Draw a text in the middle of a figure, without axes to be seen."""
+    figure.add_subplot().set_axis_off()
+    figure.text(
+        0.5, 0.5, text, ha="center", va="center", wrap=True,
+        fontsize=style.size, color=style.scheme.text,
+    )  # fmt: skip
+
+
+def draw_measured(session: Session, figure: Figure, style: Style) -> None:
+    """Draw throat and gaps of the undeformed mesh and of the shown step; as text without span."""
+    measured = curves.gaps_of(session)
+    if any(gap.along for gap in measured[0][2]):
+        draw_gaps(figure, measured, style)
+        return
+    lines = [
+        f"{label}: {gap.words} {gap.distance:.6g}" for label, _, found in measured for gap in found
+    ]
+    say("\n".join(lines) or "There is one blade, which does not repeat.", figure, style)
+
+
 def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
     """Draw the greedy selection of the shown step: its error against control nodes."""
     axes, run = figure.add_subplot(), curves.greedy_run(session)
@@ -289,22 +329,12 @@ def draw_span(
     figure: Figure,
     style: Style,
 ) -> None:
-    """Draw the lowest or mean quality along a coordinate; if ``find`` fails, draw its error text.
-
-    ``find`` returns the profiles to draw.
-    """
+    """Draw the lowest or mean quality along a coordinate; ``find`` returns the profiles."""
+    profiles = find()
     axes = figure.add_subplot()
-    try:
-        profiles = find()
-    except SlidevizError as error:
-        axes.set_axis_off()
-        figure.text(
-            0.5, 0.5, str(error), ha="center", va="center", wrap=True,
-            fontsize=style.size, color=style.scheme.text,
-        )  # fmt: skip
-        return
     spanwise(axes, profiles, what, style=style)
-    axes.yaxis.label.set_text(f"{coordinate} before deformation [mesh units]")
+    unit = "-" if coordinate == "span" else "mesh units"
+    axes.yaxis.label.set_text(f"{coordinate} before deformation [{unit}]")
     if not whole:
         axes.set_xlim(close_limits(getattr(profile, what) for profile in profiles))
     add_legend(axes, style, loc="best")

@@ -1,0 +1,122 @@
+"""The meridional view of a passage: the mean of a quantity by place, in the plane of z and r.
+
+A place is a bin of span and of m'; all cells of the passage around the axis count in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.plots.style import PRINT, Style, style_axes
+from slideviz.sections.span import SpanWalls
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LARGE = 75.0  # bins are as large as this percentage of the cells, so that most bins have some
+MOST_BINS = 120  # most bins in each direction
+
+
+@dataclass(frozen=True, eq=False)
+class MeridionalBins:
+    """Cells by their meridional place: k bins from hub to shroud and l along the passage."""
+
+    places: FloatArray
+    """(k + 1, l + 1, 2): z and r of the corners of bins, in the mesh's length unit."""
+    bin_of: IntArray
+    """(m,): the bin of each cell, row by row."""
+    walls: tuple[str, str]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Return the numbers of bins, k and l."""
+        return self.places.shape[0] - 1, self.places.shape[1] - 1
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """Return the mean (k, l) of values (m,) of cells; NaN where no cell has a finite one."""
+        there = np.isfinite(values)
+        total, count = (
+            np.bincount(self.bin_of[there], weights, int(np.prod(self.shape)))
+            for weights in (values[there], None)
+        )
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(self.shape)
+
+
+def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
+    """Return the bins of the cells of a mesh; a cell is in that of the mean of its nodes.
+
+    Along the passage bins are equal parts of m' from its first to its last node at each span.
+    """
+    curves, cells = walls.curves, mesh.cells
+    used = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))[:, [2, 0]]
+    used[:, 0] = np.clip(used[:, 0], 0.0, 1.0)
+    k = _bins_of(mesh, used[:, 0])
+    row = np.minimum(used[:, 0] * k, k - 1).astype(np.int64)
+    ends = []
+    for order in (np.argsort(used[:, 1]), np.argsort(-used[:, 1])):
+        first = order[np.unique(row[order], return_index=True)[1]]  # the extreme of each row
+        ends.append(np.polyfit(used[first, 0], used[first, 1], min(2, len(first) - 1)))
+
+    low, high = (np.polyval(end, used[:, 0]) for end in ends)
+    used[:, 1] = np.clip((used[:, 1] - low) / np.maximum(high - low, 1e-300), 0.0, 1.0)
+    n = _bins_of(mesh, used[:, 1])
+    at = np.full((len(mesh.points), 2), np.nan)
+    at[cells.nodes] = used
+    middle = np.add.reduceat(at[cells.connectivity], cells.offsets[:-1])
+    middle /= np.diff(cells.offsets)[:, None]
+    at_row, at_column = np.minimum(middle * (k, n), (k - 1, n - 1)).astype(np.int64).T
+    span, share = np.meshgrid(np.linspace(0, 1, k + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    low, high = (np.polyval(end, span) for end in ends)
+    plane = np.stack([low + share * (high - low), 0.0 * span, span], axis=-1)
+    places = curves.traced(plane.reshape(-1, 3)).reshape(k + 1, n + 1, 2)
+    return MeridionalBins(places, at_row * n + at_column, (walls.hub, walls.shroud))
+
+
+def _bins_of(mesh: Mesh, used: FloatArray) -> int:
+    """Return the number of bins along a coordinate (u,) from 0 to 1 of the nodes of cells."""
+    at = np.empty(len(mesh.points))
+    at[mesh.cells.nodes] = used
+    corners, first = at[mesh.cells.connectivity], mesh.cells.offsets[:-1]
+    size = np.maximum.reduceat(corners, first) - np.minimum.reduceat(corners, first)
+    usual = float(np.percentile(size, LARGE))
+    return int(np.clip(1.0 / max(usual, 1e-9), 1, MOST_BINS))
+
+
+def draw_meridional(
+    figure: Figure,
+    bins: MeridionalBins,
+    means: FloatArray,
+    label: str,
+    limits: tuple[float, float],
+    *,
+    color_map: str = "viridis",
+    style: Style = PRINT,
+    unit: str = "mesh units",
+) -> None:
+    """Draw means (k, l) of bins by z and r, with a color bar; ``label`` names the quantity."""
+    axes: Any = figure.add_subplot()
+    style_axes(axes, style, f"z [{unit}]", f"r [{unit}]")
+    axes.grid(False)
+    z, r = bins.places[..., 0], bins.places[..., 1]
+    mesh = axes.pcolormesh(z, r, means, cmap=color_map, vmin=limits[0], vmax=limits[1])
+    mesh.set_rasterized(True)
+    for row, name in zip((0, -1), bins.walls, strict=True):
+        axes.plot(z[row], r[row], color=style.scheme.text, linewidth=style.width)
+        at, other = bins.places[[row, -1 - row], z.shape[1] // 2]
+        outwards = (at - other) / np.linalg.norm(at - other)
+        axes.annotate(
+            name, at, xytext=tuple(4.0 * outwards), textcoords="offset points",
+            ha=("right", "center", "left")[1 + int(np.sign(outwards[0].round(1)))],
+            va=("top", "center", "bottom")[1 + int(np.sign(outwards[1].round(1)))],
+            fontsize=style.size, color=style.scheme.text,
+        )  # fmt: skip
+    axes.locator_params(axis="x", nbins=4)
+    axes.set_aspect("equal", adjustable="datalim")
+    bar = figure.colorbar(mesh, ax=axes)
+    bar.set_label(label, fontsize=style.size, color=style.scheme.text)
+    bar.ax.tick_params(colors=style.scheme.text, labelsize=style.size)
+    bar.outline.set_edgecolor(style.scheme.edge)
