@@ -241,7 +241,7 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     painted = paint(mesh, quality, arguments.color, base)
     painted = painted.within(*arguments.range) if arguments.range else painted
     bins = meridional_bins(undeformed, walls)
-    means = bins.means(np.where(painted.inverted, 0.0, painted.values))
+    means = bins.means(painted.values)
     wide, high = arguments.size or (1600, 1000)
     figure = empty_figure((8.0, 8.0 * high / wide), wide / 8.0, "constrained")
     label = f"mean {QUANTITIES[painted.label].axis}"

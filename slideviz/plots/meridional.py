@@ -1,6 +1,6 @@
 """The meridional view of a passage: the mean of a quantity by place, in the plane of z and r.
 
-A place is a bin of span and of m'; all cells of the passage around the axis count in it.
+A place is a bin of span and of length along the passage, in which all cells around the axis count.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ class MeridionalBins:
 def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
     """Return the bins of the cells of a mesh; a cell is in that of the mean of its nodes.
 
-    Along the passage bins are equal parts of m' from its first to its last node at each span.
+    Along the passage bins are equal parts of the length from first to last node at each span.
     """
     curves, cells = walls.curves, mesh.cells
-    used = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))[:, [2, 0]]
-    used[:, 0] = np.clip(used[:, 0], 0.0, 1.0)
+    plane = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))
+    used = np.stack([np.clip(plane[:, 2], 0.0, 1.0), curves.length(plane)], axis=1)
     k = _bins_of(mesh, used[:, 0])
     row = np.minimum(used[:, 0] * k, k - 1).astype(np.int64)
     ends = []
@@ -71,8 +71,9 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
     at_row, at_column = np.minimum(middle * (k, n), (k - 1, n - 1)).astype(np.int64).T
     span, share = np.meshgrid(np.linspace(0, 1, k + 1), np.linspace(0, 1, n + 1), indexing="ij")
     low, high = (np.polyval(end, span) for end in ends)
-    plane = np.stack([low + share * (high - low), 0.0 * span, span], axis=-1)
-    places = curves.traced(plane.reshape(-1, 3)).reshape(k + 1, n + 1, 2)
+    m_prime = curves.at_length((low + share * (high - low)).ravel(), span.ravel())
+    plane = np.stack([m_prime, 0.0 * m_prime, span.ravel()], axis=1)
+    places = curves.traced(plane).reshape(k + 1, n + 1, 2)
     return MeridionalBins(places, at_row * n + at_column, (walls.hub, walls.shroud))
 
 
@@ -83,7 +84,7 @@ def _bins_of(mesh: Mesh, used: FloatArray) -> int:
     corners, first = at[mesh.cells.connectivity], mesh.cells.offsets[:-1]
     size = np.maximum.reduceat(corners, first) - np.minimum.reduceat(corners, first)
     usual = float(np.percentile(size, LARGE))
-    return int(np.clip(1.0 / max(usual, 1e-9), 1, MOST_BINS))
+    return int(np.clip(1.0 / max(usual, 1e-9) + 0.05, 1, MOST_BINS))
 
 
 def draw_meridional(

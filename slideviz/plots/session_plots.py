@@ -182,7 +182,7 @@ def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None
         _BINS[walls] = meridional_bins(mesh, walls)
     what = quantity_drawn(session)
     limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
-    means = _BINS[walls].means(frame.shown_values(what, mesh))
+    means = _BINS[walls].means(frame.values(what, mesh))
     label, color_map = f"mean {QUANTITIES[what].axis}", session.view.color_map
     draw_meridional(figure, _BINS[walls], means, label, limits, color_map=color_map, style=style)
 

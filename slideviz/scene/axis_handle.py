@@ -11,7 +11,14 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, axis_shape, patch_of
+from slideviz.sections.around_axis import (
+    TURN,
+    Patch,
+    PlaceOnSection,
+    Quadric,
+    axis_shape,
+    patch_of,
+)
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
@@ -20,6 +27,7 @@ PixelsOf = Callable[[FloatArray], FloatArray]
 
 _MARGIN = 0.015  # margin between a patch and the frame around it, relative to the patch's diagonal
 _CHORD = np.radians(1.0)  # angle between the points of an arc, in radians
+_SIDE = 33  # points of a side that is no straight line
 _STEEP = 0.3  # foreshortening of the size's direction below which the mouse cannot drag along it
 _LEAST = 1e-3
 """Least size after a drag, relative to that before; and distance from the largest size there is,
@@ -53,7 +61,9 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
         first, last = patch.angles[0], patch.angles[0] + TURN
     angle = np.linspace(first, last, int(np.ceil((last - first) / _CHORD)) + 2)
     arcs = [np.column_stack([angle, np.full(len(angle), at)]) for at in (low, high)]
-    sides = [] if closed else [np.array([[at, low], [at, high]]) for at in (first, last)]
+    along = np.linspace(low, high, 2 if isinstance(shape, Quadric) else _SIDE)
+    sides = [np.column_stack([np.full(len(along), at), along]) for at in (first, last)]
+    sides = [] if closed else sides
     return [shape.surface(section, line, section.size) for line in (*arcs, *sides)]
 
 

@@ -241,13 +241,15 @@ def find_walls(
     as `find_span` does.
     """
     case = case or Case()
-    if mesh.dim == 3 and pair is not None and pair.kind != "rotational":
-        raise CaseError(
-            f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant span "
-            "need an axis about which they turn: set PERIODIC_TYPE= rotational and PERIODIC_AXIS"
-        )
     require_one_zone(mesh, "a span")
     hub, shroud = between or span_ends(case, mesh)
+    if pair is not None and pair.kind != "rotational":
+        if mesh.dim == 3 and case.markers_with("periodic"):
+            raise CaseError(
+                f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant span "
+                "need an axis about which they turn: set PERIODIC_TYPE= rotational"
+            )
+        pair = None  # it was guessed: inflow and outflow match, too
     axis, origin = about or ((case.axis, case.origin) if pair is None else (pair.axis, pair.origin))
     period = 2.0 * np.pi if pair is None else pair.period
     return span_walls(mesh, hub, shroud, axis, origin, period)

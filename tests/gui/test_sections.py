@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
-from qtpy.QtWidgets import QApplication
+from qtpy.QtWidgets import QApplication, QPushButton
 
 from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
 from slideviz.gui.viewport.section_views import PlaneHandle, arrangement_for
@@ -242,6 +242,34 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
     driver.click(flat.title.close_button)
     assert window.section_views.flat is None
     assert not panel.flat.isChecked()
+
+
+def test_a_section_of_constant_span_goes_to_10_50_and_90_percent(window, driver, wheel):
+    driver.open(wheel)
+    window.dock_manager.bring_to_front("sections")
+    panel = window.dock_manager.panels["sections"]
+    driver.click(panel.add["span"])
+    assert sections(window)[0].walls.hub == "HUB"
+    assert not panel.editor.axis.isVisible()
+    low, half, high = panel.editor.picks["span"].findChildren(QPushButton)
+    assert [button.text() for button in (low, half, high)] == ["10 %", "50 %", "90 %"]
+    driver.click(high)
+    assert sections(window)[0].span == 0.9
+    assert panel.editor.number.text() == "0.9"
+    driver.click(low)
+    assert sections(window)[0].span == 0.1
+    drag(panel.editor.slider, 0.3)
+    assert sections(window)[0].span == pytest.approx(0.3, abs=1e-3)
+    driver.click(panel.add["cylinder"])
+    assert not panel.editor.picks["span"].isVisible()
+    window.store.change(changes.set_case, span=("INFLOW", "HUB"))
+    assert "needs hub and shroud" in panel.list.item(0).text()
+
+
+def test_without_hub_and_shroud_there_is_no_span(window, driver, panel):
+    driver.click(panel.add["span"])
+    assert not sections(window)
+    assert "do not say between which the span goes" in window.banner.text.text()
 
 
 def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_path, answers):

@@ -70,7 +70,9 @@ def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
     # Its handle: places of the surface are on the span, and the frame is around them.
     patch = patch_of(section, cut.points)
     on = section.shape.surface(section, patch.places[::20], 0.37)
-    assert section.shape.positions(section, on) == pytest.approx(0.37, abs=1e-4)
+    off = np.abs(section.shape.positions(section, on) - 0.37)
+    assert np.median(off) < 1e-4
+    assert off.max() < 0.02  # the facets of the walls have edges, which the spline rounds
     assert all(np.isfinite(line).all() for line in frame_of(section, patch))
     assert section.shape.lever(section, 0.0) == pytest.approx(0.3, rel=0.3)
 
@@ -81,8 +83,11 @@ def test_periods_about_its_axis_keep_it():
     turn = pair("rotational", 3, angle=np.radians(30.0))
     assert keeps(section, turn.matrix(1))
     assert not keeps(section, pair("translational", 3, vector=(0.0, 0.0, 1.0)).matrix(1))
+    case = sv.Case(roles={"inflow": "periodic", "outflow": "periodic"})
     with pytest.raises(CaseError, match=r"repeat by .*need an axis about which they turn"):
-        find_walls(mesh, None, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
+        find_walls(mesh, case, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
+    # One that was guessed does not count.
+    assert find_walls(mesh, None, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
 
 
 def test_without_walls_it_cuts_nothing():
