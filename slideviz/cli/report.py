@@ -179,7 +179,8 @@ def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
 
 def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4`` or "", ``not met``."""
-    value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
+    none = "infinite" if entry["failing"] else "no value"
+    value = none if entry["actual"] is None else f"{entry['actual']:.6g}"
     before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
     if before and not entry["passed"] and not entry["undeformed_passed"]:
         before = f"the undeformed mesh misses it, too: {entry['undeformed']:.6g}"
