@@ -14,6 +14,7 @@ from slideviz.design.su2.config import read_config
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
+from tests.solver.test_zones import stage
 
 DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
 FILES = """
@@ -899,3 +900,28 @@ def test_boxes_that_the_surface_leaves_behind_are_told(here, capsys):
     config("DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, 0, 0, 1)\nDV_VALUE= 0.02\n")
     assert run(["def", "a.cfg", "-q"]) == 0
     assert "'BOX' on low are not those of the mesh, by up to 0.07" in capsys.readouterr().err
+
+
+ZONES = """MESH_FILENAME= stage.su2
+MESH_OUT_FILENAME= out.su2
+DV_MARKER= ( 1:BLOCK, 2:BLOCK )
+MARKER_SYM= ( 1:inner, 1:outer, 2:inner )
+DV_KIND= TRANSLATION
+DV_PARAM= (0, 1, 0)
+DV_VALUE= 0.01
+"""
+
+
+def test_boundaries_of_all_zones_are_in_one_configuration(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mesh = sv.read(stage(tmp_path))
+    (tmp_path / "a.cfg").write_text(ZONES)
+    assert run(["def", "a.cfg", "-q"]) == 0
+    shift = sv.read("out.su2").points - mesh.points
+    for name in ("1:BLOCK", "2:BLOCK"):
+        assert np.allclose(shift[mesh.marker(name).nodes], [0.0, 0.01], atol=1e-12)
+    assert run(["def", "a.cfg", "-q", "--set", "DV_VALUE=0", "--force"]) == 0
+    assert np.array_equal(sv.read("out.su2").points, mesh.points)
+    (tmp_path / "b.cfg").write_text(f"{ZONES}CONFIG_LIST= (a.cfg, a.cfg)\n")
+    assert run(["def", "b.cfg"]) != 0
+    assert "b.cfg:8: CONFIG_LIST has a configuration for each zone" in capsys.readouterr().err

@@ -19,10 +19,12 @@ from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, r
 from slideviz.case.model import NEW, Case
 from slideviz.case.values import YES_NO, integer, real
 from slideviz.case.words import list_of, number
+from slideviz.case.zones import with_marker_names
 from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
 from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.zones import spellings
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import ROLES, Role
@@ -402,7 +404,13 @@ class _Reader:
                     raise CaseError(f"{shown(words[key])} is no {needed} above {least:g}")
             except CaseError as problem:
                 self.note(self.rows[key], str(problem))
-        if "DV_KIND" not in self.rows:
+        if "CONFIG_LIST" in self.rows:
+            sentence = (
+                "CONFIG_LIST has a configuration for each zone, but one is read at a time: name "
+                "all boundaries in one, as 1:blade, or take each one with --set ZONE=1 and so on"
+            )
+            self.problems.append((self.rows["CONFIG_LIST"].line, sentence))
+        elif "DV_KIND" not in self.rows:
             sentence = (
                 f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
             )
@@ -420,8 +428,16 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
     """Return the configuration without markers that the mesh lacks, with a warning for each key.
 
     A periodic pair of which one is missing stays, and so does all that would move where all of it
-    is missing: `problems_of_markers` tells them.
+    is missing: `problems_of_markers` tells them. Boundaries get the names that they have in the
+    mesh, where they are written as ``1:blade``.
     """
+    known = spellings(mesh)
+    config = replace(
+        config,
+        case=with_marker_names(config.case, mesh),
+        markers=tuple(known.get(name, name) for name in config.markers),
+        named={known.get(name, name): key for name, key in config.named.items()},
+    )
     lacking = [name for name in config.named if name not in mesh.marker_names]
     passed = {name: key for name in lacking if (key := config.named[name]) in PASSED_OVER}
     roles = config.case.roles
