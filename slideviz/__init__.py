@@ -25,10 +25,12 @@ if TYPE_CHECKING:
         Radial,
         Rotate,
         Scale,
+        SpanMotion,
         Translate,
     )
     from slideviz.design.deformer import Constraint, Deformer
     from slideviz.design.gap import Gap, gaps
+    from slideviz.design.span_variables import SpanVariables
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.design.wheel import WheelQuality, wheel
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
@@ -53,9 +55,10 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
-    "Prescribed Radial Rotate Scale Translate",
+    "Prescribed Radial Rotate Scale SpanMotion Translate",
     "design.deformer": "Constraint Deformer",
     "design.gap": "Gap gaps",
+    "design.span_variables": "SpanVariables",
     "design.sweeps.sweep": "sweep",
     "design.wheel": "WheelQuality wheel",
     "errors": "ConditionWarning SlidevizError ToleranceWarning",
@@ -85,9 +88,10 @@ __all__ = [
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "Gap", "HicksHenne",
     "Marker", "Mesh", "MeshRepair", "MetricValues", "Prescribed", "Quality", "QualityDerivative",
     "Radial", "Reduction", "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle",
-    "SlidevizError", "Step", "ToleranceWarning", "Translate", "Walls", "WheelQuality",
-    "__version__", "compare", "convert", "deform", "film", "gaps", "metrics", "picture", "quality",
-    "read", "repair", "safe_fraction", "section", "sweep", "walls", "wheel", "write",
+    "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning", "Translate",
+    "Walls", "WheelQuality", "__version__", "compare", "convert", "deform", "film", "gaps",
+    "metrics", "picture", "quality", "read", "repair", "safe_fraction", "section", "sweep", "walls",
+    "wheel", "write",
 ]  # fmt: skip
 
 

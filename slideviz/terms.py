@@ -120,6 +120,7 @@ MotionKind = Literal[
     "ffd-camber",
     "ffd-thickness",
     "ffd-twist",
+    "span",
     "file",
 ]
 MOTION_KINDS: dict[MotionKind, Term] = {
@@ -134,8 +135,34 @@ MOTION_KINDS: dict[MotionKind, Term] = {
     "ffd-camber": Term("camber by box"),
     "ffd-thickness": Term("thickness by box"),
     "ffd-twist": Term("twist by box"),
+    "span": Term("blade over span"),
     "file": Term("displacement file"),
 }
+
+SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]
+
+
+@dataclass(frozen=True)
+class SpanTerm(Term):
+    """The words for what a curve over the span changes; where it is ``rest``, nothing changes."""
+
+    unit: str = ""
+    rest: float = 0.0
+
+
+SPAN_KINDS: dict[SpanKind, SpanTerm] = {
+    "twist": SpanTerm(
+        "twist", "Turns sections about the stacking line, from m towards growing θ.", unit="°"
+    ),
+    "stagger": SpanTerm("stagger", "Turns all sections by one angle.", unit="°"),
+    "lean": SpanTerm("lean", "Shifts sections along θ, by a length.", unit="length"),
+    "sweep": SpanTerm("sweep", "Shifts sections along m, by a length.", unit="length"),
+    "chord": SpanTerm("chord", "Scales sections about the stacking line.", unit="factor", rest=1.0),
+    "camber": SpanTerm(
+        "camber", "Bends sections towards growing θ, by a part of their chord.", unit="part"
+    ),
+}
+"""What motions of a blade change over the span; verbs of ``MOTION``."""
 
 Side = Literal["upper", "lower"]
 SIDES: dict[Side, Term] = {

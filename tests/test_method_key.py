@@ -96,6 +96,7 @@ SIZES = {
     "turbine-row": 5_000,
     "turbine-row-3d": 10_000,
     "stator": 5_000,
+    "impeller": 3_000,
     "airfoil": 24,
 }
 

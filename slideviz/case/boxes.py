@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, mean_of
 from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, applies_to, named
 from slideviz.errors import CaseError, Note, SlidevizError, nearest
 from slideviz.ffd.box import (
@@ -249,20 +249,13 @@ def ffd_displacements(
                 )
     if problems:
         raise CaseError("\n".join(problems[place] for place in sorted(problems)))
-    return {motion: _mean(several) for motion, several in displacements.items()}
+    return {motion: mean_of(several) for motion, several in displacements.items()}
 
 
 _STAYS = (
     "the FFD box {} in the deformed mesh stays where it was, because boxes are nested or other "
     "motions move boundaries, too; define it again to use it with that mesh"
 )
-
-
-def _mean(several: list[Displacements]) -> Displacements:
-    if len(several) == 1:
-        return several[0]
-    vectors = np.mean([each.vectors for each in several], axis=0)
-    return replace(several[0], vectors=vectors)
 
 
 def _moved(

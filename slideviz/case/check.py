@@ -17,15 +17,17 @@ from slideviz.case.model import (
     BoxMotion,
     FromFile,
     Motion,
-    OnAirfoil,
+    PlacedMotion,
     Prescribed,
     Radial,
     Rotate,
+    SpanMotion,
     Translate,
     applies_to,
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.spans import span_problems
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Note, nearest
 from slideviz.mesh.zones import without_zone
@@ -169,6 +171,8 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
         problems = [*_motion_problems(motion, mesh.dim)]
         if isinstance(motion, BoxMotion) and not problems:
             problems += ffd_problems(case, mesh, motion)
+        elif isinstance(motion, SpanMotion) and not problems:
+            problems += span_problems(case, mesh)
         elif isinstance(motion, Prescribed):
             problems += _prescribed_problems(case, mesh, motion)
         found += [f"motion {place}: {text}" for text in problems]
@@ -186,7 +190,9 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
     except (CaseError, TypeError, ValueError) as problem:
         yield str(problem).removeprefix("motion 1: ")
         return
-    if isinstance(motion, BoxMotion | OnAirfoil):
+    if isinstance(motion, SpanMotion) and dim == 2:
+        yield f"{motion.kind} changes a blade over its span, and the mesh has none: it is 2D"
+    if isinstance(motion, PlacedMotion):
         return
     needed = f"the mesh has {dim} dimensions"
     if isinstance(motion, Translate):

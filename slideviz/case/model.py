@@ -31,6 +31,7 @@ from slideviz.terms import (
     SIDES,
     SKEW_METRICS,
     SLIDING,
+    SPAN_KINDS,
     FfdBlending,
     FfdSystem,
     FileFormat,
@@ -45,6 +46,7 @@ from slideviz.terms import (
     Side,
     SkewMetric,
     Sliding,
+    SpanKind,
 )
 
 Point = tuple[float, ...] | Literal["centroid"]
@@ -211,6 +213,52 @@ class FfdTwist(CheckedFields):
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
 
+@dataclass(frozen=True)
+class SpanMotion(CheckedFields):
+    """Change the sections of a blade, each at its span, by a curve over the span.
+
+    The curve is the monotone cubic through ``values`` at ``spans``, from 0 at the hub to 1 at the
+    shroud, and constant beyond them; a single value holds for the whole span. By ``kind``:
+
+    * ``twist``, ``stagger``: turned about the stacking line, in degrees, from the direction of m
+      towards that of growing theta; ``stagger`` has a single value.
+    * ``lean``, ``sweep``: shifted along theta, or along the meridional direction, by a length.
+    * ``chord``: scaled about the stacking line by a factor.
+    * ``camber``: bent towards growing theta, by a part of the chord.
+
+    Nodes keep their span, so those of hub and shroud stay on them. ``point``: a point of the
+    stacking line, which then follows the line from hub to shroud through it; None: a straight line
+    fitted to the sections' centroids. Displacements depend on the undeformed blade, whatever
+    motions come before; several of one blade add up in any order.
+    """
+
+    marker: Target
+    kind: SpanKind = field(metadata=SPAN_KINDS)
+    spans: tuple[float, ...]
+    values: tuple[float, ...]
+    point: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        spans = self.spans
+        if not spans or len(spans) != len(self.values):
+            raise CaseError(
+                f"{len(spans)} spans and {len(self.values)} values are given; a curve needs a "
+                "value for each span, and one or more"
+            )
+        if not (spans[0] >= 0.0 and spans[-1] <= 1.0) or (np.diff(spans) <= 0.0).any():
+            raise CaseError(
+                f"the spans {', '.join(f'{span:g}' for span in spans)} do not ascend from 0 (hub) "
+                "to 1 (shroud); sort them, each once"
+            )
+        if self.kind == "stagger" and len(spans) > 1:
+            raise CaseError("stagger has one angle for the whole span; a curve of them is a twist")
+        if self.kind == "chord" and min(self.values) <= 0.0:
+            raise CaseError(
+                f"the chord's factor {min(self.values):g} is not above 0: it would fold the blade"
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class Prescribed(CheckedFields):
     """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
@@ -241,7 +289,9 @@ _ROLES = 'a role for each marker, as {"blade": "moving"}'
 OnAirfoil = HicksHenne | Cst | Bump
 BoxMotion = Ffd | FfdCamber | FfdThickness | FfdTwist
 """Motions of control points of boxes; those of one box act one after the other."""
-Motion = Translate | Rotate | Scale | Radial | OnAirfoil | BoxMotion | FromFile | Prescribed
+PlacedMotion = OnAirfoil | BoxMotion | SpanMotion
+"""Motions that depend on undeformed places, whatever motions come before."""
+Motion = Translate | Rotate | Scale | Radial | PlacedMotion | FromFile | Prescribed
 
 
 def named(target: Target) -> tuple[str, ...]:

@@ -18,13 +18,13 @@ from slideviz.case.boxes import ffd_displacements
 from slideviz.case.check import marker_problems, motion_problems, raise_all
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.model import (
-    BoxMotion,
     Case,
     Cst,
     FromFile,
     HicksHenne,
     Motion,
     OnAirfoil,
+    PlacedMotion,
     Prescribed,
     Radial,
     Rotate,
@@ -34,6 +34,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import term_of
+from slideviz.case.spans import span_displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.cached_boundary import boundary_of
@@ -155,7 +156,7 @@ ReferenceDisplacements = Mapping[object, Displacements]
 """Displacements by the key (`key_of`) of their motion."""
 
 
-def key_of(motion: FromFile | BoxMotion | OnAirfoil) -> object:
+def key_of(motion: FromFile | PlacedMotion) -> object:
     """Return the key of a motion; those with the same displacements share it."""
     return (motion.path, motion.marker) if isinstance(motion, FromFile) else motion
 
@@ -168,13 +169,17 @@ def placed_displacements(
     ``on`` has the nodes (k,) of each moving marker. Raises CaseError where such a motion moves no
     node.
     """
-    return ffd_displacements(case, mesh, on) | bump_displacements(case, mesh, on)
+    return (
+        ffd_displacements(case, mesh, on)
+        | bump_displacements(case, mesh, on)
+        | span_displacements(case, mesh, on)
+    )
 
 
 def reference_displacements(
     case: Case, mesh: Mesh, on: Mapping[str, IntArray]
 ) -> dict[object, Displacements]:
-    """Return the displacements by files, FFD boxes and bumps of a case, by `key_of` their motion.
+    """Return the displacements by files and placed motions of a case, by `key_of` their motion.
 
     ``on`` has the nodes (k,) of each moving marker. Raises CaseError if a file cannot be read or
     has mistakes, or a box has none of the nodes that it should move; the message has all of these.
@@ -330,8 +335,8 @@ def displacement_of(
     ``motions``: the motions of this marker.
     ``points`` (k, d) float64: undeformed positions of its nodes.
     ``nodes`` (k,) int64: their indices; needed for displacements of files, boxes and programs only.
-    ``files``: the displacements of files, boxes and bumps, by `key_of` their motion; a motion that
-    is not among them displaces nothing.
+    ``files``: the displacements of files and of `PlacedMotion`, by `key_of` their motion; a motion
+    that is not among them displaces nothing.
     """
     total = np.zeros_like(points)
     for motion in motions:
@@ -349,7 +354,7 @@ def _change(
             _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
             out[here] = motion.vectors[given]
         return out
-    if not isinstance(motion, FromFile | BoxMotion | OnAirfoil):
+    if not isinstance(motion, FromFile | PlacedMotion):
         return _increment(motion, points)
     key = key_of(motion)
     if not files or nodes is None or key not in files:

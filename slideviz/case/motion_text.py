@@ -25,6 +25,7 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Scale,
+    SpanMotion,
     Target,
     Translate,
     named,
@@ -32,9 +33,9 @@ from slideviz.case.model import (
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, counted, is_none, name_text, number, words_of
 from slideviz.errors import CaseError, nearest, not_one_of, shown
-from slideviz.terms import MOTION_KINDS, SIDES, MotionKind
+from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS, MotionKind, SpanKind
 
-VERBS = tuple(MOTION_KINDS)
+VERBS = (*(kind for kind in MOTION_KINDS if kind != "span"), *SPAN_KINDS)
 VERB_OF: dict[type, MotionKind] = {
     Translate: "translate",
     Rotate: "rotate",
@@ -47,9 +48,10 @@ VERB_OF: dict[type, MotionKind] = {
     FfdCamber: "ffd-camber",
     FfdThickness: "ffd-thickness",
     FfdTwist: "ffd-twist",
+    SpanMotion: "span",
     FromFile: "file",
 }
-"""Verbs of motions, by class."""
+"""Verbs of motions, by class; those of `SpanMotion` are its kinds."""
 ALL_MOVING = "*"
 MOST_TERMS = 100  # most terms of an airfoil's shape function
 
@@ -114,6 +116,9 @@ def _read_motion(group: list[Word]) -> Motion:
         raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
     if verb == "file":
         return _read_file(marker, remaining)
+    kind = next((kind for kind in SPAN_KINDS if kind == verb), None)
+    if kind is not None:
+        return _read_span(marker, kind, remaining)
     if verb == "ffd":
         return _read_ffd(marker, remaining)
     if verb in _BUMPS:
@@ -329,6 +334,41 @@ def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
     return FfdTwist(marker, items[0].text, plane, number(items[2].text), point, axis)
 
 
+def _read_span(marker: Target, kind: SpanKind, rest: list[Word]) -> SpanMotion:
+    start = next((place for place, word in enumerate(rest) if word.is_sign("(")), len(rest))
+    point = _flat(rest[start:])
+    if point and len(point) != 3:
+        raise CaseError("the point of the stacking line needs three coordinates: (x, y, z)")
+    at = read_vector(point, "the stacking point") if point else None
+    curve = read_curve(" ".join(word.text for word in rest[:start]))
+    return SpanMotion(marker, kind, *curve, at)  # type: ignore[arg-type]
+
+
+def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return spans and values of a curve as ``0:0, 0.5:1.5, 1:4``, or of a single value.
+
+    Raises CaseError with a sentence.
+    """
+    words = text.replace(",", " ").split()
+    if len(words) == 1 and ":" not in text:
+        return (0.0,), (number(words[0]),)
+    if not words or any(word.count(":") != 1 for word in words):
+        raise CaseError(
+            f"{shown(text)} is no curve over the span; expected span:value, as in 0:0, 0.5:1.5, "
+            "1:4, or a single value"
+        )
+    spans, values = zip(*(word.split(":") for word in words), strict=True)
+    return tuple(map(number, spans)), tuple(map(number, values))
+
+
+def curve_text(motion: SpanMotion) -> str:
+    """Return the curve of a motion over the span as text, as `read_curve` reads it."""
+    if motion.spans == (0.0,):
+        return repr(float(motion.values[0]))
+    pairs = zip(motion.spans, motion.values, strict=True)
+    return ", ".join(f"{float(span)!r}:{float(value)!r}" for span, value in pairs)
+
+
 def _integers(words: list[Word]) -> list[int]:
     at = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in at):
@@ -348,6 +388,9 @@ def _motion_text(motion: Motion) -> str:
         return _bump_text(head, motion)
     if isinstance(motion, BoxMotion):
         return f"({head}, {VERB_OF[type(motion)]}, {name_text(motion.box)}, {_of_box(motion)})"
+    if isinstance(motion, SpanMotion):
+        point = "" if motion.point is None else f", {vector_text(motion.point)}"
+        return f"({head}, {motion.kind}, {curve_text(motion)}{point})"
     if isinstance(motion, FromFile):
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
@@ -408,6 +451,11 @@ GRAMMAR = (
     "(BLADE, ffd-camber, BOX, i, j, dz)            a column of control points; 2D: no j",
     "(BLADE, ffd-thickness, BOX, i, j, dz)         its first one by -dz, its last by dz",
     "(BLADE, ffd-twist, BOX, j, degrees, AXIS, (px, py, pz))  a plane of control points",
+    "(BLADE, twist, 0:0, 0.5:1.5, 1:4)             span:degrees, about the stacking line; in 3D",
+    "(BLADE, stagger, degrees)                     one angle for all spans",
+    "(BLADE, lean, 0:0, 1:0.01)                    span:length, along theta; sweep: along m",
+    "(BLADE, chord, 0:1, 1:1.1)                    span:factor; camber: span:part of the chord",
+    "(BLADE, twist, 0:0, 1:4, (px, py, pz))        with a point of the stacking line",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, VERB, ...)                                all moving boundaries, as one body",
     "((BLADE, TIP), VERB, ...)                     several, as one body; in a sweep: BLADE+TIP",

@@ -23,12 +23,13 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Scale,
+    SpanMotion,
     Target,
     Translate,
     named,
 )
 from slideviz.mesh.model import Mesh
-from slideviz.terms import AXES
+from slideviz.terms import AXES, SPAN_KINDS
 
 ALONG = 1e-12
 """A direction is along an axis where the cosine of their angle differs from 1 by less than this."""
@@ -76,6 +77,9 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
             return _of_box(motion)
         about = f"{direction_words(motion.axis)} through {_place(motion.point, extent)}"
         return f"{_of_box(motion)} about {about}"
+    if isinstance(motion, SpanMotion):
+        about = "" if motion.point is None else f" about {_place(motion.point, extent)}"
+        return f"{_curve(motion)}{about}"
     if isinstance(motion, Prescribed):
         return f"displace {len(motion.nodes):,} nodes as given"
     return f"displace as in {motion.path.name or '(no file yet)'}"
@@ -140,6 +144,8 @@ def _briefly(motion: Motion) -> str:
         return _bump(motion, f"{motion.height:+.4g}")
     if isinstance(motion, BoxMotion):
         return _of_box(motion)
+    if isinstance(motion, SpanMotion):
+        return _curve(motion)
     if isinstance(motion, Prescribed):
         return f"{len(motion.nodes):,} nodes as given"
     return motion.path.name or "(no file yet)"
@@ -158,6 +164,8 @@ def _exactly(motion: Motion) -> str:
         return _of_box(motion, ".15g") + _about(motion.point) + _along(motion.axis)
     if isinstance(motion, BoxMotion):
         return _of_box(motion, ".15g")
+    if isinstance(motion, SpanMotion):
+        return _curve(motion, ".15g") + ("" if motion.point is None else _about(motion.point))
     if isinstance(motion, Prescribed):
         return _briefly(motion)
     if isinstance(motion, Translate):
@@ -217,6 +225,17 @@ def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
         return f"{motion.side} side {by} × CST {motion.term[0]} of {motion.term[1]}"
     what = "both sides" if isinstance(motion, Bump) else f"{motion.side} side"
     return f"{what} {by} at {format(100.0 * motion.peak, form)} % chord"
+
+
+def _curve(motion: SpanMotion, form: str = ".4g") -> str:
+    """Return what a motion over the span changes, in words, with its values along the span."""
+    unit = "°" if SPAN_KINDS[motion.kind].unit == "°" else ""
+    values = [f"{format(value, form)}{unit}" for value in motion.values]
+    if len(values) == 1:
+        return f"{motion.kind} {values[0]}"
+    spans = [format(100.0 * span, form) for span in motion.spans]
+    pairs = (f"{value} at {span} %" for value, span in zip(values, spans, strict=True))
+    return f"{motion.kind} {', '.join(pairs)} span"
 
 
 def _control(motion: Ffd | FfdCamber | FfdThickness) -> str:

@@ -306,14 +306,18 @@ class SpanCurves:
     def at_length(self, m: FloatArray, span: FloatArray) -> FloatArray:
         """Return m' (n,) at arc lengths m (n,) of the curves at spans (n,)."""
         m_prime = m / np.maximum(self._at(span, np.zeros(len(m)), 0)[:, 1], ON_AXIS)
-        for _ in range(30):
+        for _ in range(NEWTON):
             gap = m - self._value(span, m_prime, 2, 0)
-            m_prime = m_prime + gap / self._value(span, m_prime, 2, 1)
+            m_prime = m_prime + gap / self.growth(m_prime, span)
         return m_prime
 
     def traced(self, plane: FloatArray) -> FloatArray:
         """Return z and r (n, 2) of (m', theta, span), (n, 3), on the spline: beyond walls, too."""
         return self._at(plane[:, 2], plane[:, 0], 0)
+
+    def growth(self, m_prime: FloatArray, span: FloatArray) -> FloatArray:
+        """Return the derivative dm / dm' (n,) at m' of the curves at spans (n,)."""
+        return self._value(span, m_prime, 2, 1)
 
     def coords(self, plane: FloatArray) -> FloatArray:
         """Return meridional coordinates (n, 3) of (m', theta, span), (n, 3)."""

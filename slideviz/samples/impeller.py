@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.case.model import Case
+from slideviz.case.model import Case, SpanMotion
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.samples.passage import (
@@ -89,6 +89,25 @@ def impeller_mesh(size: int) -> Mesh:
 
 
 def impeller_case() -> Case:
-    """Return the case that twists the blade by 5 degrees at the shroud, and leans it there."""
-    roles = {"BLADE": "moving", "HUB": "sliding", "SHROUD": "sliding"}
-    return Case(roles=roles)  # type: ignore[arg-type]
+    """Return the case that twists the blade by 4 degrees at the shroud, and leans it there."""
+    return Case(
+        roles={
+            "BLADE": "moving",
+            "HUB": "sliding",
+            "SHROUD": "sliding",
+            "INFLOW": "sliding",
+            "OUTFLOW": "sliding",
+            "PER1": "periodic",
+            "PER2": "periodic",
+        },
+        motions=(
+            SpanMotion("BLADE", "twist", (0.0, 0.5, 1.0), (0.0, 1.5, 4.0)),
+            SpanMotion("BLADE", "lean", (0.0, 1.0), (0.0, 0.01)),
+        ),
+        sliding="ps",
+        periodic="moving",
+        periodic_type="rotational",
+        steps=3,
+        relax="auto",
+        layers="auto",
+    )

@@ -12,6 +12,7 @@ from slideviz.errors import CaseError, nearest
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
 from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
+from slideviz.samples.impeller import impeller_case, impeller_mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
@@ -122,6 +123,11 @@ SAMPLES: Mapping[str, SampleKind] = {
         _stator,
         ("file",),
         _streamed_stator,
+    ),
+    "impeller": SampleKind(
+        "3D: centrifugal compressor passage, 13 around, twisted over its span; size: cells (12000)",
+        12_000,
+        lambda name, size, _: Sample(name, impeller_mesh(size), impeller_case()),
     ),
 }
 """Every kind of sample, by name."""

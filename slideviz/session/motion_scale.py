@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import FromFile, Motion
+from slideviz.case.model import FromFile, Motion, SpanMotion
+from slideviz.terms import SPAN_KINDS
 
 LINEAR = ("vector", "angle_deg", "distance", "height", "amount")
 """Fields of motions to which the displacement is proportional: exactly, or nearly (angles)."""
@@ -47,6 +48,8 @@ def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | No
 
 def _values(motion: Motion) -> list[tuple[str, Any, float]]:
     """Return name and value of the fields that say how far, and their value at rest."""
+    if isinstance(motion, SpanMotion):
+        return [("values", motion.values, SPAN_KINDS[motion.kind].rest)]
     names = [(field.name, float(field.name in RATIOS)) for field in fields(motion)]
     return [(k, getattr(motion, k), rest) for k, rest in names if k in LINEAR or rest]
 

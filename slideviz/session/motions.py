@@ -27,6 +27,7 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Scale,
+    SpanMotion,
     Target,
     Translate,
     applies_to,
@@ -210,6 +211,8 @@ def new_motion(
         return Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
     if kind in (FfdCamber, FfdThickness):
         return kind(marker, (*boxes, "")[0], (0, 0 if dim == 3 else -1), 0.0)
+    if kind is SpanMotion:
+        return SpanMotion(marker, "twist", (0.0, 1.0), (0.0, 0.0))
     if kind is FfdTwist:
         return FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
     return FromFile(Path(), marker)

@@ -9,12 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
-from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, SpanMotion, Translate
 from slideviz.case.motion import moved_points
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING
+from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -52,7 +52,18 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
         st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
         st.builds(Ffd, marker, text, index, st.tuples(finite, finite, finite)),
         st.builds(FromFile, path, marker),
+        curves(marker),
     )
+
+
+@st.composite
+def curves(draw: st.DrawFn, marker) -> SpanMotion:
+    kind = draw(st.sampled_from(list(SPAN_KINDS)))
+    spans = draw(st.lists(st.floats(0, 1), min_size=1, max_size=4, unique=True))
+    spans = tuple(sorted(spans if kind != "stagger" else spans[:1]))
+    values = st.tuples(*[positive if kind == "chord" else finite] * len(spans))
+    three = st.tuples(finite, finite, finite)
+    return SpanMotion(draw(marker), kind, spans, draw(values), draw(st.none() | three))
 
 
 reductions = st.builds(

@@ -195,7 +195,13 @@ def same_mesh(one: sv.Mesh, other: sv.Mesh) -> bool:
     ("name", "variant"), [(n, v) for n in SAMPLES for v in SAMPLES[n].variants]
 )
 def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, name, variant):
-    size = {"passage": 12, "turbine-row": 5_000, "turbine-row-3d": 10_000, "stator": 5_000}
+    size = {
+        "passage": 12,
+        "turbine-row": 5_000,
+        "turbine-row-3d": 10_000,
+        "stator": 5_000,
+        "impeller": 3_000,
+    }
     size = (size | {"airfoil": 16}).get(name, 5)
     paths = write_sample(name, tmp_path / "a" / "b", size, variant)
     assert all(path.is_file() for path in paths)

@@ -23,6 +23,8 @@ MOTIONS = (
     sv.Ffd("b", "BOX", (0, 0, -1), (0.0, 0.5, 0.0)),
     sv.FfdTwist("b", "BOX", 0, 5.0),
     sv.FfdCamber("b", "BOX", (0, 0), 0.25),
+    sv.SpanMotion("b", "twist", (0.0, 0.5, 1.0), (0.0, 1.5, 4.0)),
+    sv.SpanMotion("b", "chord", (0.0, 1.0), (1.2, 0.8)),
 )
 
 

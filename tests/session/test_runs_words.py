@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, SpanMotion, Translate
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import Reduction
@@ -64,6 +64,8 @@ def test_settings_without_effect_tell_no_runs_apart():
         (Scale("blade", (1.1, 1.1)), "scale 1.1"),
         (Scale("blade", (1.1, 1.0)), "scale 1.1 × 1"),
         (Radial("blade", 1.03), "radially +3 %"),
+        (SpanMotion("blade", "stagger", (0.0,), (-2.0,)), "stagger -2°"),
+        (SpanMotion("blade", "twist", (0.0, 0.5), (0, 1.5)), "twist 0° at 0 %, 1.5° at 50 % span"),
         (Radial("blade", 1.0, -0.2), "radially -0.2"),
         (FromFile(Path("/far/away/shape.txt"), "blade"), "shape.txt"),
     ],
@@ -101,6 +103,14 @@ def test_the_boundary_is_named_where_several_move():
         (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0000001))),
         (Radial("blade", 1.03), Radial("blade", 1.03, 0.0, (1.0, 0.0, 0.0))),
         (Radial("blade", 1.03), Radial("blade", 1.0300001)),
+        (
+            SpanMotion("blade", "lean", (0.0,), (1.0,)),
+            SpanMotion("blade", "lean", (0.0,), (1.0,), (1, 2, 3)),
+        ),
+        (
+            SpanMotion("blade", "chord", (0.0,), (1.1,)),
+            SpanMotion("blade", "chord", (0.0,), (1.1000001,)),
+        ),
         (Translate("blade", (0.1, 0.2)), Translate("blade", (0.1, 0.2000001))),
         (FromFile(Path("a/shape.txt")), FromFile(Path("b/shape.txt"))),
     ],
@@ -167,6 +177,9 @@ def test_a_motion_in_full():
     assert describe(Scale("blade", (2.0, 1.0))) == "blade: scale by 2 × 1 about its centroid"
     assert describe(FromFile(Path())) == "all moving: displace as in (no file yet)"
     assert describe(Radial("blade", 1.0, 0.0)) == "blade: push radially by +0"
+    camber = SpanMotion("blade", "camber", (0.0, 1.0), (0.0, 0.02), (1.0, 0.5, 0.0))
+    words = "blade: camber 0 at 0 %, 0.02 at 100 % span about (1, 0.5, 0)"
+    assert describe(camber, 3) == words
 
 
 def other_value(key, case):
@@ -179,6 +192,7 @@ def other_value(key, case):
         "whole": ["7", "8"],
         "axis": ["(1.0, 0.0, 1e-9)"],
         "point": ["(1.0, 0.0, 1e-9)"],
+        "text": ["( A, B )"],
     }[kind.entry]
     return next(kind.read(text) for text in texts if kind.read(text) != value)
 

@@ -3,7 +3,8 @@
 The name of a number is ``BLADE.translate.y``: marker, kind of motion, and number; or, by the place
 of the motion in ``MOTION``, ``motion2.y``, which is needed where two motions of one kind move the
 same marker. The name of a box's number has the control point, ``BLADE.ffd.BOX.1.0.0.y``, that of a
-bump its side, ``WING.hicks-henne.upper.height``. The name of a key is that of ``--set``, ``STEPS``.
+bump its side, ``WING.hicks-henne.upper.height``, that of a curve over the span the span of its
+point, ``BLADE.twist.0.5``. The name of a key is that of ``--set``, ``STEPS``.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     Prescribed,
+    SpanMotion,
     named,
 )
 from slideviz.case.motion_text import VERB_OF
@@ -214,7 +216,8 @@ def _normalized_name(name: str) -> str:
 
 
 def _head(motion: Motion) -> str:
-    head = f"{'+'.join(named(motion.marker)) or '*'}.{VERB_OF.get(type(motion), '')}"
+    verb = motion.kind if isinstance(motion, SpanMotion) else VERB_OF.get(type(motion), "")
+    head = f"{'+'.join(named(motion.marker)) or '*'}.{verb}"
     if isinstance(motion, BoxMotion):
         at = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
         return ".".join([head, motion.box, *map(str, at)])
@@ -225,6 +228,11 @@ def _head(motion: Motion) -> str:
 
 def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
     if isinstance(motion, FromFile | Prescribed):
+        return
+    if isinstance(motion, SpanMotion):
+        for k, span in enumerate(motion.spans):
+            name = "value" if len(motion.spans) == 1 else f"{span:.15g}"
+            yield name, NumberPlace(at, "values", k)
         return
     for field in fields(motion):
         if field.name in ("index", "plane", "term", "chord"):  # what it moves does not vary

@@ -1,0 +1,146 @@
+"""The values of curves over span as design variables: displacements, with exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.case.model import Case, Radial, Rotate, Scale, SpanMotion
+from slideviz.case.motion import displacements
+from slideviz.case.spans import blades_of
+from slideviz.design.sweeps.columns import numbers_of
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+
+class SpanVariables:
+    """The values at the points of all `SpanMotion` curves of a case, as design variables.
+
+    `displacement` is what a `Deformer` of the same mesh and case takes, and `vjp` continues what
+    its ``vjp`` returns, so that an optimiser has the gradient by the variables.
+
+    Attributes
+    ----------
+    names : tuple of str
+        A name for each variable, as of a column of `slideviz.sweep`: ``BLADE.twist.0.5``.
+    values : (k,) float64
+        The values of the case.
+    nodes : (m,) int64
+        The nodes of the moving markers, ascending; those of a `Deformer`.
+
+    Notes
+    -----
+    Derivatives are exact where curves over span are smooth: not where two slopes in turn change
+    their sign. Motions of other kinds keep their values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import slideviz as sv
+    >>> from slideviz.samples.table import sample
+    >>> row = sample("impeller", 3000)
+    >>> design = sv.SpanVariables(row.mesh, row.case)
+    >>> design.names
+    ('BLADE.twist.0', 'BLADE.twist.0.5', 'BLADE.twist.1', 'BLADE.lean.0', 'BLADE.lean.1')
+    >>> moved = design.displacement(2.0 * design.values)
+    >>> gradient = design.vjp(2.0 * design.values, np.ones_like(moved))
+    >>> gradient.shape
+    (5,)
+    """
+
+    @check_types
+    def __init__(self, mesh: Mesh, case: Case) -> None:
+        """Find the variables.
+
+        Raises
+        ------
+        CaseError
+            The case has no motion over the span, or rotates, scales or pushes the same boundary
+            after one; or the case does not fit the mesh.
+        """
+        places = [k for k, motion in enumerate(case.motions) if isinstance(motion, SpanMotion)]
+        if not places:
+            raise CaseError("the case has no motion over the span; add one, as SpanMotion(...)")
+        _require_last(case, places[0])
+        moved = displacements(case, mesh)
+        self.mesh, self.case, self.nodes = mesh, case, moved.nodes
+        numbers = {(at.motion, at.component): name for name, at in numbers_of(case).items()}
+        self._at = [
+            (place, k) for place in places for k in range(len(_span_motion(case, place).values))
+        ]
+        self.names = tuple(numbers[at] for at in self._at)
+        self.values = np.array([_span_motion(case, place).values[k] for place, k in self._at])
+
+    @check_types
+    def case_of(self, values: FloatArray) -> Case:
+        """Return the case with other values (k,) of the variables."""
+        given = np.asarray(values, np.float64)
+        if given.shape != self.values.shape or not np.isfinite(given).all():
+            raise CaseError(
+                f"values have the shape {given.shape}; expected {len(self.values)} finite numbers, "
+                f"of {', '.join(self.names)}"
+            )
+        motions = list(self.case.motions)
+        for place in dict.fromkeys(place for place, _ in self._at):
+            mine = [v for v, (at, _) in zip(given.tolist(), self._at, strict=True) if at == place]
+            motions[place] = replace(_span_motion(self.case, place), values=tuple(mine))
+        return self.case.change(motions=tuple(motions))
+
+    @check_types
+    def displacement(self, values: FloatArray) -> FloatArray:
+        """Return the displacement (m, d) of the moving nodes for values (k,) of the variables."""
+        return displacements(self.case_of(values), self.mesh).vectors
+
+    @check_types
+    def jvp(self, values: FloatArray, direction: FloatArray) -> FloatArray:
+        """Return the derivative (m, d) of the displacement at ``values`` in a direction (k,)."""
+        out = np.zeros((len(self.nodes), self.mesh.dim))
+        change = np.asarray(direction, np.float64)
+        for rows, columns, by_total, slope in self._slopes(values):
+            out[rows] += by_total * (slope @ change[columns])[:, None]
+        return out
+
+    @check_types
+    def vjp(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the gradient (k,) of ``(weights * displacement).sum()``; weights (m, d)."""
+        out = np.zeros(len(self.values))
+        adjoint = np.asarray(weights, np.float64)
+        for rows, columns, by_total, slope in self._slopes(values):
+            out[columns] += np.sum(adjoint[rows] * by_total, axis=1) @ slope
+        return out
+
+    def _slopes(
+        self, values: FloatArray
+    ) -> Iterator[tuple[IntArray, list[int], FloatArray, FloatArray]]:
+        """Yield for each motion its rows of nodes, its variables, and two factors of derivatives.
+
+        They are that of points (n, d) by the total of motions, and of the total (n, k) by values.
+        """
+        case = self.case_of(values)
+        on = {name: self.mesh.marker(name).nodes for name in case.markers_with("moving")}
+        for blade in blades_of(case, self.mesh, on):
+            totals, slopes = blade.totals()
+            by_totals = blade.sections.moved(totals[-1])[1]
+            rows = np.searchsorted(self.nodes, blade.nodes)
+            for place, (row, slope) in zip(blade.places, slopes, strict=True):
+                columns = [k for k, (at, _) in enumerate(self._at) if at == place]
+                yield rows, columns, by_totals[:, :, row], slope
+
+
+def _require_last(case: Case, first: int) -> None:
+    """Raise CaseError if motion ``first``, over the span, comes before one of moved places."""
+    for place, motion in enumerate(case.motions[first:], start=first + 1):
+        if isinstance(motion, Rotate | Scale | Radial):
+            raise CaseError(
+                f"motion {place} turns or scales what motion {first + 1} has moved over the span, "
+                "so derivatives would have to go through it; put it before"
+            )
+
+
+def _span_motion(case: Case, place: int) -> SpanMotion:
+    motion = case.motions[place]
+    assert isinstance(motion, SpanMotion)
+    return motion

@@ -1,0 +1,219 @@
+"""Motions of blades over span: sections are turned, shifted, scaled and bent in their own plane.
+
+A section at a span is laid flat in the plane of (m', theta), as the complex number m' + i theta.
+With its stacking point c, the distance w of a node from c, and totals over all motions so far
+
+    w  <-  k exp(i alpha) (w + kappa 4 xi (1 - xi) i (t - l))      chord k, angle alpha, camber
+    c  <-  c + i lean / r,  then along the curve of constant span by the length sweep
+
+where l and t are leading and trailing edge, and xi is the place of a node along the chord between
+them. Spans never change, so nodes of hub and shroud stay on them. Totals do not depend on the order
+of motions. Each quantity is a curve over span: a monotone cubic through points (F. N. Fritsch,
+R. E. Carlson, "Monotone piecewise cubic interpolation", SIAM J. Numer. Anal. 17, 1980, with the
+slopes of F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984), constant beyond its ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.machine.span import SpanCurves, SpanField
+from slideviz.mesh.model import FloatArray, IntArray
+
+SECTIONS = 24  # sections of a blade, of which centroids and edges are found
+Complex = NDArray[np.complex128]
+
+TOTALS = 5
+ANGLE, LEAN, SWEEP, CHORD, CAMBER = range(TOTALS)
+"""Rows of the totals: radians, lengths, the logarithm of a factor, a part of the chord."""
+
+
+def curve_at(
+    spans: Sequence[float], values: Sequence[float], at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the monotone cubic through (spans, values) at spans (n,), and its derivative (n, k).
+
+    The derivative is that by the values (k,), exact where no two slopes in turn change their sign.
+    """
+    x, y = np.asarray(spans, float), np.asarray(values, float)
+    count, eye = len(x), np.eye(len(x))
+    if count == 1:
+        return np.full(len(at), y[0]), np.ones((len(at), 1))
+    h = np.diff(x)
+    secant, by = np.diff(y) / h, np.diff(eye, axis=0) / h[:, None]
+    slope, slope_by = np.zeros(count), np.zeros((count, count))
+    for k in range(1, count - 1):
+        one, two = secant[k - 1 : k + 1]
+        if one * two > 0.0:  # else the curve is level there
+            w1, w2 = 2.0 * h[k] + h[k - 1], h[k] + 2.0 * h[k - 1]
+            both = w1 * two + w2 * one
+            slope[k] = (w1 + w2) * one * (two / both)
+            parts = w1 * (two / both) ** 2, w2 * (one / both) ** 2
+            slope_by[k] = (w1 + w2) * (parts[0] * by[k - 1] + parts[1] * by[k])
+    for k, near, far in ((0, 0, 1), (count - 1, count - 2, count - 3)):
+        if count == 2:
+            slope[k], slope_by[k] = secant[0], by[0]
+            continue
+        h0, h1 = h[near], h[min(far, count - 2)]
+        w0, w1 = (2.0 * h0 + h1) / (h0 + h1), -h0 / (h0 + h1)
+        slope[k], slope_by[k] = w0 * secant[near] + w1 * secant[far], w0 * by[near] + w1 * by[far]
+        if slope[k] * secant[near] <= 0.0:
+            slope[k], slope_by[k] = 0.0, 0.0
+        elif secant[near] * secant[far] < 0.0 and abs(slope[k]) > 3.0 * abs(secant[near]):
+            slope[k], slope_by[k] = 3.0 * secant[near], 3.0 * by[near]
+    s = np.clip(at, x[0], x[-1])
+    left = np.clip(np.searchsorted(x, s, "right") - 1, 0, count - 2)
+    t, step = (s - x[left]) / h[left], h[left]
+    a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t)
+    c, d = step * t * (1.0 - t) ** 2, -step * t**2 * (1.0 - t)
+    value = a * y[left] + b * y[left + 1] + c * slope[left] + d * slope[left + 1]
+    weights = (
+        part[:, None] * table
+        for part, table in zip(
+            (a, b, c, d),
+            (eye[left], eye[left + 1], slope_by[left], slope_by[left + 1]),
+            strict=True,
+        )
+    )
+    return value, np.asarray(sum(weights))
+
+
+class BladeSections:
+    """The nodes of a blade, laid flat, and where totals of motions over span take them."""
+
+    def __init__(
+        self,
+        field: SpanField,
+        points: FloatArray,
+        triangles: IntArray,
+        stack: FloatArray | None = None,
+    ) -> None:
+        """Lay the nodes flat, and find stacking points and chords.
+
+        ``points`` (n, 3), ``triangles`` (t, 3): of the blade. ``stack`` (3,): a point through which
+        the stacking line goes, normal to the curves of constant span; None: a straight line fitted
+        to the centroids of the sections' outlines, in (m', theta) over span.
+
+        Raises MeshError if the blade has no span, or reaches the axis.
+        """
+        coords = field.meridional(points)
+        middle = coords.mean(axis=0) if stack is None else field.meridional(stack[None])[0]
+        self.field, self.curves = field, SpanCurves(field, middle[:2])
+        plane = self.curves.plane(coords)
+        self.spans = plane[:, 2]
+        self._radius = coords[:, 1]
+        self._start = plane[:, 0] + 1j * plane[:, 1]
+        self._length = self.curves.length(plane)
+        low, high = self.spans.min(), self.spans.max()
+        if not high - low > 1e-6:
+            raise MeshError("the boundary has one span everywhere, so nothing can vary over it")
+        levels = low + (high - low) * np.linspace(0.01, 0.99, SECTIONS)
+        cuts = [_cut(self._start, self.spans, triangles, level) for level in levels]
+        some = [len(cut) > 0 for cut in cuts]
+        levels, cuts = levels[some], [cut for cut in cuts if len(cut)]
+        edges = np.array([_edges(cut.ravel()) for cut in cuts])
+        if stack is None:
+            centres = np.array([_centroid(cut) for cut in cuts])
+            line = np.polyfit(levels, centres, min(1, len(levels) - 1))
+            centre = np.polyval(line, self.spans)
+        else:
+            centre = np.full(len(plane), 1j * middle[2])
+        left = np.clip(np.searchsorted(levels, self.spans) - 1, 0, max(len(levels) - 2, 0))
+        right = np.minimum(left + 1, len(levels) - 1)
+        gap = np.where(right > left, levels[right] - levels[left], 1.0)
+        part = ((self.spans - levels[left]) / gap)[:, None]
+        leading, trailing = ((1.0 - part) * edges[left] + part * edges[right]).T
+        self._centre, self._away = centre, self._start - centre
+        chord = trailing - leading
+        place = ((self._start - leading) * np.conj(chord)).real / np.abs(chord) ** 2
+        self._camber = 4.0 * place * (1.0 - place) * 1j * chord
+
+    def moved(self, totals: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the points (n, 3) for totals (5, n) of motions, and derivatives (n, 3, 5) by them.
+
+        Raises MeshError if a node would leave the walls' extent.
+        """
+        turn = np.exp(totals[CHORD] + 1j * totals[ANGLE])
+        shape = turn * (self._away + totals[CAMBER] * self._camber)
+        start = self._start.real
+        swept = (
+            start
+            if not totals[SWEEP].any()
+            else self.curves.at_length(self._length + totals[SWEEP], self.spans)
+        )
+        flat = self._centre + (swept - start) + 1j * totals[LEAN] / self._radius + shape
+        plane = np.stack([flat.real, flat.imag, self.spans], axis=1)
+        coords, by_plane = self.curves.coords_and_slopes(plane)
+        by = np.empty((5, len(flat)), complex)
+        by[ANGLE], by[CHORD], by[CAMBER] = 1j * shape, shape, turn * self._camber
+        by[LEAN], by[SWEEP] = 1j / self._radius, 1.0 / self.curves.growth(swept, self.spans)
+        by_totals = np.stack([by.real, by.imag])  # (2, 5, n)
+        slopes = np.einsum("nij,njk,ktn->nit", self.field.slopes(coords), by_plane, by_totals)
+        return self.field.points(coords), slopes
+
+
+def change_of(
+    kind: str, spans: Sequence[float], values: Sequence[float], at: FloatArray
+) -> tuple[int, FloatArray, FloatArray]:
+    """Return which total a motion changes, by how much at spans (n,), and the derivative (n, k).
+
+    The derivative is that by the values of the curve (k,); angles of it are in degrees.
+    """
+    (value, slope), row = curve_at(spans, values, at), ROWS[kind]
+    if row == ANGLE:
+        value, slope = np.radians(value), np.radians(slope)
+    if row == CHORD:
+        value, slope = np.log(value), slope / value[:, None]
+    return row, value, slope
+
+
+ROWS: Mapping[str, int] = {
+    "twist": ANGLE,
+    "stagger": ANGLE,
+    "lean": LEAN,
+    "sweep": SWEEP,
+    "chord": CHORD,
+    "camber": CAMBER,
+}
+"""The row of the totals that a kind of motion adds to."""
+
+
+def _cut(flat: Complex, spans: FloatArray, triangles: IntArray, level: float) -> Complex:
+    """Return the ends (k, 2) of the segments in which triangles (t, 3) have a span."""
+    above = spans[triangles] > level
+    some = triangles[above.any(axis=1) & ~above.all(axis=1)]
+    above = spans[some] > level
+    # First the corner that is alone on its side.
+    odd = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)
+    rows = np.arange(len(some))
+    alone = some[rows, odd]
+    ends = []
+    for k in (1, 2):
+        other = some[rows, (odd + k) % 3]
+        part = (level - spans[alone]) / (spans[other] - spans[alone])
+        ends.append(flat[alone] + part * (flat[other] - flat[alone]))
+    return np.stack(ends, axis=1)
+
+
+def _centroid(cut: Complex) -> complex:
+    length = np.abs(cut[:, 1] - cut[:, 0])
+    return complex(np.average(cut.mean(axis=1), weights=length + 1e-300))
+
+
+def _edges(outline: Complex) -> tuple[complex, complex]:
+    """Return the two points that are farthest apart, the one with the smaller m' first."""
+    ends = np.unique(np.concatenate([_extreme(outline, a) for a in np.linspace(0, np.pi, 181)]))
+    far = np.abs(ends[:, None] - ends)
+    one, two = np.unravel_index(int(np.argmax(far)), far.shape)
+    first, last = sorted((ends[one], ends[two]), key=lambda end: (end.real, end.imag))
+    return complex(first), complex(last)
+
+
+def _extreme(outline: Complex, angle: float) -> Complex:
+    """Return the points that are farthest in a direction, and against it."""
+    height = (outline * np.exp(-1j * angle)).real
+    return outline[[int(np.argmin(height)), int(np.argmax(height))]]

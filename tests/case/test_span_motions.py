@@ -1,0 +1,155 @@
+"""Motions over span in a case: spans kept, sequences, several boundaries, and what is refused."""
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.check import check_case
+from slideviz.case.motion import displacements
+from slideviz.case.spans import span_field
+from slideviz.errors import CaseError
+from slideviz.samples.stator import stator_case, stator_mesh
+from slideviz.samples.table import sample
+from slideviz.session.motions import Ghosts
+from tests.builders import passage, square
+
+TWIST = sv.SpanMotion("blade", "twist", (0.0, 0.5, 1.0), (0.0, 1.0, 5.0))
+LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.0, 0.02))
+
+
+def case_of(*motions, **values):
+    roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
+    return sv.Case(roles=roles, motions=motions, periodic_type="rotational", **values)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return passage((4, 6, 8))
+
+
+def vectors(mesh, *motions, **values):
+    return displacements(case_of(*motions, **values), mesh).vectors
+
+
+def test_nodes_keep_their_span_and_the_hub_stays_to_the_bit(mesh):
+    moved = displacements(case_of(TWIST, LEAN), mesh)
+    before, after = mesh.points[moved.nodes], mesh.points[moved.nodes] + moved.vectors
+    radius = np.hypot(*before[:, :2].T)
+    assert np.abs(np.hypot(*after[:, :2].T) - radius).max() < 1e-15
+    hub = np.abs(radius - 0.5) < 1e-12
+    assert hub.any()
+    assert not moved.vectors[hub].any()
+    assert np.linalg.norm(moved.vectors[~hub], axis=1).max() > 0.02
+
+
+def test_motions_of_one_blade_add_up_in_any_order_and_equal_ones_twice(mesh):
+    both = vectors(mesh, TWIST, LEAN)
+    assert both == pytest.approx(vectors(mesh, LEAN, TWIST), abs=1e-14)
+    assert np.abs(both - vectors(mesh, TWIST) - vectors(mesh, LEAN)).max() > 1e-6
+    double = sv.SpanMotion("blade", "twist", TWIST.spans, tuple(2.0 * v for v in TWIST.values))
+    assert vectors(mesh, TWIST, TWIST) == pytest.approx(vectors(mesh, double), abs=1e-14)
+
+
+def test_motions_of_other_kinds_come_before_or_after(mesh):
+    shift = sv.Translate("blade", (0.0, 0.0, 0.1))
+    alone = vectors(mesh, TWIST)
+    assert vectors(mesh, shift, TWIST) == pytest.approx(alone + [0.0, 0.0, 0.1], abs=1e-15)
+    turn = sv.Rotate("blade", 3.0, (0.0, 0.0, 0.0))
+    after = vectors(mesh, TWIST, turn)
+    assert np.abs(after - alone - vectors(mesh, turn)).max() > 1e-4
+
+
+def test_ghosts_show_the_same(mesh):
+    case = case_of(TWIST, LEAN)
+    moved = displacements(case, mesh)
+    ghost = Ghosts(mesh).moved(case)["blade"]
+    assert np.array_equal(ghost, mesh.points[moved.nodes] + moved.vectors)
+
+
+def test_a_point_of_the_stacking_line_stays(mesh):
+    nodes = mesh.marker("blade").nodes
+    place = int(np.argmax(mesh.points[nodes, 2]))
+    point = tuple(mesh.points[nodes[place]].tolist())
+    twist = sv.SpanMotion("blade", "stagger", (0.0,), (5.0,), point)
+    found = vectors(mesh, twist)
+    assert np.abs(found[place]).max() < 1e-15
+    assert np.linalg.norm(found, axis=1).max() > 0.01
+    with pytest.raises(CaseError, match="motion 2 has another stacking point than motion 1"):
+        vectors(mesh, twist, LEAN)
+
+
+def test_two_boundaries_of_one_blade_move_as_one(mesh):
+    """A blade of two markers moves as that of one: each facet is on one of them."""
+    boundary = mesh.marker("blade").cells
+    types, nodes = boundary.types, boundary.connectivity.reshape(-1, 4)
+    halves = np.arange(len(nodes)) % 2 == 0
+    parts = [
+        sv.Marker(name, sv.Cells.from_types(types[some], nodes[some].ravel()))
+        for name, some in (("front", halves), ("back", ~halves))
+    ]
+    others = [marker for marker in mesh.markers if marker.name != "blade"]
+    split = sv.Mesh(mesh.points, mesh.cells, (*others, *parts), name="split")
+    motion = sv.SpanMotion(("front", "back"), "twist", TWIST.spans, TWIST.values)
+    case = case_of(motion)
+    roles = {"front": "moving", "back": "moving", "per1": "periodic", "per2": "periodic"}
+    moved = displacements(case.change(roles=roles), split).vectors
+    assert moved == pytest.approx(vectors(mesh, TWIST), abs=1e-14)
+    every = case.change(
+        roles=roles, motions=(sv.SpanMotion("", "twist", TWIST.spans, TWIST.values),)
+    )
+    assert np.array_equal(displacements(every, split).vectors, moved)
+
+
+def test_what_cannot_be_is_said_before_the_run(mesh):
+    flat = square(4)
+    case = sv.Case(roles={"BLOCK": "moving"}, motions=(sv.SpanMotion("BLOCK", *TWIST_ARGS),))
+    assert any("the mesh has none: it is 2D" in text for text in check_case(case, flat))
+    case = case_of(TWIST, span=("hub", "top"))
+    assert any("SPAN: plain 3D has no marker 'top'" in text for text in check_case(case, mesh))
+    case = case_of(TWIST, span=("hub", "per1"))
+    assert any("do not face each other" in text for text in check_case(case, mesh))
+    with pytest.raises(CaseError, match="motion 1: blade: the boundary has one span everywhere"):
+        displacements(case_of(TWIST, span=("inflow", "outflow")), flat_blade(mesh))
+
+
+TWIST_ARGS = ("twist", (0.0, 1.0), (0.0, 1.0))
+
+
+def flat_blade(mesh):
+    """Return the mesh with a blade that is the part of its hub before the block."""
+    inflow = mesh.marker("inflow")
+    others = [m for m in mesh.markers if m.name not in ("blade", "inflow")]
+    cells = inflow.cells
+    half = len(cells) // 2
+    table = cells.connectivity.reshape(-1, 4)
+    some = [
+        sv.Marker(name, sv.Cells.from_types(cells.types[rows], table[rows].ravel()))
+        for name, rows in (("inflow", slice(half)), ("blade", slice(half, None)))
+    ]
+    return sv.Mesh(mesh.points, mesh.cells, (*others, *some), name="flat")
+
+
+@pytest.mark.parametrize(("angle", "lowest"), [(5.0, 0.83), (12.0, 0.83)])
+def test_a_stator_twisted_in_five_steps_folds_no_cell(angle, lowest):
+    mesh = stator_mesh(10_000)
+    roles = {**stator_case().roles, "HUB": "sliding", "SHROUD": "sliding"}
+    twist = sv.SpanMotion("BLADE", "twist", (0.0, 1.0), (0.0, angle))
+    case = stator_case().change(roles=roles, motions=(twist,), steps=5, reduction=None)
+    *_, last = sv.deform(case, mesh)
+    found = sv.quality(last.mesh, mesh)
+    assert found.inverted == 0
+    assert found.min > lowest
+    for name, radius in (("HUB", 0.25), ("SHROUD", 0.3)):
+        nodes = mesh.marker(name).nodes
+        assert np.abs(np.hypot(*last.mesh.points[nodes, :2].T) - radius).max() < 1e-15
+
+
+def test_a_blade_of_an_impeller_is_exact_at_each_span_and_folds_no_cell():
+    row = sample("impeller", 3000)
+    *_, last = sv.deform(row.case, row.mesh)
+    field, nodes = span_field(row.case, row.mesh), row.mesh.marker("BLADE").nodes
+    before, after = (
+        field.span(field.meridional(m.points[nodes]))[0] for m in (row.mesh, last.mesh)
+    )
+    assert np.abs(after - before).max() < 1e-12
+    assert sv.quality(last.mesh, row.mesh).inverted == 0
