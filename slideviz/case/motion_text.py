@@ -363,10 +363,13 @@ def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 def curve_text(motion: SpanMotion) -> str:
     """Return the curve of a motion over the span as text, as `read_curve` reads it."""
+    spans, values = (
+        [repr(float(one)).removesuffix(".0") for one in several]
+        for several in (motion.spans, motion.values)
+    )
     if motion.spans == (0.0,):
-        return repr(float(motion.values[0]))
-    pairs = zip(motion.spans, motion.values, strict=True)
-    return ", ".join(f"{float(span)!r}:{float(value)!r}" for span, value in pairs)
+        return values[0]
+    return ", ".join(f"{span}:{value}" for span, value in zip(spans, values, strict=True))
 
 
 def _integers(words: list[Word]) -> list[int]:

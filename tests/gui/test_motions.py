@@ -17,13 +17,15 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Scale,
+    SpanMotion,
     Translate,
 )
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
-from slideviz.gui.panels.motion_editor import control_point_problem
 from slideviz.gui.panels.motions import TableDialog
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.vector_field import control_point_problem
+from slideviz.samples.table import write_sample
 from slideviz.session import changes
 from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.run_messages import run_requirements
@@ -161,6 +163,35 @@ def test_a_file_with_mistakes_is_told_as_it_is_chosen(blade, tmp_path, qtbot):
     told = blade.window.run_panel.text
     qtbot.waitUntil(lambda: "table.txt:1: " in told.text(), timeout=10_000)
     assert not blade.window.run_panel.run.isEnabled()
+
+
+def test_a_curve_over_span_is_typed_checked_and_shown_with_its_ghost(driver, tmp_path):
+    driver.open(write_sample("impeller", tmp_path, 3000)[0])
+    driver.role("BLADE", "moving")
+    driver.add_motion(SpanMotion)
+    form = editor(driver)
+    driver.type(form.curve, "0:0, 0.5:1, 1:5")
+    motion = SpanMotion("BLADE", "twist", (0.0, 0.5, 1.0), (0.0, 1.0, 5.0))
+    assert driver.session.case.motions == (motion,)
+    assert listed(driver) == "1.  BLADE: twist 0° at 0 %, 1° at 50 %, 5° at 100 % span"
+    mesh = driver.session.mesh
+    moved = driver.window.scene.motion_ghosts["BLADE"] - mesh.points[mesh.marker("BLADE").nodes]
+    assert np.linalg.norm(moved, axis=1).max() > 0.01
+    driver.type(form.curve, "0:0, 0.5")
+    assert form.curve.property("bad")
+    assert "expected span:value" in form.curve.toolTip()
+    assert driver.session.case.motions == (motion,)
+    driver.choose(form.about, "point")
+    assert driver.session.case.motions[0].point is not None
+    driver.choose(form.about, "line")
+    assert driver.session.case.motions == (motion,)
+    assert form.curve.value == "0:0, 0.5:1, 1:5"
+    driver.choose(form.change, "chord")
+    assert driver.session.case.motions[0].values == (1.0, 1.0), "at rest"
+    driver.type(form.curve, "0:1, 1:-1")
+    assert "is not above 0" in form.curve.toolTip()
+    driver.choose(form.change, "stagger")
+    assert driver.session.case.motions == (SpanMotion("BLADE", "stagger", (0.0,), (0.0,)),)
 
 
 # Tables ---------------------------------------------------------------------------------------

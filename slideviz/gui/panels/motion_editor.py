@@ -25,21 +25,31 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Scale,
+    SpanMotion,
     Target,
     Translate,
     named,
 )
-from slideviz.case.motion_text import VERB_OF
+from slideviz.case.motion_text import VERB_OF, curve_text, read_curve
 from slideviz.case.motion_words import direction_words, target_words
 from slideviz.gui.widgets.build import as_widget, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, TextField, not_zero
-from slideviz.gui.widgets.vector_field import VectorField, a_direction
+from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, not_zero
+from slideviz.gui.widgets.vector_field import (
+    VectorField,
+    a_direction,
+    chord_problem,
+    control_point_problem,
+    peak_problem,
+    scale_problem,
+    term_problem,
+)
 from slideviz.session.motions import Axis, new_motion, radial
-from slideviz.terms import MOTION_KINDS, SIDES
+from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS
 
 ABOUT = {
     "centroid": "its centroid",
+    "line": "a line through its sections",
     "axis": "the machine's axis",
     "radial": "radial through its centroid",
     "point": "a point",
@@ -92,6 +102,8 @@ ROWS: dict[str, FormRow] = {
         lambda percent: round(1.0 + percent / 100.0, 14),
     ),
     "distance": FormRow("and by (length)", "distance"),
+    "change": FormRow("Changes", "kind"),
+    "curve": FormRow("Over span", "spans"),
     "about": FormRow("About", "point"),
     "point": FormRow("Point", "point"),
     "axis": FormRow("Axis", "axis"),
@@ -120,10 +132,12 @@ FIELDS: dict[type, tuple[str, ...]] = {
     FfdCamber: ("index", "box", "amount"),
     FfdThickness: ("index", "box", "amount"),
     FfdTwist: ("plane", "box", "angle", "point", "axis"),
+    SpanMotion: ("curve", "change"),
     FromFile: ("path",),
 }
 """Rows of each kind of motion, the one to be typed into first at the beginning. Those of point and
-axis of `Rotate`, `Scale` and `Radial` depend on what stays in place."""
+axis of motions with ``about`` depend on what stays in place."""
+WITH_ABOUT = Rotate | Scale | Radial | SpanMotion
 
 
 class MotionEditor(QWidget):
@@ -221,6 +235,14 @@ class MotionEditor(QWidget):
             names=("x from", "to"),
             tip="x of the leading and of the trailing edge: the airfoil lies along x.",
         )
+        kinds = {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()}
+        self.change = Choice(kinds, "What of the blade's sections the curve changes.")
+        self.change.set_tips({kind: term.tip for kind, term in SPAN_KINDS.items()})
+        self.curve = CheckedText(
+            self._curve_as_written,
+            "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, 1:4; "
+            "or one value for all. A smooth curve goes through them.",
+        )
         self.path = TextField()
         self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
@@ -246,16 +268,17 @@ class MotionEditor(QWidget):
         widest = max(label.sizeHint().width() for label in labels)
         for label in labels:
             label.setMinimumWidth(widest)
-        for choice in (self.kind, self.marker, self.about, self.box, self.side):
+        for choice in (self.kind, self.marker, self.about, self.box, self.side, self.change):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def _connect(self) -> None:
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
+        self.change.chosen.connect(self._change_chosen)
         for choice in (self.marker, self.box, self.side):
             choice.chosen.connect(lambda _: self._emit_changed())
         for field in self._rows.values():
-            if isinstance(field, NumberField | VectorField):
+            if isinstance(field, NumberField | VectorField | CheckedText):
                 field.changed.connect(lambda _: self._emit_changed())
         self.path.textEdited.connect(lambda _: self._emit_changed())
         self.browse.clicked.connect(self._browse)
@@ -268,7 +291,8 @@ class MotionEditor(QWidget):
         if motion is None:
             return
         self._sync_targets(motion, targets)
-        self.kind.set_item_enabled(FfdTwist, dim == 3)  # a section has no span to twist along
+        for kind in (FfdTwist, SpanMotion):  # a section has no span to twist along
+            self.kind.set_item_enabled(kind, dim == 3)
         self.kind.show_value(type(motion))
         for name in FIELDS.get(type(motion), ()):
             row = ROWS[name]
@@ -276,7 +300,7 @@ class MotionEditor(QWidget):
         shown = {*FIELDS.get(type(motion), ())}
         if isinstance(motion, OnAirfoil):
             self._name_height(motion)
-        if isinstance(motion, Rotate | Scale | Radial):
+        if isinstance(motion, WITH_ABOUT):
             shown |= {"about"} | self._show_place(motion, dim)
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
@@ -288,6 +312,9 @@ class MotionEditor(QWidget):
         """Show a value in the field of a row."""
         if name == "box":
             self._sync_boxes(value)
+        elif name == "curve":
+            assert isinstance(self._motion, SpanMotion)
+            self.curve.show_value(curve_text(self._motion))
         elif name != "path":
             getattr(self, name).show_value(value)
         elif str(value) != self.path.text() and not self.path.hasFocus():
@@ -301,10 +328,12 @@ class MotionEditor(QWidget):
         label.setText(title)
         self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
 
-    def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
+    def _show_place(self, motion: Rotate | Scale | Radial | SpanMotion, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
         offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
-        if self.machine is not None and not isinstance(motion, Scale):
+        if isinstance(motion, SpanMotion):
+            offered[0] = "line"
+        elif self.machine is not None and not isinstance(motion, Scale):
             offered.insert(-1, "axis")
         if self._radial(motion) is not None:
             offered.insert(-1, "radial")
@@ -313,14 +342,17 @@ class MotionEditor(QWidget):
             self.about.clear()
             for what, word in zip(offered, words, strict=True):
                 self.about.addItem(word, what)
-        what = "centroid" if motion.point == "centroid" else "point"
+        what = {"centroid": "centroid", None: "line"}.get(motion.point, "point")  # type: ignore[arg-type]
         if "axis" in offered and self._is_machine(motion) and not self._as_point:
             what = "axis"
         elif "radial" in offered and what == "centroid" and motion.axis == self._radial(motion):
             what = "radial"
         self.about.show_value(what)
-        if motion.point != "centroid":
+        if what == "point":
+            assert isinstance(motion.point, tuple)
             self.point.show_value(motion.point)
+        if isinstance(motion, SpanMotion):
+            return {"point"} if what == "point" else set()
         if not isinstance(motion, Scale):
             self.axis.show_value(motion.axis)
         turns = not isinstance(motion, Scale) and dim == 3 and what not in ("axis", "radial")
@@ -336,15 +368,15 @@ class MotionEditor(QWidget):
         return radial(self.machine, self.centroid_of(motion.marker))
 
     def _about_words(self, what: str) -> str:
-        if what in ("centroid", "radial") and len(named(self._motion.marker)) != 1:
+        if what in ("centroid", "radial", "line") and len(named(self._motion.marker)) != 1:
             return ABOUT[what].replace("its", "their")
         if what != "axis" or self._dim == 2 or self.machine is None:
             return ABOUT[what]
         axis, _ = self.machine
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
-    def _is_machine(self, motion: Rotate | Scale | Radial) -> bool:
-        if self.machine is None or isinstance(motion, Scale):
+    def _is_machine(self, motion: Rotate | Scale | Radial | SpanMotion) -> bool:
+        if self.machine is None or isinstance(motion, Scale | SpanMotion):
             return False
         axis, origin = self.machine
         return motion.axis == axis and motion.point == origin[: self._dim]
@@ -374,6 +406,19 @@ class MotionEditor(QWidget):
             motion = new_motion(kind, marker, self._dim, self.machine, self.boxes, chord)
             self.changed.emit(motion)
 
+    def _change_chosen(self, kind: Any) -> None:
+        """Emit a motion that changes something else, at rest: its values have another unit."""
+        if isinstance(self._motion, SpanMotion) and kind != self._motion.kind:
+            spans = (0.0,) if kind == "stagger" else (0.0, 1.0)
+            values = (SPAN_KINDS[kind].rest,) * len(spans)
+            self.changed.emit(replace(self._motion, kind=kind, spans=spans, values=values))
+
+    def _curve_as_written(self, text: str) -> str:
+        """Return the text of a curve of the motion over the span; CaseError if it is none."""
+        assert isinstance(self._motion, SpanMotion)
+        spans, values = read_curve(text)
+        return curve_text(replace(self._motion, spans=spans, values=values))
+
     def _about_chosen(self, what: str) -> None:
         """Set the fixed point and axis to a choice, a key of `ABOUT`, and emit the motion."""
         motion = self._motion
@@ -381,7 +426,7 @@ class MotionEditor(QWidget):
         across = self._radial(motion)
         radially = across is not None and getattr(motion, "axis", None) == across
         self._as_point = what == "point"
-        if what == "point" and getattr(motion, "point", None) == "centroid":
+        if what == "point" and getattr(motion, "point", None) in ("centroid", None):
             self.point.show_value(self.centroid_of(motion.marker))
         elif what == "axis" and self.machine is not None:
             axis, origin = self.machine
@@ -399,7 +444,7 @@ class MotionEditor(QWidget):
         """Reset what is not of the motion before another is shown: “a point”, invalid texts."""
         self._as_point = False
         for field in self._rows.values():
-            if isinstance(field, NumberField | VectorField):
+            if isinstance(field, NumberField | VectorField | CheckedText):
                 field.restore()
 
     def focus(self) -> None:
@@ -420,9 +465,11 @@ class MotionEditor(QWidget):
         motion = self._motion
         assert motion is not None
         values = {ROWS[name].attribute: self._typed(name) for name in FIELDS[type(motion)]}
-        if isinstance(motion, Rotate | Scale | Radial):
-            centred = self.about.currentData() in ("centroid", "radial")
-            values["point"] = "centroid" if centred else self.point.value
+        if isinstance(motion, SpanMotion):
+            values["spans"], values["values"] = read_curve(self.curve.value)
+        if isinstance(motion, WITH_ABOUT):
+            fixed = {"centroid": "centroid", "radial": "centroid", "line": None}
+            values["point"] = fixed.get(self.about.currentData(), self.point.value)
         if isinstance(motion, Rotate | Radial):
             values["axis"] = self._typed("axis") if self._dim == 3 else Z
         edited = replace(motion, marker=self._targets[self.marker.currentData()], **values)
@@ -437,6 +484,8 @@ class MotionEditor(QWidget):
         if name == "path":
             return Path(field.text().strip())
         before = getattr(self._motion, row.attribute)
+        if isinstance(field, CheckedText):
+            return before
         if isinstance(field, VectorField) and field.problem:
             return before
         value = row.read(field.value)
@@ -449,31 +498,3 @@ class MotionEditor(QWidget):
         if name:
             self.path.setText(name)
             self._emit_changed()
-
-
-def scale_problem(value: float) -> str:
-    """Return why a radius cannot change by this many percent; empty if it can."""
-    return "" if value > -100.0 else "-100 % or less would fold the boundary"
-
-
-def control_point_problem(values: Sequence[float]) -> str:
-    """Return why numbers are no index of a control point; empty if they are."""
-    whole = all(value == int(value) and value >= -1 for value in values)
-    return "" if whole else "expected whole numbers from 0, or -1 for all"
-
-
-def term_problem(values: Sequence[float]) -> str:
-    """Return why numbers are no term of a shape function; empty if they are."""
-    k, n = values
-    whole = k == int(k) and n == int(n) and 1 <= k <= n
-    return "" if whole else "expected whole numbers, and a term from 1 to how many there are"
-
-
-def peak_problem(value: float) -> str:
-    """Return why a bump cannot have its peak at this percentage of the chord; empty if it can."""
-    return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
-
-
-def chord_problem(values: Sequence[float]) -> str:
-    """Return why a chord cannot go from one x to another; empty if it can."""
-    return "" if values[0] < values[1] else "the trailing edge has the larger x"

@@ -13,6 +13,7 @@ from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValidator, QWheelEvent
 from qtpy.QtWidgets import QApplication, QCheckBox, QLineEdit, QSpinBox, QWidget
 
+from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import set_style
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.services import main_window
@@ -129,6 +130,65 @@ class TextField(QLineEdit):
     def event(self, event: QEvent) -> bool:
         handled = _undo_in_field(self, event)
         return super().event(event) if handled is None else handled
+
+
+class CheckedText(TextField):
+    """A field for a text that may be wrong: it is marked as invalid then, and emits nothing.
+
+    Its value is then the one from before the editing, not a valid beginning of what was typed.
+    ``read``: returns a text as it is written, or raises a SlidevizError that says what is wrong.
+    """
+
+    changed = Signal(str)
+    """The new text, as it is written, after each valid edit."""
+
+    def __init__(self, read: Callable[[str], str], tip: str = "") -> None:
+        super().__init__()
+        self._read, self._tip, self.value, self._before = read, tip, "", ""
+        self.setToolTip(wrapped(tip))
+        self.textEdited.connect(self._edited)
+
+    @property
+    def problem(self) -> str:
+        """Return why the text is invalid; empty if it is valid."""
+        try:
+            self._read(self.text())
+        except SlidevizError as problem:
+            return str(problem)
+        return ""
+
+    def show_value(self, text: str) -> None:
+        """Set the text; nothing is emitted, and what is typed of the same value stays."""
+        same = text == self.value and self.isModified()
+        self.value = text
+        if not same:
+            self._before = text
+            self.restore()
+
+    def restore(self) -> None:
+        """Replace the text by the last valid one; nothing is emitted."""
+        self.setText(self.value)
+        self.setCursorPosition(0)
+        self._mark("")
+
+    def _edited(self) -> None:
+        problem = self.problem
+        value = self._before if problem else self._read(self.text())
+        if value != self.value:
+            self.value = value
+            self.changed.emit(value)
+        self._mark(problem)
+
+    def _mark(self, problem: str) -> None:
+        self.setToolTip(wrapped(problem or self._tip))
+        set_style(self, "bad", bool(problem))
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if not self.problem:
+            self._before = self.value
+        elif self.isModified():
+            _report_restored(self, self.problem, self.value)
 
 
 class NumberField(TextField):
