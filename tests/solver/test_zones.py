@@ -186,6 +186,13 @@ def test_a_stream_takes_one_zone(tmp_path, capsys):
     )
 
 
+@pytest.mark.parametrize("words", [["compare", "--no-pictures"], ["gap"]])
+def test_some_commands_are_of_one_zone(tmp_path, words, capsys):
+    both().change(mesh_file=stage(tmp_path)).write(tmp_path / "c.cfg")
+    assert command([words[0], str(tmp_path / "c.cfg"), *words[1:]]) == 1
+    assert "has 2 zones, but a " in capsys.readouterr().err
+
+
 def test_a_setup_is_of_one_zone(tmp_path):
     from slideviz.solver.setup import make_setup
 
