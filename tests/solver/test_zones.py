@@ -12,6 +12,8 @@ from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.zones import zones_of
+from slideviz.session.large import is_large
+from slideviz.session.motions import Ghosts
 from slideviz.session.opening import guess_roles
 from tests.builders import sector
 from tests.mesh.test_interfaces import zones
@@ -93,6 +95,24 @@ def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
     ):
         with pytest.raises(CaseError, match=message):
             last(both().change(motions=(motion,)), sv.read(stage(tmp_path)))
+
+
+def test_a_displacement_file_numbers_the_nodes_of_its_zone(tmp_path):
+    path = stage(tmp_path)
+    alone = sv.read(path, 2)
+    nodes = alone.marker("BLOCK").nodes
+    listed = "\n".join(f"{node} 0.01 {0.001 * k}" for k, node in enumerate(nodes))
+    (tmp_path / "d.txt").write_text(listed)
+
+    def case(zone):
+        motion = sv.FromFile(tmp_path / "d.txt", f"{zone}BLOCK")
+        return sv.Case(roles=roles_of(zone), motions=(motion,), sliding="ps")
+
+    mesh = sv.read(path)
+    moved = last(case("2:"), mesh).mesh
+    assert np.array_equal(zones_of(moved)[1].points, last(case(""), alone).mesh.points)
+    ghost = Ghosts(mesh).moved(case("2:"))["2:BLOCK"]
+    np.testing.assert_allclose(ghost, moved.points[mesh.marker("2:BLOCK").nodes], atol=1e-15)
 
 
 def test_errors_and_warnings_name_the_zone(tmp_path):
@@ -184,6 +204,12 @@ def test_a_stream_takes_one_zone(tmp_path, capsys):
     assert "has 2 zones, of which only one at a time can be streamed; choose" in (
         capsys.readouterr().err
     )
+
+
+def test_a_binary_of_several_zones_is_opened_in_memory(tmp_path):
+    path = zones(tmp_path, "zones.su2b")
+    assert not is_large(path, None)
+    assert not is_large(path, 2)
 
 
 @pytest.mark.parametrize("words", [["compare", "--no-pictures"], ["gap"]])
