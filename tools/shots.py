@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.case.model import Case, Motion, Rotate, Translate
 from slideviz.errors import SlidevizError
+from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.samples.table import sample, write_sample
@@ -69,6 +70,9 @@ def settle(window: MainWindow) -> None:
 
 STATOR_CELLS = 40_000
 """Approximate number of cells of the sample ``stator``."""
+
+IMPELLER_CELLS = 30_000
+"""Approximate number of cells of the centrifugal compressor."""
 
 TURNED: tuple[Motion, ...] = (
     Rotate("BLADE", 15.0, (0.275, 0.0, 0.0525), (1.0, 0.0, 0.0)),
@@ -195,6 +199,23 @@ def _near_hub(window: MainWindow, other: int, zoom: float) -> None:
     scene.camera.zoom_at(0.62 * view.width(), 0.4 * view.height(), zoom)
 
 
+def span(window: MainWindow, place: Path) -> None:
+    """Show a section at 90 % span, laid flat, and the throat by span before and after the run."""
+    _open(window, _stator(place))
+    _run(window, **SLIDING)
+    window.dock_manager.bring_to_front("sections")
+    panel = window.dock_manager.panel(SectionsPanel)
+    panel.add["span"].click()
+    panel.editor.changed.emit(window.store.session.view.sections[0].sized(0.9))
+    window.store.change(changes.set_view, passages=1)
+    window.section_views.want_flat(True)
+    window.store.change(changes.show_boundaries, OUTER, False)
+    window.dock_manager.bring_to_front("curves")
+    window.dock_manager.panel(CurvesPanel).show_kind("gaps")
+    settle(window)
+    _look(window, 25.0, -10.0)
+
+
 def beside(window: MainWindow, place: Path) -> None:
     """Show two methods side by side, on a cylindrical section near the hub."""
     _open(window, _stator(place))
@@ -248,6 +269,7 @@ STATES = (
     ShotState("quality", quality),
     ShotState("wheel", wheel),
     ShotState("section", section),
+    ShotState("machine-span", span),
     ShotState("side-by-side", beside),
     ShotState("repaired", repaired),
     ShotState("zones", zones),
@@ -293,7 +315,28 @@ def shots(folder: Path) -> list[Path]:
             with open_window(place) as window:
                 state.bring(window, place)
                 made.append(photograph(window, folder / f"{state.name}.png"))
-        return [*made, film_of_passage(folder / "passage.gif")]
+        return [*made, film_of_passage(folder / "passage.gif"), *machine_pictures(folder, place)]
+
+
+def machine_pictures(folder: Path, place: Path) -> list[Path]:
+    """Write a compressor's section and meridional view, and a throat; return their paths."""
+    from slideviz.cli import run
+    from slideviz.formats.files import write
+    from slideviz.samples.impeller import impeller_mesh
+
+    mesh, case = place / "impeller.su2", str(_stator(place))
+    write(mesh, impeller_mesh(IMPELLER_CELLS))
+    made = [folder / f"machine-{name}.png" for name in ("flat", "meridional", "throat")]
+    files = [str(path) for path in made]
+    for command in (
+        ["section", str(mesh), "--span", "0.5", "--copies", "1", "-o", files[0]],
+        ["section", str(mesh), "--meridional", "--size", "1400x900", "-o", files[1]],
+        ["gap", case, "-q", "-o", files[2]],
+    ):
+        run(command)
+    for path in made:
+        shrink(path)
+    return made
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from slideviz.sections.span import SpanWalls
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LARGE = 75.0  # bins are as large as this percentage of the cells, so that most bins have some
+LARGE = 95.0  # bins are as large as this percentage of the cells, so that most bins have some
 MOST_BINS = 120  # most bins in each direction
 
 
@@ -55,7 +55,7 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
     plane = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))
     used = np.stack([np.clip(plane[:, 2], 0.0, 1.0), curves.length(plane)], axis=1)
     k = _bins_of(mesh, used[:, 0])
-    row = np.minimum(used[:, 0] * k, k - 1).astype(np.int64)
+    row = np.rint(used[:, 0] * k)  # 0 and k: the walls
     ends = []
     for order in (np.argsort(used[:, 1]), np.argsort(-used[:, 1])):
         first = order[np.unique(row[order], return_index=True)[1]]  # the extreme of each row

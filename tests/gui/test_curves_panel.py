@@ -9,11 +9,14 @@ from qtpy.QtGui import QMouseEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.model import Translate
+from slideviz.case.model import Case, Translate
 from slideviz.color_scheme import DARK
 from slideviz.gui.panels.curves import CurvesPanel
+from slideviz.mesh.quality import quality
 from slideviz.session import changes, jobs
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import Session, StepFrame
+from tests.builders import passage
 from tests.gui.test_worst import session_with_runs
 
 
@@ -39,7 +42,7 @@ def lines(panel):
     return {line.get_gid() or line.get_label(): line for line in axes.lines}
 
 
-@pytest.mark.parametrize("kind", ["steps", "reach", "greedy", "span"])
+@pytest.mark.parametrize("kind", ["steps", "reach", "greedy", "span", "meridional", "gaps"])
 def test_without_a_mesh_it_says_what_to_do(panel, kind):
     choose(panel, kind)
     assert panel.area.shows_text
@@ -186,6 +189,43 @@ def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbo
         choose(full, "span")
     texts = [text.get_text() for text in full.canvas.figure.texts]
     assert texts == ["the mesh has no extent along r; choose another"]
+
+
+def drawn_kind(panel, kind, qtbot):
+    """Choose a plot, wait until it is drawn, and return its figure."""
+    with qtbot.waitSignal(panel.canvas.drawn, timeout=60_000):
+        choose(panel, kind)
+    qtbot.waitUntil(lambda: not panel.canvas.busy, timeout=60_000)
+    return panel.canvas.figure
+
+
+def test_of_a_machine_the_meridional_view_throat_and_span_are_drawn(panel, qtbot):
+    mesh = passage((2, 6, 6), 40.0)
+    roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
+    case = Case(roles=roles, periodic_type="rotational")
+    with qtbot.waitSignal(panel.canvas.drawn, timeout=60_000):
+        panel.kind.show_value("meridional")
+        panel.store.put(open_mesh(StepFrame(mesh, quality(mesh)), None, (), case))
+    view, bar = drawn_kind(panel, "meridional", qtbot).axes
+    assert (view.get_xlabel(), bar.get_ylabel()) == ("z [mesh units]", "mean size-skew [-]")
+    assert not panel.whole.isVisible()
+    [throat] = drawn_kind(panel, "gaps", qtbot).axes
+    assert throat.get_xlabel() == "throat [mesh units]"
+    [line, dot] = throat.lines
+    assert (line.get_gid(), len(line.get_xdata())) == ("undeformed", 25)
+    assert dot.get_ydata() == pytest.approx([0.0], abs=1e-9)
+    drawn_kind(panel, "span", qtbot)
+    panel.coordinate.show_value("span")
+    [axes] = drawn_kind(panel, "span", qtbot).axes
+    assert axes.get_ylabel() == "span before deformation [-]"
+    assert axes.get_ylim() == pytest.approx((0.0, 1.0))
+
+
+def test_what_is_no_machine_is_told_in_the_plot(full, qtbot):
+    [text] = drawn_kind(full, "meridional", qtbot).texts
+    assert "needs a mesh in 3D" in text.get_text() or "do not say" in text.get_text()
+    [text] = drawn_kind(full, "gaps", qtbot).texts
+    assert "no blade" in text.get_text() or "one blade" in text.get_text()
 
 
 def test_another_mesh_is_begun_with(full):

@@ -211,6 +211,11 @@ class CurvesPanel(Panel):
         find = partial(self._profiles.of, session, coordinate)
         return partial(draw_or_say, partial(draw_span, find, coordinate, what, whole))
 
+    def show_kind(self, kind: str) -> None:
+        """Show a plot of `KINDS`."""
+        self.kind.show_value(kind)
+        self._other_plot()
+
     # What the user does ----------------------------------------------------------------
     def _other_plot(self) -> None:
         """Draw the newly selected plot; wipe the old one first, as its axes are other ones."""
