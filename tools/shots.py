@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.case.model import Case, Motion, Rotate, Translate
+from slideviz.case.model import Case, Motion, Rotate, SpanMotion, Translate
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.sections import SectionsPanel
@@ -164,6 +164,16 @@ def quality(window: MainWindow, place: Path) -> None:
     _look(window, 30.0, 0.0)
 
 
+def twist(window: MainWindow, place: Path) -> None:
+    """Show the curve of a twist over the span, with its ghost."""
+    _open(window, _stator(place))
+    curve = SpanMotion("BLADE", "twist", (0.0, 0.5, 1.0), (0.0, 0.5, 3.0))
+    window.store.change(changes.set_case, motions=(curve,))
+    window.store.change(changes.show_boundaries, OUTER, False)
+    window.motions.editor.drawn.setFocus()
+    _look(window, 30.0, -8.0)
+
+
 def wheel(window: MainWindow, place: Path) -> None:
     """Show all passages of the stator after a run."""
     _open(window, _stator(place))
@@ -267,6 +277,7 @@ def dark(window: MainWindow, place: Path) -> None:
 STATES = (
     ShotState("roles", roles),
     ShotState("quality", quality),
+    ShotState("twist", twist),
     ShotState("wheel", wheel),
     ShotState("section", section),
     ShotState("machine-span", span),

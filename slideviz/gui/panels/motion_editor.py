@@ -35,6 +35,7 @@ from slideviz.case.motion_words import direction_words, target_words
 from slideviz.gui.widgets.build import as_widget, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, not_zero
+from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.gui.widgets.vector_field import (
     VectorField,
     a_direction,
@@ -238,8 +239,9 @@ class MotionEditor(QWidget):
         kinds = {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()}
         self.change = Choice(kinds, "What of the blade's sections the curve changes.")
         self.change.set_tips({kind: term.tip for kind, term in SPAN_KINDS.items()})
+        self.drawn = SpanCurveField()
         self.curve = CheckedText(
-            self._curve_as_written,
+            self.drawn.written,
             "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, 1:4; "
             "or one value for all. A smooth curve goes through them.",
         )
@@ -263,6 +265,8 @@ class MotionEditor(QWidget):
         for name, row in ROWS.items():
             self._rows[name] = file if name == "path" else getattr(self, name)
             self.form.addRow(QLabel(row.title), self._rows[name])
+            if name == "curve":
+                self.form.addRow(self.drawn)
         # One width for all labels, so that the fields do not jump from motion to motion.
         labels = [self.form.labelForField(widget) for widget in self._rows.values()]
         widest = max(label.sizeHint().width() for label in labels)
@@ -274,12 +278,13 @@ class MotionEditor(QWidget):
     def _connect(self) -> None:
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        self.change.chosen.connect(self._change_chosen)
+        self.change.chosen.connect(self.drawn.change_kind)
         for choice in (self.marker, self.box, self.side):
             choice.chosen.connect(lambda _: self._emit_changed())
         for field in self._rows.values():
             if isinstance(field, NumberField | VectorField | CheckedText):
                 field.changed.connect(lambda _: self._emit_changed())
+        self.drawn.changed.connect(self.changed)
         self.path.textEdited.connect(lambda _: self._emit_changed())
         self.browse.clicked.connect(self._browse)
         self.table.clicked.connect(lambda _: self.table_wanted.emit())
@@ -302,6 +307,7 @@ class MotionEditor(QWidget):
             self._name_height(motion)
         if isinstance(motion, WITH_ABOUT):
             shown |= {"about"} | self._show_place(motion, dim)
+        self.form.setRowVisible(self.drawn, isinstance(motion, SpanMotion))
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))
@@ -315,6 +321,7 @@ class MotionEditor(QWidget):
         elif name == "curve":
             assert isinstance(self._motion, SpanMotion)
             self.curve.show_value(curve_text(self._motion))
+            self.drawn.show_motion(self._motion)
         elif name != "path":
             getattr(self, name).show_value(value)
         elif str(value) != self.path.text() and not self.path.hasFocus():
@@ -406,19 +413,6 @@ class MotionEditor(QWidget):
             motion = new_motion(kind, marker, self._dim, self.machine, self.boxes, chord)
             self.changed.emit(motion)
 
-    def _change_chosen(self, kind: Any) -> None:
-        """Emit a motion that changes something else, at rest: its values have another unit."""
-        if isinstance(self._motion, SpanMotion) and kind != self._motion.kind:
-            spans = (0.0,) if kind == "stagger" else (0.0, 1.0)
-            values = (SPAN_KINDS[kind].rest,) * len(spans)
-            self.changed.emit(replace(self._motion, kind=kind, spans=spans, values=values))
-
-    def _curve_as_written(self, text: str) -> str:
-        """Return the text of a curve of the motion over the span; CaseError if it is none."""
-        assert isinstance(self._motion, SpanMotion)
-        spans, values = read_curve(text)
-        return curve_text(replace(self._motion, spans=spans, values=values))
-
     def _about_chosen(self, what: str) -> None:
         """Set the fixed point and axis to a choice, a key of `ABOUT`, and emit the motion."""
         motion = self._motion
@@ -459,6 +453,7 @@ class MotionEditor(QWidget):
     def set_extent(self, extent: float) -> None:
         """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
         self.point.set_scale(extent)
+        self.drawn.set_extent(extent)
 
     def _emit_changed(self) -> None:
         """Emit the motion that the fields describe, if it differs from the shown one."""

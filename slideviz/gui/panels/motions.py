@@ -22,7 +22,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.model import FfdTwist, FromFile, Motion, Target, Translate, named
+from slideviz.case.model import FfdTwist, FromFile, Motion, SpanMotion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.errors import SlidevizError
@@ -59,6 +59,7 @@ from slideviz.session.reach import TYPED_TIP, typed_words
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
+from slideviz.terms import SPAN_KINDS
 
 FILTERS = "Displacements (*.txt)"
 ABOUT = (
@@ -171,6 +172,7 @@ class MotionPanel(Panel):
         self.editor = MotionEditor()
         self.editor.centroid_of, self.editor.chord_of = self._centroid, self._chord
         self.editor.changed.connect(self._edited)
+        self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
         parts = (buttons, self.list, self.editor, self.hint, None)
@@ -184,7 +186,8 @@ class MotionPanel(Panel):
         menu = QMenu()
         self.add = tool_button("", image="add", text="Add motion", menu=menu, name="add_motion")
         self.add_actions = {}
-        for kind, words in KINDS.items():
+        for kind, label in KINDS.items():
+            words = label if kind is not SpanMotion else f"{label}: {', '.join(SPAN_KINDS)}"
             self.add_actions[kind] = menu.addAction(words[:1].upper() + words[1:])
             self.add_actions[kind].triggered.connect(partial(self._add, kind))
         self.add_table = menu.addAction("Displacement table…", self.new_table)
@@ -237,7 +240,8 @@ class MotionPanel(Panel):
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         mesh = session.mesh
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
-        self.add_actions[FfdTwist].setEnabled(mesh is None or mesh.dim == 3)  # as in the editor
+        for kind in (FfdTwist, SpanMotion):  # as in the editor
+            self.add_actions[kind].setEnabled(mesh is None or mesh.dim == 3)
         self.editor.set_extent(self._extent)
 
     def _chord(self, target: Target) -> tuple[float, float]:
