@@ -144,10 +144,10 @@ SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]
 
 @dataclass(frozen=True)
 class SpanTerm(Term):
-    """The words for what a curve over the span changes; where it is ``rest``, nothing changes."""
+    """The words for what a curve over the span changes; where it is ``neutral``, nothing changes."""
 
     unit: str = ""
-    rest: float = 0.0
+    neutral: float = 0.0
 
 
 SPAN_KINDS: dict[SpanKind, SpanTerm] = {
@@ -157,7 +157,9 @@ SPAN_KINDS: dict[SpanKind, SpanTerm] = {
     "stagger": SpanTerm("stagger", "Turns all sections by one angle.", unit="°"),
     "lean": SpanTerm("lean", "Shifts sections along θ, by a length.", unit="length"),
     "sweep": SpanTerm("sweep", "Shifts sections along m, by a length.", unit="length"),
-    "chord": SpanTerm("chord", "Scales sections about the stacking line.", unit="factor", rest=1.0),
+    "chord": SpanTerm(
+        "chord", "Scales sections about the stacking line.", unit="factor", neutral=1.0
+    ),
     "camber": SpanTerm(
         "camber", "Bends sections towards growing θ, by a part of their chord.", unit="part"
     ),

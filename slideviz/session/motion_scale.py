@@ -49,7 +49,7 @@ def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | No
 def _values(motion: Motion) -> list[tuple[str, Any, float]]:
     """Return name and value of the fields that say how far, and their value at rest."""
     if isinstance(motion, SpanMotion):
-        return [("values", motion.values, SPAN_KINDS[motion.kind].rest)]
+        return [("values", motion.values, SPAN_KINDS[motion.kind].neutral)]
     names = [(field.name, float(field.name in RATIOS)) for field in fields(motion)]
     return [(k, getattr(motion, k), rest) for k, rest in names if k in LINEAR or rest]
 

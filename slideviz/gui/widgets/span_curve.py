@@ -89,7 +89,7 @@ class SpanCurveField(QWidget):
         if self._motion is None or len(points) != len(self._points):
             self._at = len(points) - 1
         self._motion, self._points, term = motion, points, SPAN_KINDS[motion.kind]
-        self._neutral, self._unit = term.rest, term.unit if term.unit == "°" else ""
+        self._neutral, self._unit = term.neutral, term.unit if term.unit == "°" else ""
         self._least = RANGES[term.unit] * (self._extent if term.unit == "length" else 1.0)
         self._refit()
 
@@ -103,7 +103,7 @@ class SpanCurveField(QWidget):
         """Emit a motion that changes something else, at rest: its values have another unit."""
         if self._motion is not None and kind != self._motion.kind:
             spans = (0.0,) if kind == "stagger" else (0.0, 1.0)
-            values = (SPAN_KINDS[kind].rest,) * len(spans)
+            values = (SPAN_KINDS[kind].neutral,) * len(spans)
             self.changed.emit(replace(self._motion, kind=kind, spans=spans, values=values))
 
     def _emit(self) -> None:
