@@ -144,7 +144,7 @@ SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]
 
 @dataclass(frozen=True)
 class SpanTerm(Term):
-    """The words for what a curve over the span changes; where it is ``neutral``, nothing changes."""
+    """Words for what a curve over the span changes; where it is ``neutral``, nothing changes."""
 
     unit: str = ""
     neutral: float = 0.0
