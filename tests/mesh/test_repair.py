@@ -1,5 +1,6 @@
 """Repair of folded cells: all types are mended, and everything else keeps its bits."""
 
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -343,3 +344,15 @@ def test_a_lift_shortens_no_edge_to_raise_the_quality():
         return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min()
 
     assert shortest(done.mesh) > 0.3 * shortest(last.mesh)
+
+
+@pytest.mark.parametrize("kind", ["plain", "mixed"])
+def test_an_undeformed_mesh_that_is_folded_itself_makes_no_infinite_target(kind):
+    mesh = grid((3, 3, 3), kind=kind)
+    held, rng = held_boundary(mesh), np.random.default_rng(4)
+    points = np.where(held[:, None], mesh.points, rng.random((2, *mesh.points.shape)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        targets_folded = mesh.with_points(points[0])
+        result = repair(mesh.with_points(points[1]), Freedom.within(3, held), targets_folded)
+    assert len(result.bad_after) < len(result.bad_before)

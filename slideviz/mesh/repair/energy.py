@@ -43,6 +43,9 @@ CORNER_AT = {
 LEAST_SCALE = 0.1
 """Least coefficient of a target, over its mean one."""
 
+LEAST_LENGTH = 1e-9
+"""Least length of a target's edge, over its longest one."""
+
 LEAST_SINE = 0.01
 """Least Jacobian of a target's corner over the product of its edges; flatter ones are opened."""
 
@@ -78,10 +81,11 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     each = np.arange(m * n).reshape(m, n)
     write_coefficients(vtk, np.ascontiguousarray(at.reshape(-1, d)), each, table, found)
     found *= signs
-    mean = np.maximum(found.mean(axis=0), np.finfo(float).tiny)
     edges = at[:, table[:, 1:]] - at[:, table[:, :1]]
     gram = edges @ np.swapaxes(edges, 2, 3)
-    length = np.sqrt(np.maximum(np.einsum("mcii->mci", gram), np.finfo(float).tiny))
+    length = np.sqrt(np.einsum("mcii->mci", gram))
+    longest = np.maximum(length.max(axis=(1, 2), keepdims=True), np.finfo(float).tiny ** 0.25)
+    length = np.maximum(length, LEAST_LENGTH * longest)
     size, jacobian = length.prod(axis=2), found[CORNER_AT[vtk]].T
     flat = ~(jacobian > LEAST_SINE * size)
     edges[flat], jacobian[flat] = np.eye(d), 1.0
@@ -97,6 +101,7 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     shape[:, 0] = signs / jacobian.T
     for k, (i, j) in enumerate([(i, i) for i in range(d)] + [(0, 1), (1, 2), (2, 0)][: 2 * d - 3]):
         shape[:, 1 + k] = inverse[..., i, j].T
+    mean = np.maximum(found.mean(axis=0), LEAST_SCALE * jacobian.mean(axis=1))
     scale = signs / np.maximum(found, LEAST_SCALE * mean)
     return Targets(vtk, np.ascontiguousarray(nodes), scale, shape)
 

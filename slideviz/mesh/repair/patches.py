@@ -201,6 +201,7 @@ class Patch:
             maps = self.maps[self.row[part.nodes[bound]]]
             out[bound] = np.swapaxes(maps, 1, 2) @ out[bound] @ maps
             np.add.at(total, place[place >= 0], out[place >= 0])
+        total[~np.isfinite(total).all(axis=(1, 2))] = 0.0  # beside cells without a size
         value, vector = np.linalg.eigh(total)
         keep = value > FLAT * value[:, -1:]
         inverse = np.where(keep, 1.0 / np.where(keep, value, 1.0), 0.0)

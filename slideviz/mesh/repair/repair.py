@@ -379,7 +379,8 @@ class _Mending:
             points = self._settled(self._descended(self.patch, LIFTED, POLISH), LIFTED)
             if (score := self.score(points)) > best:
                 best_points, best = points, score
-        if best[0] == 0 and not self.good(best):
+        # The quality of a cell that is folded in the reference is 0, however it is lifted.
+        if best[0] == 0 and best[1] > 0 and not self.good(best):
             best_points, best = self._lifted(best_points, best)
         return best_points
 
