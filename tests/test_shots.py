@@ -53,6 +53,15 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
 
 
 @pytest.mark.slow
+def test_span_is_near_the_tip_beside_the_throat(window, tmp_path):
+    shots.span(window, tmp_path)
+    (cut,) = window.store.session.view.sections
+    assert (cut.kind, cut.span, cut.flat) == ("span", 0.9, True)
+    [axes] = window.dock_manager.panel(shots.CurvesPanel).canvas.figure.axes
+    assert axes.get_xlabel() == "throat [mesh units]"
+
+
+@pytest.mark.slow
 def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
     shots.section(window, tmp_path)
     (cut,) = window.store.session.view.sections
