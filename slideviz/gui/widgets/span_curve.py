@@ -123,9 +123,9 @@ class SpanCurveField(QWidget):
 
     def _refit(self) -> None:
         self._range = self._fit()
-        self._tell()
+        self._describe()
 
-    def _tell(self) -> None:
+    def _describe(self) -> None:
         """Draw the points, and say where the chosen one is."""
         self.setAccessibleDescription(self._words())
         self.update()
@@ -158,7 +158,7 @@ class SpanCurveField(QWidget):
     def _set(self, points: Points, at: int) -> None:
         self._points, self._at = points, at
         self._soon.start()
-        self._tell()
+        self._describe()
 
     def _move(self, span: float, value: float) -> None:
         """Move the chosen point; along the span it stays between its neighbours."""
@@ -204,7 +204,7 @@ class SpanCurveField(QWidget):
         if min(away) <= REACH:
             self._at, self._before = int(np.argmin(away)), self._points
             self.dragging.emit(True)
-            self._tell()
+            self._describe()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._before is not None:
