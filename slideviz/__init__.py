@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         FfdTwist,
         FromFile,
         HicksHenne,
+        Onto,
         Prescribed,
         Radial,
         Rotate,
@@ -55,7 +56,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
-    "Prescribed Radial Rotate Scale SpanMotion Translate",
+    "Onto Prescribed Radial Rotate Scale SpanMotion Translate",
     "design.deformer": "Constraint Deformer",
     "design.gap": "Gap gaps",
     "design.span_variables": "SpanVariables",
@@ -86,12 +87,12 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 __all__ = [
     "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "Gap", "HicksHenne",
-    "Marker", "Mesh", "MeshRepair", "MetricValues", "Prescribed", "Quality", "QualityDerivative",
-    "Radial", "Reduction", "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle",
-    "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning", "Translate",
-    "Walls", "WheelQuality", "__version__", "compare", "convert", "deform", "film", "gaps",
-    "metrics", "picture", "quality", "read", "repair", "safe_fraction", "section", "sweep", "walls",
-    "wheel", "write",
+    "Marker", "Mesh", "MeshRepair", "MetricValues", "Onto", "Prescribed", "Quality",
+    "QualityDerivative", "Radial", "Reduction", "Rotate", "SafeFraction", "Scale", "Section",
+    "SectionStyle", "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning",
+    "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert", "deform", "film",
+    "gaps", "metrics", "picture", "quality", "read", "repair", "safe_fraction", "section", "sweep",
+    "walls", "wheel", "write",
 ]  # fmt: skip
 
 

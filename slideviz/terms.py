@@ -122,6 +122,7 @@ MotionKind = Literal[
     "ffd-twist",
     "span",
     "file",
+    "onto",
 ]
 MOTION_KINDS: dict[MotionKind, Term] = {
     "translate": Term("translate"),
@@ -137,6 +138,7 @@ MOTION_KINDS: dict[MotionKind, Term] = {
     "ffd-twist": Term("twist by box"),
     "span": Term("blade over span"),
     "file": Term("displacement file"),
+    "onto": Term("onto a surface"),
 }
 
 SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]

@@ -17,6 +17,7 @@ from slideviz.case.model import (
     BoxMotion,
     FromFile,
     Motion,
+    Onto,
     PlacedMotion,
     Prescribed,
     Radial,
@@ -175,12 +176,14 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
             problems += span_problems(case, mesh)
         elif isinstance(motion, Prescribed):
             problems += _prescribed_problems(case, mesh, motion)
+        elif isinstance(motion, Onto):
+            problems += _onto_problems(case, place)
         found += [f"motion {place}: {text}" for text in problems]
     return tuple(found)
 
 
 def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
-    if isinstance(motion, FromFile | Prescribed):
+    if isinstance(motion, FromFile | Prescribed) and not isinstance(motion, Onto):
         return
     if isinstance(motion, BoxMotion) and not motion.box:
         yield "it names no FFD box; choose one of the mesh, or define one with FFD_DEFINITION"
@@ -192,7 +195,7 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
         return
     if isinstance(motion, SpanMotion) and dim == 2:
         yield f"{motion.kind} changes a blade over its span, and the mesh has none: it is 2D"
-    if isinstance(motion, PlacedMotion):
+    if isinstance(motion, PlacedMotion | Onto):
         return
     needed = f"the mesh has {dim} dimensions"
     if isinstance(motion, Translate):
@@ -206,6 +209,17 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
             yield f"the axis {motion.axis} leaves the plane; in 2D leave the axis out"
     elif len(motion.factors) not in (1, dim):
         yield f"{len(motion.factors)} factors are given, and {needed}; give 1 or {dim}"
+
+
+def _onto_problems(case: Case, place: int) -> Iterator[str]:
+    motion = case.motions[place - 1]
+    for marker in case.markers_with("moving"):
+        before = [one for one in case.motions[: place - 1] if applies_to(one, marker)]
+        if before and applies_to(motion, marker):
+            yield (
+                f"it begins at the undeformed places of {marker!r}, which another motion leaves "
+                "before; put this one first"
+            )
 
 
 def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator[str]:

@@ -136,7 +136,7 @@ def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
 
 
 def _leading_file(case: Case) -> tuple[Motion, ...]:
-    return tuple(m for m in case.motions[:1] if isinstance(m, FromFile) and not m.marker)
+    return tuple(m for m in case.motions[:1] if type(m) is FromFile and not m.marker)
 
 
 def put_file(case: Case, path: Path | None) -> Case:

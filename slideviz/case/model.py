@@ -116,6 +116,19 @@ class FromFile(CheckedFields):
 
 
 @dataclass(frozen=True)
+class Onto(FromFile):
+    """Lay a marker onto the surface in a file: an STL or VTU surface, or a boundary of a mesh.
+
+    Nodes move to closest points, smoothly, from their undeformed places, so that no other motion of
+    the marker may come before. Those at the rim stay on the boundaries that they have in common
+    with. Of a mesh, the boundary with the marker's name counts, or its only one. ``limit`` is how
+    far a node may stay from the surface, in the mesh's length unit; 0 is 1 % of the marker's size.
+    """
+
+    limit: float = 0.0
+
+
+@dataclass(frozen=True)
 class Ffd(CheckedFields):
     """Move control points of a box for free-form deformation, and with them the nodes inside.
 
@@ -447,7 +460,7 @@ class Case(CheckedFields):
         if self.source is not None:
             inputs[self.source] = "the case file"
         files = (motion.path for motion in self.motions if isinstance(motion, FromFile))
-        return inputs | dict.fromkeys(files, "a displacement file")
+        return inputs | dict.fromkeys(files, "a file of a motion")
 
     @classmethod
     @check_types

@@ -24,6 +24,7 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     OnAirfoil,
+    Onto,
     PlacedMotion,
     Prescribed,
     Radial,
@@ -34,6 +35,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import term_of
+from slideviz.case.onto import laid_displacements
 from slideviz.case.spans import span_displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
@@ -158,7 +160,7 @@ ReferenceDisplacements = Mapping[object, Displacements]
 
 def key_of(motion: FromFile | PlacedMotion) -> object:
     """Return the key of a motion; those with the same displacements share it."""
-    return (motion.path, motion.marker) if isinstance(motion, FromFile) else motion
+    return (motion.path, motion.marker) if type(motion) is FromFile else motion
 
 
 def placed_displacements(
@@ -192,7 +194,12 @@ def reference_displacements(
         problems.append(str(problem))
     for motion in case.motions:
         moved = [nodes for name, nodes in on.items() if applies_to(motion, name)]
-        if isinstance(motion, FromFile) and (moved or not motion.marker):
+        if isinstance(motion, Onto) and moved:
+            try:
+                files[key_of(motion)] = laid_displacements(motion, mesh, tuple(on))
+            except CaseError as problem:
+                problems.append(str(problem))
+        elif isinstance(motion, FromFile) and (moved or not motion.marker):
             nodes = np.unique(np.concatenate([*moved, np.empty(0, np.int64)]))
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"

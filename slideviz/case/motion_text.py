@@ -20,6 +20,7 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     OnAirfoil,
+    Onto,
     Point,
     Prescribed,
     Radial,
@@ -50,6 +51,7 @@ VERB_OF: dict[type, MotionKind] = {
     FfdTwist: "ffd-twist",
     SpanMotion: "span",
     FromFile: "file",
+    Onto: "onto",
 }
 """Verbs of motions, by class; those of `SpanMotion` are its kinds."""
 ALL_MOVING = "*"
@@ -116,6 +118,8 @@ def _read_motion(group: list[Word]) -> Motion:
         raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
     if verb == "file":
         return _read_file(marker, remaining)
+    if verb == "onto":
+        return _read_onto(marker, remaining)
     kind = next((kind for kind in SPAN_KINDS if kind == verb), None)
     if kind is not None:
         return _read_span(marker, kind, remaining)
@@ -156,6 +160,18 @@ def _read_file(marker: Target, rest: list[Word]) -> FromFile:
             "expected (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
         )
     return FromFile(Path(rest[0].text.replace("\\", "/")), marker)
+
+
+def _read_onto(marker: Target, rest: list[Word]) -> Onto:
+    if len(rest) not in (1, 2) or not rest[0].text:
+        raise CaseError(
+            "expected (MARKER, onto, path) or (MARKER, onto, path, limit), where the limit is the "
+            "largest distance that may remain; a path with spaces, commas or brackets needs quotes"
+        )
+    limit = number(rest[1].text) if rest[1:] else 0.0
+    if limit < 0.0 or (rest[1:] and not limit):
+        raise CaseError(f"the limit {limit:g} is not above 0; leave it out for 1 % of the size")
+    return Onto(_read_file(marker, rest[:1]).path, marker, limit)
 
 
 def _flat(words: list[Word]) -> list[Word]:
@@ -398,7 +414,8 @@ def _motion_text(motion: Motion) -> str:
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
         path = f'"{path}"' if any(sign in path for sign in " ,") and path[0] != '"' else path
-        return f"({head}, file, {path})"
+        limit = f", {float(motion.limit)!r}" if getattr(motion, "limit", 0.0) else ""
+        return f"({head}, {VERB_OF[type(motion)]}, {path}{limit})"
     if isinstance(motion, Translate):
         return f"({head}, translate, {_numbers(motion.vector)})"
     if isinstance(motion, Radial):
@@ -460,6 +477,7 @@ GRAMMAR = (
     "(BLADE, chord, 0:1, 1:1.1)                    span:factor; camber: span:part of the chord",
     "(BLADE, twist, 0:0, 1:4, (px, py, pz))        with a point of the stacking line",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
+    "(BLADE, onto, path[, limit])                  the surface in a file; limit: what may remain",
     "(*, VERB, ...)                                all moving boundaries, as one body",
     "((BLADE, TIP), VERB, ...)                     several, as one body; in a sweep: BLADE+TIP",
     "centroid: mean of the nodes of what is moved, where they are at that moment",

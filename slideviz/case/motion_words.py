@@ -18,6 +18,7 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     OnAirfoil,
+    Onto,
     Point,
     Prescribed,
     Radial,
@@ -82,7 +83,7 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
         return f"{_curve(motion)}{about}"
     if isinstance(motion, Prescribed):
         return f"displace {len(motion.nodes):,} nodes as given"
-    return f"displace as in {motion.path.name or '(no file yet)'}"
+    return f"{_laid(motion) or 'displace as in '}{motion.path.name or '(no file yet)'}"
 
 
 def deformation(case: Case) -> tuple[object, ...]:
@@ -148,13 +149,13 @@ def _briefly(motion: Motion) -> str:
         return _curve(motion)
     if isinstance(motion, Prescribed):
         return f"{len(motion.nodes):,} nodes as given"
-    return motion.path.name or "(no file yet)"
+    return f"{_laid(motion)}{motion.path.name or '(no file yet)'}"
 
 
 def _exactly(motion: Motion) -> str:
     """Return a motion in words, with its point and axis, and numbers with 15 digits."""
     if isinstance(motion, FromFile):
-        return str(motion.path)
+        return f"{_laid(motion)}{motion.path}"
     if isinstance(motion, Ffd):
         return f"{_control(motion)} {vector_words(motion.vector, '.15g')}"
     if isinstance(motion, OnAirfoil):
@@ -177,6 +178,10 @@ def _exactly(motion: Motion) -> str:
         return f"radially {by}" + _about(motion.point) + _along(motion.axis)
     turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point)
     return turned + _along(motion.axis)
+
+
+def _laid(motion: FromFile) -> str:
+    return "lay onto " if isinstance(motion, Onto) else ""
 
 
 def mesh_words(mesh: Mesh) -> tuple[str, str]:

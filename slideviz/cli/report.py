@@ -16,6 +16,7 @@ import numpy as np
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
+from slideviz.case.onto import Remaining
 from slideviz.case.words import counted
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
@@ -112,6 +113,7 @@ def run_report(
             default=None,
         ),
         "relax": None if (relaxed := Relaxed.joined(each)) is None else asdict(relaxed),
+        "targets": [text.report for text in last.warnings if isinstance(text, Remaining)],
         "repair": None if (mended := _repaired(steps)) is None else mended.report(),
         "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},

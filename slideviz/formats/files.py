@@ -54,8 +54,20 @@ _CHUNK_BYTES = 1 << 20  # most bytes that are read from the process at a time
 _SET_DEATH_SIGNAL = 1  # ``PR_SET_PDEATHSIG`` of Linux's ``prctl``
 
 
-def read_in_subprocess(path: Path, progress: Tick) -> Mesh:
-    """Return the mesh of a file, read by the isolated reader of its format.
+def read_surface(path: Path) -> Mesh:
+    """Return the surface in a file: its facets as cells of a mesh, or a mesh with its boundaries.
+
+    Raises MeshError if the file cannot be read.
+    """
+    path = _checked_path(path, None)
+    row = format_of(path)
+    if row.isolated and row.reader == MESHIO.reader:
+        return read_in_subprocess(path, lambda _: None, "meshio.bridge:read_surface")
+    return read(path)
+
+
+def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
+    """Return the mesh of a file, read by the isolated reader of its format, or another one.
 
     Raises MeshError as the reader does, and if the process takes too long, crashes or does not
     start.
@@ -65,6 +77,7 @@ def read_in_subprocess(path: Path, progress: Tick) -> Mesh:
     # Without -P a file numpy.py in the folder of the mesh would be run.
     command = [sys.executable, "-P", "-c", f"from {__name__} import main; main()"]
     command += [*map(str, (os.getpid(), *_limits(path.stat().st_size))), str(path)]
+    command += [function or format_for(path).reader]
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(part for part in sys.path if part),
@@ -143,7 +156,7 @@ def main() -> None:
     """Read a mesh and write it, pickled, to the standard output: the program of the subprocess.
 
     Its command-line arguments are the parent's process number, the limits (seconds and bytes of
-    memory), and the path. If the file cannot be read, it writes the message of the error instead.
+    memory), the path, and the reader. If the file cannot be read, it writes the error's message.
     """
     _die_with(int(sys.argv[1]))
     # Whatever prints must not get into the answer.
@@ -152,7 +165,7 @@ def main() -> None:
         seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
         _limit(seconds, memory)
         try:
-            mesh = format_for(path).function("reader")(path)
+            mesh = replace(MESHIO, reader=sys.argv[5]).function("reader")(path)
         except MeshError as problem:
             pickle.dump(str(problem), channel)
         except MemoryError:

@@ -17,7 +17,7 @@ import numpy as np
 
 from slideviz.case.check import check_case
 from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, FromFile, Onto
 from slideviz.case.motion import displacements
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
@@ -181,9 +181,11 @@ def _first_line(error: SlidevizError, files: list[Path]) -> str:
 
 def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
-    if intersection_key(session) != key or (session.intersection, session.folding) == found:
+    laid = tuple(motion for motion in session.case.motions if isinstance(motion, Onto))
+    same = (session.intersection, session.folding, session.laid) == (*found, laid)
+    if same or intersection_key(session) != key:
         return session
-    return replace(session, intersection=found[0], folding=found[1])
+    return replace(session, intersection=found[0], folding=found[1], laid=laid)
 
 
 Report = Callable[[object], None]
@@ -301,7 +303,7 @@ def prepare(
     with suppress(SlidevizError):  # said beside the Run button
         find_period(mesh, session.case, pairs)
     ghosts = Ghosts(mesh)
-    ghosts.moved(session.case)
+    ghosts.moved(session.case, wait=True)
     coarse = coarse_surfaces(surfaces, mesh.points)
     if case is None:
         return Opened(session, surfaces, ghosts, coarse=coarse)

@@ -24,6 +24,7 @@ from slideviz.case.model import (
     FromFile,
     HicksHenne,
     Motion,
+    Onto,
     Radial,
     Rotate,
     Scale,
@@ -41,6 +42,7 @@ from slideviz.case.motion import (
     read_file,
 )
 from slideviz.case.motion_words import direction_words
+from slideviz.case.onto import is_laid, laid_displacements
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
@@ -215,7 +217,7 @@ def new_motion(
         return SpanMotion(marker, "twist", (0.0, 1.0), (0.0, 0.0))
     if kind is FfdTwist:
         return FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
-    return FromFile(Path(), marker)
+    return Onto(Path(), marker) if kind is Onto else FromFile(Path(), marker)
 
 
 def targets(session: Session) -> tuple[Target, ...]:
@@ -268,9 +270,12 @@ def boxes_hint(session: Session) -> str:
 
 
 def largest_prescribed(case: Case, mesh: Mesh) -> float:
-    """Return the largest displacement that the motions prescribe; 0 if they are invalid."""
+    """Return the largest displacement that the motions prescribe; 0 if they are invalid.
+
+    It is 0, too, while motions onto surfaces are not computed.
+    """
     try:
-        vectors = displacements(case, mesh).vectors
+        vectors = displacements(case, mesh).vectors if is_laid(case, mesh) else np.empty((0, 3))
     except (OSError, SlidevizError):
         return 0.0
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
@@ -279,7 +284,8 @@ def largest_prescribed(case: Case, mesh: Mesh) -> float:
 def support_key(case: Case, mesh: Mesh) -> tuple[object, ...]:
     """Return the values on which `support_of` depends."""
     settings = case.method, case.influence_factor, case.support_radius
-    return mesh, case.markers_with("moving"), case.motions, box_definition(case), settings
+    moving = case.markers_with("moving")
+    return mesh, moving, case.motions, box_definition(case), settings, is_laid(case, mesh)
 
 
 def shown_case(session: Session) -> Case:
@@ -292,10 +298,12 @@ def shown_case(session: Session) -> Case:
 def support_of(case: Case, mesh: Mesh) -> tuple[float, FloatArray]:
     """Return the support radius of a case, and the boxes (b, 2, d) of what moves.
 
-    0 and none where the case has no such radius, or mistakes, which are reported elsewhere.
+    0 and none where the case has no such radius, or mistakes, which are reported elsewhere, or
+    motions onto surfaces that are not computed yet.
     """
     none = 0.0, np.empty((0, 2, mesh.dim))
-    if case.method != "rbf" or set(case.markers_with("moving")) - {*mesh.marker_names}:
+    unknown = set(case.markers_with("moving")) - {*mesh.marker_names}
+    if case.method != "rbf" or unknown or not is_laid(case, mesh):
         return none
     try:
         moved = displaced(displacements(case, mesh), mesh)
@@ -338,11 +346,12 @@ class Ghosts:
         self._nodes = {marker.name: marker.nodes for marker in mesh.markers}
         self._files: dict[tuple[Path, tuple[str, ...], float], Displacements | None] = {}
 
-    def moved(self, case: Case) -> dict[str, FloatArray]:
+    def moved(self, case: Case, wait: bool = False) -> dict[str, FloatArray]:
         """Return the moved points (u, d) of the nodes of each boundary with motions, by name.
 
         A displacement file that cannot be read, or a missing box, moves nothing here; the checks
-        before a run report it.
+        before a run report it. Motions onto surfaces take seconds: without ``wait`` they move
+        nothing until their displacement is known (`slideviz.session.jobs.find_intersection`).
         """
         on = {
             name: self._nodes[name]
@@ -351,7 +360,11 @@ class Ghosts:
         }
         files: dict[object, Displacements] = {}
         for motion in case.motions:
-            if isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
+            if isinstance(motion, Onto):
+                if wait or is_laid(case, self.mesh):
+                    with suppress(SlidevizError):
+                        files[key_of(motion)] = laid_displacements(motion, self.mesh, on)
+            elif isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
                 files[key_of(motion)] = read
         with suppress(SlidevizError):
             files |= placed_displacements(case, self.mesh, on)

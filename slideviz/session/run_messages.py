@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Motion, applies_to
+from slideviz.case.model import Case, FromFile, Motion, Onto, applies_to
 from slideviz.errors import Note
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
@@ -196,7 +196,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         )
     for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
-            requirements.append(Requirement(_lacks_file(motion.path), "motion", motion=place))
+            requirements.append(Requirement(_lacks_file(motion), "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         requirements.append(Requirement(text, "method"))
@@ -210,13 +210,15 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     return tuple(requirements)
 
 
-def _lacks_file(path: Path) -> str:
-    """Return a sentence on a displacement file that is none."""
+def _lacks_file(motion: FromFile) -> str:
+    """Return a sentence on a motion whose file is none."""
+    path = motion.path
+    what = "surface to lie on" if isinstance(motion, Onto) else "displacement file"
     if path == Path():
-        return "A motion lacks its displacement file: choose it."
+        return f"A motion lacks its {what}: choose it."
     if path.is_dir():
-        return f"{path} is a folder: choose the displacement file in it."
-    return f"The displacement file {path} does not exist."
+        return f"{path} is a folder: choose the {what} in it."
+    return f"The {what} {path} does not exist."
 
 
 _STILL = dict.fromkeys(("vector", "angle_deg", "distance", "height", "amount"), 0.0)

@@ -112,6 +112,7 @@ def test_examples_of_the_reference_are_read():
             "dx, dy[, dz]": "1, 2",
             "degrees": "5",
             "px, py[, pz]": "1, 2",
+            "path[, limit]": "a.stl, 0.1",
             "SIDE, peak, h[, x0, x1]": "upper, 0.5, 1",
             "SIDE, k, n, h[, x0, x1]": "lower, 1, 2, 1, 0, 1",
             "peak, h, x0, x1": "0.5, 1, 0, 1",

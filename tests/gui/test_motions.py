@@ -14,6 +14,7 @@ from slideviz.case.model import (
     FfdTwist,
     FromFile,
     HicksHenne,
+    Onto,
     Radial,
     Rotate,
     Scale,
@@ -27,7 +28,7 @@ from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.vector_field import control_point_problem
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
-from slideviz.session.motions import Ghosts, TableRows
+from slideviz.session.motions import Ghosts, TableRows, largest_prescribed
 from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
 from tests.builders import airfoil
@@ -458,3 +459,29 @@ def test_bumps_on_an_airfoil_are_shown_edited_and_kept(driver, tmp_path):
     assert driver.session.case.motions == (Bump("airfoil", 0.05, 0.5, (1.0, 3.0)),)
     driver.session.case.write(tmp_path / "kept.cfg")
     assert sv.Case.read(tmp_path / "kept.cfg").motions == driver.session.case.motions
+
+
+def test_a_boundary_is_laid_onto_a_surface_without_blocking_the_window(driver, tmp_path):
+    mesh = airfoil(24, 3)
+    sv.write(tmp_path / "wing.su2", mesh)
+    sv.write(tmp_path / "high.su2", mesh.with_points(mesh.points + np.array([0.0, 0.2])))
+    driver.open(tmp_path / "wing.su2")
+    driver.role("airfoil", "moving")
+    driver.add_motion(Onto)
+    form = editor(driver)
+    assert [form.path.isVisible(), form.limit.isVisible(), form.table.isVisible()] == [1, 1, 0]
+    assert "surface" in form.path.toolTip()
+    driver.type(form.limit, "-1")
+    driver.type(form.limit, "0.1")
+    put(driver, Onto(tmp_path / "high.su2", "airfoil", 0.1))
+    # The thread of the window does not compute it; a job does, and then the ghost is there.
+    ghost = driver.window.scene.motion_ghosts
+    assert np.array_equal(ghost["airfoil"], mesh.points[:24])
+    assert largest_prescribed(driver.session.case, driver.session.mesh) == 0.0
+    driver.qtbot.waitUntil(lambda: not driver.window.intersection_check.busy)
+    ghost = driver.window.scene.motion_ghosts
+    assert np.abs(ghost["airfoil"] - mesh.points[:24] - [0.0, 0.2]).max() < 0.02
+    assert largest_prescribed(driver.session.case, driver.session.mesh) > 0.19
+    assert listed(driver) == "1.  airfoil: lay onto high.su2"
+    put(driver, Onto(tmp_path / "none.su2", "airfoil"))
+    assert "The surface to lie on" in driver.window.run_panel.text.text()

@@ -149,19 +149,33 @@ def read_with_meshio(path: Path) -> Mesh:
         return _mesh(path, data)
 
 
-def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
+def read_surface(path: Path) -> Mesh:
+    """Return the facets, or lines, in a file as the cells of a mesh without markers.
+
+    Of a file with a volume, it is that mesh with its boundaries. Otherwise as `read_with_meshio`.
+    """
+    with meshio_errors(path, "read"):
+        require_own_folder(path)
+    data = load(path, formats_of(path))
+    with meshio_errors(path, "understood"):
+        return _mesh(path, data, least=1)
+
+
+def _mesh(path: Path, data: meshio.Mesh, least: int = 2) -> Mesh:
     blocks = [
         _block(path, cells.type, cells.data, index)
         for index, cells in enumerate(data.cells)
         if len(cells.data) and cells.type != "empty"
     ]
     dim = max((ELEMENTS[block.vtk].dim for block in blocks), default=0)
-    if dim < 2:
+    if dim < least:
         raise path_error(path, "there are no cells, only points and lines; export the mesh")
     cells = Cells.from_blocks(
         (block.vtk, block.nodes) for block in blocks if ELEMENTS[block.vtk].dim == dim
     )
     points = _points(path, data, cells)
+    if least == 1 and dim < points.shape[1]:
+        return Mesh(points=points, cells=cells, name=printable(path.name))
     if dim == 2 and points.shape[1] == 3:
         points = flattened(path, points, cells)
     mesh = Mesh(points=points, cells=cells, name=printable(path.name), source=path.resolve())

@@ -22,6 +22,7 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     OnAirfoil,
+    Onto,
     Radial,
     Rotate,
     Scale,
@@ -40,6 +41,7 @@ from slideviz.gui.widgets.vector_field import (
     VectorField,
     a_direction,
     chord_problem,
+    limit_problem,
     control_point_problem,
     peak_problem,
     scale_problem,
@@ -64,6 +66,11 @@ RAISED = {
     False: ("Raised by", "towards +y"),
 }
 """Title and direction of the height of an airfoil's motion, by whether it is `HicksHenne`."""
+PATH_TIPS = {
+    False: "A line for each node: its number and its displacement.",
+    True: "The surface that it is laid onto: STL, VTU, or a mesh with a boundary of that name.",
+}
+"""Tips of the file of a motion, by whether it is `Onto`."""
 KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_OF.items()}
 """Labels of the kinds of motion, by class."""
 
@@ -119,6 +126,7 @@ ROWS: dict[str, FormRow] = {
     "raised": FormRow("Raised by", "height"),
     "chord": FormRow("Chord", "chord"),
     "path": FormRow("File", "path"),
+    "limit": FormRow("At most away", "limit"),
 }
 """The rows of the form; each is named as its field in `MotionEditor`."""
 FIELDS: dict[type, tuple[str, ...]] = {
@@ -135,6 +143,7 @@ FIELDS: dict[type, tuple[str, ...]] = {
     FfdTwist: ("plane", "box", "angle", "point", "axis"),
     SpanMotion: ("curve", "change"),
     FromFile: ("path",),
+    Onto: ("path", "limit"),
 }
 """Rows of each kind of motion, the one to be typed into first at the beginning. Those of point and
 axis of motions with ``about`` depend on what stays in place."""
@@ -245,8 +254,12 @@ class MotionEditor(QWidget):
             "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, 1:4; "
             "or one value for all. A smooth curve goes through them.",
         )
+        self.limit = NumberField(
+            allowed=limit_problem,
+            tip="How far a node may stay from the surface, in the mesh's length unit; 0 is 1 % of "
+            "the boundary's size.",
+        )
         self.path = TextField()
-        self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
         self.browse.setMaximumWidth(30)
         self.browse.setToolTip("Choose the file.")
@@ -302,6 +315,8 @@ class MotionEditor(QWidget):
         for name in FIELDS.get(type(motion), ()):
             row = ROWS[name]
             self._show_value(name, row.shown(getattr(motion, row.attribute)))
+        self.table.setVisible(not isinstance(motion, Onto))
+        self.path.setToolTip(PATH_TIPS[isinstance(motion, Onto)])
         shown = {*FIELDS.get(type(motion), ())}
         if isinstance(motion, OnAirfoil):
             self._name_height(motion)
@@ -489,7 +504,8 @@ class MotionEditor(QWidget):
         return (*value, *before[len(value) :]) if boxed else value
 
     def _browse(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Displacement file", self.path.text())
+        title = "Surface" if isinstance(self._motion, Onto) else "Displacement file"
+        name, _ = QFileDialog.getOpenFileName(self, title, self.path.text())
         if name:
             self.path.setText(name)
             self._emit_changed()

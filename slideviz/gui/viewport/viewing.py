@@ -319,7 +319,8 @@ class Viewing(QWidget):
 
     def sync(self, old: Session, new: Session) -> None:
         """Update the views to a changed session; another mesh is shown by `open` instead."""
-        if old.case != new.case and self._ghosts is not None and self._ghosts.mesh is new.mesh:
+        changed = (old.case, old.laid) != (new.case, new.laid)
+        if changed and self._ghosts is not None and self._ghosts.mesh is new.mesh:
             moved = self._ghosts.moved(new.case)
             for scene in self._scenes():
                 scene.set_motion_ghosts(moved)

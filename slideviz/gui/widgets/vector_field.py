@@ -136,6 +136,11 @@ def peak_problem(value: float) -> str:
     return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
 
 
+def limit_problem(value: float) -> str:
+    """Return why a distance cannot be the limit of a motion onto a surface; empty if it can."""
+    return "" if value >= 0.0 else "a distance is not below 0"
+
+
 def chord_problem(values: Sequence[float]) -> str:
     """Return why a chord cannot go from one x to another; empty if it can."""
     return "" if values[0] < values[1] else "the trailing edge has the larger x"

@@ -1,0 +1,211 @@
+"""Motions onto a target surface: its file, and the displacement of the boundaries laid onto it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, Onto, applies_to
+from slideviz.errors import CaseError, MeshError, Note, printable
+from slideviz.formats.files import read as read_mesh
+from slideviz.formats.files import read_surface
+from slideviz.machine.onto import AGREE, Laid, Nearest, Target, Wall, find_edges, lay_onto
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.topology import corner_vectors, unit
+from slideviz.rbf.closest import ClosestPoints
+
+FARTHEST = 0.01
+"""Largest distance from the target that may remain, over the boundary's size, by default."""
+MOST_AWAY = 0.05  # largest part of the nodes whose normals may not face the target
+
+Key = tuple[object, ...]
+_LAID: WeakKeyDictionary[Mesh, dict[Key, Displacements | CaseError]] = WeakKeyDictionary()
+_one_at_a_time = Lock()
+
+
+class Remaining(Note):
+    """The note on how far boundaries remain from the target that they are laid onto."""
+
+    report: Mapping[str, object]  # what the report of a run has: boundaries, file, distances
+
+
+def laid_displacements(motion: Onto, mesh: Mesh, markers: Iterable[str]) -> Displacements:
+    """Return the displacements that lay those of some markers onto a target; computed once.
+
+    Raises CaseError if the target cannot be read, does not face the boundary, or remains too far
+    from it.
+    """
+    names, key = _key(motion, markers)
+    with _one_at_a_time:
+        known = _LAID.setdefault(mesh, {})
+        if key not in known:
+            try:
+                known[key] = _lay(motion, mesh, names)
+            except CaseError as problem:
+                known[key] = problem
+        result = known[key]
+    if isinstance(result, CaseError):
+        raise CaseError(str(result))
+    return result
+
+
+def is_laid(case: Case, mesh: Mesh) -> bool:
+    """Return whether the displacements of all motions onto surfaces are computed: it takes time."""
+    moving = case.markers_with("moving")
+    keys = (_key(motion, moving) for motion in case.motions if isinstance(motion, Onto))
+    return all(key in _LAID.get(mesh, {}) for names, key in keys if names)
+
+
+def _key(motion: Onto, markers: Iterable[str]) -> tuple[tuple[str, ...], Key]:
+    """Return the markers that a motion moves, and the key of their displacements."""
+    names = tuple(name for name in markers if applies_to(motion, name))
+    try:
+        state = motion.path.stat()
+    except OSError:
+        return names, (motion, names)
+    return names, (motion, names, state.st_mtime_ns, state.st_size)
+
+
+def _lay(motion: Onto, mesh: Mesh, names: tuple[str, ...]) -> Displacements:
+    boundary = boundary_of(mesh)
+    index = [boundary.names.index(name) for name in names]
+    facets = boundary.facets[np.isin(boundary.marker, index)]
+    nodes = np.unique(facets)
+    points, local = mesh.points[nodes], np.searchsorted(nodes, facets)
+    rim = nodes[np.unique(find_edges(points, local)[1])]
+    walls = []
+    for place in set(range(len(boundary.names))) - {*index}:
+        wall = boundary.facets[boundary.marker == place]
+        on = np.intersect1d(rim, wall)
+        if len(on):
+            corners = _simplices(mesh.points, wall)
+            walls.append(Wall(np.searchsorted(nodes, on), _nearest(corners)))
+    laid = lay_onto(points, local, _read_target(motion.path, mesh, names), walls)
+    size = float(np.ptp(points, axis=0).max())
+    note = _checked(motion, names, laid, np.isin(nodes, rim), size)
+    return Displacements(nodes, laid.vectors, (note,))
+
+
+def _checked(
+    motion: Onto, names: tuple[str, ...], laid: Laid, rim: np.ndarray, size: float
+) -> Remaining:
+    """Return the note on a boundary laid onto a target; CaseError where they do not fit."""
+    of, file = " and ".join(names), printable(motion.path)
+    away = int(np.count_nonzero(laid.facing < AGREE))
+    if away > MOST_AWAY * len(rim):
+        raise CaseError(
+            f"{file}: {away:,} of {len(rim):,} nodes of {of} do not face this surface: their "
+            "normals are more than 70° apart; give a surface near the boundary and about parallel "
+            "to it, whose facets are oriented alike"
+        )
+    farthest, limit = float(laid.distances.max()), motion.limit or FARTHEST * size
+    if farthest > limit:
+        default = "" if motion.limit else f", {FARTHEST:.0%} of its size"
+        raise CaseError(
+            f"{file}: {of} remains up to {farthest:.4g} away from this surface, and the limit is "
+            f"{limit:.4g}{default}; give a surface that is as large, or a larger limit: "
+            f"({names[0]}, onto, {motion.path.name}, {1.1 * farthest:.2g})"
+        )
+    note = Remaining(f"{of} lies on {motion.path.name}, at most {farthest:.3g} away from it")
+    note.report = {
+        "boundaries": list(names),
+        "file": str(motion.path),
+        "distance": farthest,
+        "rim_distance": float(laid.distances[rim].max(initial=0.0)),
+        "farthest_move": float(np.linalg.norm(laid.vectors, axis=1).max()),
+    }
+    return note
+
+
+def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> Target:
+    """Return the surface in a file: all facets, or markers of a mesh; CaseError if it has none."""
+    try:
+        read = read_surface(path)
+        if mesh.dim == 2 and _dims(read) == {2}:
+            read = read_mesh(path)
+    except MeshError as problem:
+        raise CaseError(str(problem)) from problem
+    if _dims(read) == {mesh.dim - 1} and read.dim >= mesh.dim:
+        tables = (table for _, table in read.cells.by_type.values())
+        facets = np.concatenate([_padded(table) for table in tables])
+    elif _dims(read) == {mesh.dim}:
+        facets = _facets_of(read, names, path)
+    else:
+        raise CaseError(
+            f"{printable(path)}: it has no {'curve' if mesh.dim == 2 else 'surface'}, and "
+            f"{mesh.name} has {mesh.dim} dimensions; give what its boundary is to lie on"
+        )
+    # Files such as STL have the corners of each facet.
+    points, place = np.unique(read.points[:, : mesh.dim], axis=0, return_inverse=True)
+    table = place.ravel()[facets]
+    edges, rim = find_edges(points, table)
+    return Target(_nearest(_simplices(points, table)), _along(points[edges]), _along(points[rim]))
+
+
+def _dims(mesh: Mesh) -> set[int]:
+    return {ELEMENTS[vtk].dim for vtk in mesh.cells.by_type}
+
+
+def _facets_of(read: Mesh, names: tuple[str, ...], path: Path) -> IntArray:
+    """Return the facets of markers of a mesh: those with the names, or its only marker."""
+    there = read.marker_names
+    if not set(names) <= {*there} and len(there) != 1:
+        raise CaseError(
+            f"{printable(path)}: it is a mesh without a boundary {' and '.join(names)} (it has "
+            f"{', '.join(there) or 'none'}); give the target the same name, or a file with that "
+            "surface alone"
+        )
+    boundary = boundary_of(read)
+    wanted = [at for at, name in enumerate(there) if name in names or len(there) == 1]
+    return boundary.facets[np.isin(boundary.marker, wanted)]
+
+
+def _padded(table: IntArray) -> IntArray:
+    """Return triangles (f, 3) as quadrilaterals that repeat their last node; others unchanged."""
+    return table[:, [0, 1, 2, 2]] if table.shape[1] == 3 else table
+
+
+def _simplices(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Return the corners (m, d, d) of facets, a quadrilateral as two triangles."""
+    if facets.shape[1] == 2:
+        return points[facets]
+    second = facets[facets[:, 2] != facets[:, 3]][:, [0, 2, 3]]
+    return points[np.concatenate([facets[:, :3], second])]
+
+
+def _nearest(corners: FloatArray) -> Nearest:
+    """Return a function of closest points on triangles or segments, and their normals there."""
+    padded = corners if corners.shape[2] == 2 else corners[:, [0, 1, 2, 2]]
+    return partial(
+        _closest, ClosestPoints(np.ascontiguousarray(corners)), unit(corner_vectors(padded))
+    )
+
+
+def _along(edges: FloatArray) -> Nearest | None:
+    """Return a function of closest points and tangents on edges (e, 2, d), or corners (e, 1, 2)."""
+    if not len(edges):
+        return None
+    if edges.shape[1] == 1:
+        return partial(_corner, edges[:, 0])
+    tree = ClosestPoints(np.ascontiguousarray(edges))
+    return partial(_closest, tree, unit(edges[:, 1] - edges[:, 0]))
+
+
+def _closest(
+    tree: ClosestPoints, directions: FloatArray, x: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    at, which = tree.nearest(x)
+    return at, directions[which]
+
+
+def _corner(corners: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return corners[cKDTree(corners).query(x)[1]], np.zeros_like(x)
