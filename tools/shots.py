@@ -7,6 +7,7 @@ bars that are not visible.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import shutil
 import subprocess
@@ -19,14 +20,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.case.model import Case, Motion, Rotate, SpanMotion, Translate
+from slideviz.case.model import Case, FromFile, Motion, Onto, Rotate, SpanMotion, Translate
+from slideviz.cli import run
 from slideviz.errors import SlidevizError
+from slideviz.formats.files import read, write
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.samples.table import sample, write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.solver.deform import deform
 from slideviz.system.cleanup import draft, killed_at_end
 
 if TYPE_CHECKING:
@@ -183,6 +187,22 @@ def wheel(window: MainWindow, place: Path) -> None:
     _look(window, 30.0, 25.0)
 
 
+def onto(window: MainWindow, place: Path) -> None:
+    """Show the ghost of the stator's blade on the surface that it is laid onto."""
+    path = _stator(place)
+    case = Case.read(path)
+    assert case.mesh_file is not None
+    built = case.change(motions=(FromFile(path.parent / "displacement.txt"),), steps=1)
+    (step,) = deform(built, read(case.mesh_file))
+    write(place / "built.su2", step.mesh)
+    _open(window, path)
+    window.store.change(changes.remove_motion, 1)
+    window.store.change(changes.replace_motion, 0, Onto(place / "built.su2", "BLADE"))
+    wait(lambda: bool(window.store.session.laid))
+    window.store.change(changes.show_boundaries, OUTER, False)
+    _look(window, 60.0, 0.0)
+
+
 def section(window: MainWindow, place: Path) -> None:
     """Show a cylindrical section at mid-span, unrolled below the 3D view."""
     _open(window, _stator(place))
@@ -279,6 +299,7 @@ STATES = (
     ShotState("quality", quality),
     ShotState("twist", twist),
     ShotState("wheel", wheel),
+    ShotState("onto", onto),
     ShotState("section", section),
     ShotState("machine-span", span),
     ShotState("side-by-side", beside),
@@ -308,6 +329,18 @@ def film_of_passage(path: Path) -> Path:
     return path
 
 
+def film_in_time(path: Path, place: Path) -> Path:
+    """Write a film of the 2D passage at the times of a table, and return its path."""
+    write_sample("passage", place / "moving", 24)
+    rows = (f"{k},{8.0 * math.sin(math.pi * k / 8)},0.0" for k in range(16))
+    table = place / "motion.csv"
+    table.write_text("\n".join(["time,airfoil.rotate.angle_deg,airfoil.translate.y", *rows]))
+    call = ["film", str(place / "moving" / "passage.cfg"), "--designs", str(table), "-q"]
+    if run([*call, "--size", "480x300", "--hold", "0.1", "--force", "-o", str(path)]):
+        raise SlidevizError(f"{path}: the film was not written")
+    return path
+
+
 def shots(folder: Path) -> list[Path]:
     """Write all pictures, and the film, into a folder, and return their paths.
 
@@ -326,13 +359,12 @@ def shots(folder: Path) -> list[Path]:
             with open_window(place) as window:
                 state.bring(window, place)
                 made.append(photograph(window, folder / f"{state.name}.png"))
-        return [*made, film_of_passage(folder / "passage.gif"), *machine_pictures(folder, place)]
+        films = film_of_passage(folder / "passage.gif"), film_in_time(folder / "in_time.gif", place)
+        return [*made, *films, *machine_pictures(folder, place)]
 
 
 def machine_pictures(folder: Path, place: Path) -> list[Path]:
     """Write a compressor's section and meridional view, and a throat; return their paths."""
-    from slideviz.cli import run
-    from slideviz.formats.files import write
     from slideviz.samples.impeller import impeller_mesh
 
     mesh, case = place / "impeller.su2", str(_stator(place))

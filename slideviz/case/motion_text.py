@@ -414,8 +414,9 @@ def _motion_text(motion: Motion) -> str:
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
         path = f'"{path}"' if any(sign in path for sign in " ,") and path[0] != '"' else path
-        limit = f", {float(motion.limit)!r}" if getattr(motion, "limit", 0.0) else ""
-        return f"({head}, {VERB_OF[type(motion)]}, {path}{limit})"
+        limit = motion.limit if isinstance(motion, Onto) else 0.0
+        tail = f", {float(limit)!r}" if limit else ""
+        return f"({head}, {VERB_OF[type(motion)]}, {path}{tail})"
     if isinstance(motion, Translate):
         return f"({head}, translate, {_numbers(motion.vector)})"
     if isinstance(motion, Radial):

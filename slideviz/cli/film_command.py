@@ -68,6 +68,12 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         default="size-skew",
         help="what the colors show (size-skew)",
     )
+    call.add_argument(
+        "--designs",
+        type=Path,
+        metavar="TABLE",
+        help="an image for each design of a table, as of sweep, instead of the steps",
+    )
     add_zoom(call)
     add_changes(call)
     call.add_argument(
@@ -162,13 +168,19 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks
+    from slideviz.design.sweeps.table import read_designs
     from slideviz.session.state import StepFrame
 
     frames = []
+    cases = [case]
+    if arguments.designs is not None:
+        cases = [design.case for design in read_designs(case, arguments.designs).rows]
     with Bar(not arguments.quiet) as bar:
-        for step in deform(case, mesh, bar):
-            measured = quality(step.mesh, reference=mesh, metric=case.quality_metric)
-            frames.append(StepFrame(step.mesh, measured, step))
+        for one in cases:
+            steps = list(deform(one, mesh, bar))
+            for step in steps if arguments.designs is None else steps[-1:]:
+                measured = quality(step.mesh, reference=mesh, metric=one.quality_metric)
+                frames.append(StepFrame(step.mesh, measured, step))
     print_remarks(step.warnings, quiet=arguments.quiet)
     return tuple(frames)
 

@@ -39,7 +39,9 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
         "designs are in the table, and --resume continues",
     )
     add_shared(call, "case")
-    call.add_argument("table", type=Path, nargs="?", help="the table of designs (CSV)")
+    call.add_argument(
+        "table", type=Path, nargs="?", help="the table of designs (CSV), or 'displacement_*.txt'"
+    )
     call.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_swept)"
     )
@@ -56,6 +58,15 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
         "--force", action="store_true", help="start again, and replace existing results"
     )
     add_shared(call, "set")
+    call.add_argument(
+        "--time-step",
+        type=float,
+        metavar="DT",
+        help="of a table with a column time: meshes are numbered by time / DT, as SU2's files",
+    )
+    add_shared(
+        call, "stream", help="with --meshes, for meshes larger than memory (SU2): one at a time"
+    )
     add_shared(call, "zone")
     add_shared(call, "json", help="report as JSON; - is the terminal")
     add_shared(call, "quiet")
@@ -81,7 +92,9 @@ def sweep(arguments: argparse.Namespace) -> int:
     designs = read_designs(case, arguments.table)
     mesh_file = require_mesh_file(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_swept")
-    case, mesh = read_mesh(case, mesh_file)
+    mesh = None
+    if not arguments.stream:
+        case, mesh = read_mesh(case, mesh_file)
     make_folder(folder)
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with _executor(arguments) as executor:
@@ -93,12 +106,15 @@ def sweep(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             folder=folder,
             meshes=arguments.meshes,
+            time_step=arguments.time_step,
+            stream=arguments.stream,
             resume=arguments.resume,
             force=arguments.force,
         )
         if not arguments.quiet:
             what = f"{counted(len(designs.rows), 'design')} of {', '.join(designs.columns)}"
-            print(f"{arguments.case}, {len(mesh.cells):,} cells: {what}", flush=True)
+            cells = "" if mesh is None else f", {len(mesh.cells):,} cells"
+            print(f"{arguments.case}{cells}: {what}", flush=True)
         begin = time.perf_counter()
         results = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
     report = _report(arguments, designs, results, time.perf_counter() - begin)

@@ -38,7 +38,10 @@ WALL_ROUNDS = 5  # projections onto wall and target in turn
 STILL = 1e-6  # weight of the change in a round, without which a matrix might be singular
 OFF_WALL = 1e-3
 """How far a rim may leave its wall to meet the target, over the boundary's size: walls are faceted
-and end where the boundary was, and targets may be rough."""
+and targets may be rough."""
+BENT = 0.05
+"""How much farther it may, over its distance beyond the end of the wall, which is continued flat:
+walls end where the boundary was."""
 
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Returns for points (m, d) their closest points on a surface and its unit normals there; or on
@@ -125,7 +128,7 @@ def lay_onto(
     moved = guide.on_edges(moved)
     for _ in range(WALL_ROUNDS):
         for wall in walls:
-            off, normals = _beyond(moved[wall.rows], wall)
+            off, _, normals = _beyond(moved[wall.rows], wall)
             moved[wall.rows] = target.surface(moved[wall.rows] - off * normals)[0]
         moved = guide.on_edges(moved)
     for wall in walls:
@@ -191,24 +194,27 @@ class _Guide:
         weighted = diags_array(weights) @ matrix
         return matrix.T @ weighted, weighted.T @ ways
 
-    def near_wall(self, x: FloatArray, wall: Wall, reach: float) -> FloatArray:
-        """Return points (r, d) that are on the target, not farther from the wall than ``reach``.
+    def near_wall(self, x: FloatArray, wall: Wall, near: float) -> FloatArray:
+        """Return points (r, d) that are on the target, and ``near`` the wall.
 
         They are on the target's rim where that is as near.
         """
+        off, beyond, normals = _beyond(x, wall)
+        reach = near + BENT * beyond
         if self.target.rim is not None:
             at = self.target.rim(x)[0]
-            near = np.linalg.norm(at - x, axis=1) <= reach
-            near &= ~np.isin(wall.rows, self.edge)
-            x = np.where(near[:, None], at, x)
-        off, normals = _beyond(x, wall)
+            meets = np.linalg.norm(at - x, axis=1, keepdims=True) <= reach
+            meets &= ~np.isin(wall.rows, self.edge)[:, None]
+            x = np.where(meets, at, x)
+            off, _, normals = _beyond(x, wall)
         return x - np.sign(off) * np.maximum(np.abs(off) - reach, 0.0) * normals
 
 
-def _beyond(x: FloatArray, wall: Wall) -> tuple[FloatArray, FloatArray]:
-    """Return how far points (r, d) are off a wall, (r, 1), and its normals (r, d)."""
+def _beyond(x: FloatArray, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return how far points (r, d) are off a wall, and beyond its end, (r, 1), and its normals."""
     at, normals = wall.nearest(x)
-    return _dots(x - at, normals)[:, None], normals
+    off = _dots(x - at, normals)[:, None]
+    return off, np.linalg.norm(x - at - off * normals, axis=1, keepdims=True), normals
 
 
 def _fit(points: FloatArray, guide: _Guide) -> FloatArray:

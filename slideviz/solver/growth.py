@@ -12,7 +12,8 @@ from functools import reduce
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.case.motion import ROUNDING
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
 from slideviz.solver.setup import Setup
 from slideviz.system.threads import in_parts
@@ -55,7 +56,8 @@ def unsoundness(
     ``farthest``: the largest displacement of all nodes, in the frame.
     ``least``: a length: the whole displacement counts as at least so long, where it is smaller.
     """
-    largest = part * setup.largest
+    # Shorter displacements are rounding, as sin(pi) is.
+    largest = max(part * setup.largest, ROUNDING * largest_coordinate(mesh.points))
     if solution.lost > HOPELESS * largest:
         return (
             f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "

@@ -52,6 +52,8 @@ _ALSO = {
     "dr": "distance",
 }
 """Names of numbers in the grammar of ``MOTION``, and their names here."""
+TIME = "time"
+"""The column with the time of a design, which changes nothing but the name of its mesh."""
 _WHOLE_MOTION = ("MOTION", "DEFORMATION_FILENAME")
 _LISTED = 24
 
@@ -139,7 +141,7 @@ def applied(
         if isinstance(place, str) or value == "":
             continue
         try:
-            place.put(motions, _number(value))
+            place.put(motions, number_of(value))
         except CaseError as problem:
             problems.append(f"column {shown(name)}: {problem}")
     if problems:
@@ -150,6 +152,8 @@ def applied(
 def column_name(name: str) -> str:
     """Return the name of a column in results: a key in capitals, else as it was given."""
     plain = name.strip()
+    if plain.lower() == TIME:
+        return TIME
     return plain.upper() if plain.upper() in KEYS else plain
 
 
@@ -159,6 +163,8 @@ def case_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[st
     for name, what in columns.items():
         if isinstance(what, NumberPlace):
             values[name] = what.of(case)
+        elif what == TIME:
+            values[name] = ""
         else:
             value = KEYS[what].get(case)
             values[name] = "" if value is None else KEYS[what].kind.write(value)
@@ -172,6 +178,8 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
     Raises CaseError where the name means nothing, several numbers, or a key that cannot vary.
     """
     key = name.strip().upper()
+    if name == TIME:
+        return TIME
     if key in KEYS:
         if KEYS[key].group in (FILES, VIEW):
             raise CaseError("files and the view are those of the case for all designs")
@@ -258,7 +266,8 @@ def _names_text(known: Iterable[str]) -> str:
     return ", ".join(names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
 
 
-def _number(value: Value) -> float:
+def number_of(value: Value) -> float:
+    """Return a value of a table as a finite number; raise CaseError where it is none."""
     if isinstance(value, str):
         return number(value.strip())
     if not isinstance(value, Real) or not math.isfinite(value):

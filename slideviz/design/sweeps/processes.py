@@ -20,7 +20,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
 from hashlib import blake2b
@@ -42,6 +42,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
+from slideviz.streaming.run import stream
 from slideviz.system.cleanup import clean_up
 from slideviz.terms import FileFormat
 
@@ -70,6 +71,7 @@ class Task:
     packed: Packed | None = None  # the mesh, for a worker that lacks it
     output: Path | None = None  # where the deformed mesh is written; None: it is not
     file_format: FileFormat | None = None  # of ``output``; None: as its ending says
+    streamed: bool = False  # whether the mesh goes from file to file; no worker needs it then
 
 
 @dataclass(frozen=True)
@@ -106,11 +108,11 @@ def run_task(task: Task) -> TaskResult:
         if task.packed is not None:
             cache_mesh(task.packed)
         mesh = _meshes.get(task.mesh)
-        if mesh is None:
+        if mesh is None and not task.streamed:
             return TaskResult(_worker_name())
         begin = time.perf_counter()
         try:
-            with _one_thread():
+            with nullcontext() if task.streamed else _one_thread():
                 row = _result(task, mesh, begin)
         except SlidevizError as problem:
             row = DesignRow(task.design, problem="; ".join(str(problem).splitlines()))
@@ -123,15 +125,21 @@ def run_task(task: Task) -> TaskResult:
         return TaskResult(_worker_name(), row)
 
 
-def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
+def _result(task: Task, mesh: Mesh | None, begin: float) -> DesignRow:
     """Deform the mesh as ``slideviz run`` does, and return the row."""
     last, errors = None, []
-    for step in deform(task.case, mesh):
-        last = step
-        errors.append(step.max_error)
-    assert last is not None
-    measured = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
-    if task.output is not None:
+    if mesh is None:
+        assert task.output is not None
+        done = stream(task.case, task.output, file_format=task.file_format)
+        mesh, last, measured = done.mesh, done.steps[-1], done.quality
+        errors = [step.max_error for step in done.steps]
+    else:
+        for step in deform(task.case, mesh):
+            last = step
+            errors.append(step.max_error)
+        assert last is not None
+        measured = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
+    if task.output is not None and not task.streamed:
         write(task.output, last.mesh, base=mesh, file_format=task.file_format)
     return DesignRow(
         design=task.design,

@@ -252,16 +252,23 @@ def lock_folder(folder: Path) -> BaseFileLock:
     return lock
 
 
-def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
-    """Return the digests by name, and keys as text, that the results of a case depend on."""
+def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
+    """Return the digests by name, and keys as text, that the results of a case depend on.
+
+    A mesh that is None stays in its file, which counts by its size and its time of change.
+    """
     prescribed = [motion for motion in case.motions if isinstance(motion, Prescribed)]
     written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
     plain = effective(case.change(motions=written))
-    boundaries = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
-    found = {
-        "mesh": _digest(mesh.points, mesh.cells.types, mesh.cells.connectivity, *chain(*boundaries))
-    }
-    if any(isinstance(motion, BoxMotion) for motion in written):
+    if mesh is None:
+        assert case.mesh_file is not None
+        state = case.mesh_file.stat()
+        found = {"mesh": f"{state.st_size} bytes, {state.st_mtime_ns}"}
+    else:
+        parts = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
+        cells = mesh.cells
+        found = {"mesh": _digest(mesh.points, cells.types, cells.connectivity, *chain(*parts))}
+    if mesh is not None and any(isinstance(motion, BoxMotion) for motion in written):
         boxes = boxes_of(mesh, system_of(case))
         found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes))
     for at, one in enumerate(prescribed, start=1):

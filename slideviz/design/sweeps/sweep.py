@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -21,11 +28,12 @@ from slideviz.design.sweeps.processes import (
     usable_cores,
 )
 from slideviz.design.sweeps.results import SweepResults, sources_of
-from slideviz.design.sweeps.table import Design, DesignRow, Table, read_designs
+from slideviz.design.sweeps.table import Design, DesignRow, Table, iterations, read_designs
 from slideviz.errors import CaseError, DeformError
 from slideviz.formats.files import read
 from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
+from slideviz.streaming.run import require_stream
 
 LOST = 3  # number of lost workers at which a design is given up, and its row says so
 _EVERY = 0.2  # seconds between two calls of ``going_on``
@@ -41,6 +49,8 @@ def sweep(
     workers: int | None = None,
     folder: str | Path | None = None,
     meshes: bool = False,
+    time_step: float | None = None,
+    stream: bool = False,
     resume: bool = False,
     force: bool = False,
     going_on: Callable[[], object] = lambda: None,
@@ -55,9 +65,10 @@ def sweep(
     case : Case
         Motions and settings for what the designs do not change.
     designs : path, sequence of mappings, or mapping of sequences
-        A CSV file, the designs one by one, or the columns. A column is a number of a motion, as
-        ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the case, as ``STEPS``; where
-        a value is empty, that of the case holds.
+        A CSV file, the designs one by one, or the columns; or a pattern with * of displacement
+        files, each the design at the time that is the last number in its name. A column is a
+        number of a motion, as ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the
+        case, as ``STEPS``; where a value is empty, that of the case holds.
     executor : concurrent.futures.Executor, optional
         Runs the designs: ``ProcessPoolExecutor``, ``mpi4py.futures.MPIPoolExecutor``, Dask's
         ``client.get_executor()``. Without it, processes of this machine, which are replaced when
@@ -70,7 +81,13 @@ def sweep(
     folder : path, optional
         Where ``results.csv`` is written, a row as soon as it comes.
     meshes : bool
-        Whether the deformed meshes are written to ``folder``, by the workers.
+        Whether the deformed meshes are written to ``folder``, by the workers: as ``design_3.su2``,
+        or with a column ``time`` as ``mesh_00010.su2``, where 10 is the time iteration.
+    time_step : float, optional
+        The time between two iterations; without it, times are the numbers of iterations.
+    stream : bool
+        Whether meshes go from file to file, one design after the other, with only the boundary in
+        memory: for ``meshes`` that are larger than memory.
     resume : bool
         Whether designs that have a result in ``folder`` are left out. Their rows come first.
     force : bool
@@ -117,9 +134,20 @@ def sweep(
     asked = read_designs(case, designs)
     if workers is not None and workers < 1:
         raise CaseError(f"workers is {workers}; expected 1 or more")
-    if mesh is None:
-        if case.mesh_file is None:
-            raise CaseError("the case names no mesh; give MESH_FILENAME, or mesh=")
+    numbers = iterations(asked, time_step) if meshes or time_step is not None else {}
+    if (mesh is None or stream) and case.mesh_file is None:
+        raise CaseError("the case names no mesh; give MESH_FILENAME, or mesh=")
+    if stream:
+        if not meshes or mesh is not None or executor is not None:
+            raise CaseError(
+                "stream reads and writes meshes from file to file; give meshes=True (--meshes), "
+                "and neither mesh nor executor"
+            )
+        for design in asked.rows:
+            require_stream(design.case)
+        executor = ThreadPoolExecutor(1)
+    elif mesh is None:
+        assert case.mesh_file is not None
         mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     if folder is None and (meshes or resume):
         raise CaseError("meshes and resume need a folder; give folder=")
@@ -129,7 +157,7 @@ def sweep(
         earlier = results.start(resume=resume, force=force, meshes=meshes)
     done = {row.design for row in earlier}
     waiting = deque(row for row in asked.rows if row.number not in done)
-    tasks = _Tasks(mesh, asked.rows, Path(folder) if folder and meshes else None)
+    tasks = _Tasks(mesh, asked.rows, Path(folder) if folder and meshes else None, numbers)
     if executor is None:
         count = min(workers or usable_cores(), len(waiting))
         executor = Processes(max(count, 1), tasks.packed)
@@ -153,15 +181,27 @@ def _rows(
 
 
 class _Tasks:
-    """Makes workers' tasks: cases, the mesh once, and the folder for deformed meshes or None."""
+    """Makes workers' tasks: cases, the mesh once, and the folder for deformed meshes or None.
 
-    def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:
+    A mesh that is None stays in its file. ``numbers``: time iterations by design.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh | None,
+        designs: Sequence[Design],
+        folder: Path | None,
+        numbers: Mapping[int, int],
+    ) -> None:
         self._folder = None if folder is None else Path(folder).absolute()
+        self._mesh, self._width, self._numbers = mesh, len(str(len(designs))), numbers
+        self.packed = Packed("", b"")
+        if mesh is None:
+            return
         boxes = any(isinstance(m, BoxMotion) for design in designs for m in design.case.motions)
         # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
         lean = replace(mesh, origin=Origin())
-        self.packed: Packed = pack_mesh(mesh if boxes or folder is not None else lean)
-        self._mesh, self._width = mesh, len(str(len(designs)))
+        self.packed = pack_mesh(mesh if boxes or folder is not None else lean)
 
     def of(self, design: Design, with_mesh: bool) -> Task:
         """Return the task of a design; ``with_mesh``: with the mesh, for a worker that lacks it."""
@@ -172,10 +212,17 @@ class _Tasks:
         )
         output = None
         if self._folder is not None:
-            ending = (
-                f".{case.mesh_out_format}" if case.mesh_out_format else usual_ending(self._mesh)
-            )
-            output = self._folder / f"design_{design.number:0{self._width}d}{ending}"
+            if case.mesh_out_format:
+                ending = f".{case.mesh_out_format}"
+            elif self._mesh is None:
+                assert case.mesh_file is not None
+                ending = case.mesh_file.suffix
+            else:
+                ending = usual_ending(self._mesh)
+            name = f"design_{design.number:0{self._width}d}"
+            if self._numbers:
+                name = f"mesh_{self._numbers[design.number]:05d}"  # as SU2 numbers files in time
+            output = self._folder / f"{name}{ending}"
         return Task(
             design.number,
             case.change(motions=motions, view={}, warnings=()),
@@ -183,6 +230,7 @@ class _Tasks:
             packed=self.packed if with_mesh else None,
             output=output,
             file_format=case.mesh_out_format,
+            streamed=self._mesh is None,
         )
 
 

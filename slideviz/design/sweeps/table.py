@@ -6,16 +6,25 @@ It is given as values, or read from CSV; with results it is written as CSV.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import nan
+from math import isclose, nan
 from pathlib import Path
 from typing import Annotated, Any
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
-from slideviz.design.sweeps.columns import NumberPlace, Value, applied, column_name, columns_of
+from slideviz.design.sweeps.columns import (
+    TIME,
+    NumberPlace,
+    Value,
+    applied,
+    column_name,
+    columns_of,
+    number_of,
+)
 from slideviz.errors import CaseError
 from slideviz.system.csv_table import csv_rows
 
@@ -83,14 +92,16 @@ what `read_designs` returned."""
 
 
 def read_designs(case: Case, table: Table) -> Designs:
-    """Return the designs of a table.
+    """Return the designs of a table, or of the displacement files that a pattern with * matches.
 
     Raises CaseError if the file cannot be read, a column is unknown, or values are wrong; all
     mistakes are listed, each with its line.
     """
     if isinstance(table, Designs):
         return table
-    if isinstance(table, str | Path):
+    if isinstance(table, str | Path) and "*" in Path(table).name:
+        table = _files_in_time(Path(table))
+    elif isinstance(table, str | Path):
         return _read_csv(case, Path(table))
     rows = [{column_name(name): row[name] for name in row} for row in _rows_of(table)]
     names = dict.fromkeys(name for row in rows for name in row)
@@ -107,6 +118,54 @@ def read_designs(case: Case, table: Table) -> Designs:
     if problems:
         raise CaseError("\n".join(problems))
     return Designs(columns, tuple(designs))
+
+
+def iterations(designs: Designs, time_step: float | None = None) -> dict[int, int]:
+    """Return the time iteration of each design, by its number; {} where the table has no times.
+
+    It is the time over the time step, or without one the time itself. Raises CaseError where it is
+    no whole number, or two designs have the same.
+    """
+    if time_step is not None and not time_step > 0.0:
+        raise CaseError(f"the time step is {time_step:g}; it must be above 0")
+    if TIME not in designs.columns:
+        if time_step is not None:
+            raise CaseError(f"a time step needs a column {TIME} in the table of designs")
+        return {}
+    numbers: dict[int, int] = {}
+    designs_at: dict[int, int] = {}
+    for design in designs.rows:
+        time = float(design.values[TIME])
+        ratio = time / (time_step or 1.0)
+        whole = round(ratio)
+        if whole < 0 or not isclose(ratio, whole, rel_tol=1e-6, abs_tol=1e-6):
+            of = f"time steps of {time_step:g}" if time_step else "time steps"
+            raise CaseError(
+                f"design {design.number}: the time {time:g} is no whole number of {of}, from 0 on; "
+                "give the length of a time step (--time-step, time_step=), or times that fit it"
+            )
+        if whole in designs_at:
+            raise CaseError(
+                f"designs {designs_at[whole]} and {design.number} are at time iteration {whole} "
+                "both; keep one of them, or give a smaller time step"
+            )
+        numbers[design.number] = whole
+        designs_at[whole] = design.number
+    return numbers
+
+
+def _files_in_time(pattern: Path) -> list[dict[str, Any]]:
+    """Return a design for each displacement file that matches, its time the number in its name."""
+    rows = []
+    for path in sorted(pattern.parent.glob(pattern.name)):
+        digits = re.findall(r"\d+", path.stem)
+        if not digits:
+            raise CaseError(f"{path}: its name has no number, which is its time; rename it")
+        row = {TIME: int(digits[-1]), "DEFORMATION_FILENAME": str(path.absolute())}
+        rows.append(row)
+    if not rows:
+        raise CaseError(f"{pattern}: there is no such file; give a pattern as displacement_*.txt")
+    return sorted(rows, key=lambda row: row[TIME])
 
 
 def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -> list[Mapping]:
@@ -235,11 +294,20 @@ def _design(
 ) -> Design:
     """Return a design, with motions' numbers as float; CaseError where values are wrong."""
     made = applied(case, columns, values)
+    if TIME in columns:
+        values = {**values, TIME: _time(values[TIME])}
     plain = {
         name: float(value) if isinstance(columns[name], NumberPlace) and value != "" else value
         for name, value in values.items()
     }
     return Design(number, plain, made)
+
+
+def _time(value: Value) -> float:
+    try:
+        return number_of(value)
+    except CaseError as problem:
+        raise CaseError(f"column {TIME!r}: {problem}") from problem
 
 
 def _filled_lines(text: str) -> list[tuple[int, str]]:
