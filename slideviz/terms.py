@@ -137,8 +137,8 @@ MOTION_KINDS: dict[MotionKind, Term] = {
     "ffd-thickness": Term("thickness by box"),
     "ffd-twist": Term("twist by box"),
     "span": Term("blade over span"),
-    "file": Term("displacement file"),
-    "onto": Term("onto a surface"),
+    "file": Term("displacement file", "A line for each node: its number and its displacement."),
+    "onto": Term("onto a surface", "A surface (STL, VTU), or a mesh with a boundary of that name."),
 }
 
 SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]

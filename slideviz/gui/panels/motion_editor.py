@@ -41,8 +41,8 @@ from slideviz.gui.widgets.vector_field import (
     VectorField,
     a_direction,
     chord_problem,
-    limit_problem,
     control_point_problem,
+    limit_problem,
     peak_problem,
     scale_problem,
     term_problem,
@@ -66,11 +66,6 @@ RAISED = {
     False: ("Raised by", "towards +y"),
 }
 """Title and direction of the height of an airfoil's motion, by whether it is `HicksHenne`."""
-PATH_TIPS = {
-    False: "A line for each node: its number and its displacement.",
-    True: "The surface that it is laid onto: STL, VTU, or a mesh with a boundary of that name.",
-}
-"""Tips of the file of a motion, by whether it is `Onto`."""
 KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_OF.items()}
 """Labels of the kinds of motion, by class."""
 
@@ -256,8 +251,7 @@ class MotionEditor(QWidget):
         )
         self.limit = NumberField(
             allowed=limit_problem,
-            tip="How far a node may stay from the surface, in the mesh's length unit; 0 is 1 % of "
-            "the boundary's size.",
+            tip="How far a node may stay away, a length; 0 is 1 % of the boundary's size.",
         )
         self.path = TextField()
         self.browse = QPushButton("…")
@@ -316,7 +310,7 @@ class MotionEditor(QWidget):
             row = ROWS[name]
             self._show_value(name, row.shown(getattr(motion, row.attribute)))
         self.table.setVisible(not isinstance(motion, Onto))
-        self.path.setToolTip(PATH_TIPS[isinstance(motion, Onto)])
+        self.path.setToolTip(MOTION_KINDS[VERB_OF[type(motion)]].tip)
         shown = {*FIELDS.get(type(motion), ())}
         if isinstance(motion, OnAirfoil):
             self._name_height(motion)
