@@ -114,7 +114,7 @@ install_slideviz() {
         --constraint constraints.txt --editable ".[$EXTRAS]" \
         </dev/null || fail "pip could not install slideviz; its message is above"
     # Else the first command, or each process of the tests, would do it.
-    say "compiling the numerics (half a minute)"
+    say "compiling the numerics (a minute)"
     $VENV/bin/python -c 'from slideviz.session.jit_warmup import warm_up
 warm_up(lambda: None, lambda: False)' </dev/null || say "not compiled; the first command does it"
     fingerprint >"$STAMP"
