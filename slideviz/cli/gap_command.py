@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from itertools import zip_longest
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +81,7 @@ def _gap(arguments: argparse.Namespace) -> int:
     if case.motions:
         with Bar(not arguments.quiet, begun=arguments.begun) as bar:
             *_, last = deform(case, mesh, bar)
-        after = gaps(case, last.mesh, arguments.between)
+        after = gaps(case, last.mesh, arguments.between, reference=mesh)
         warnings, inverted = last.warnings, quality(last.mesh, mesh).inverted
     report = {
         "case": str(case.source or ""),
@@ -132,6 +133,9 @@ def _lines(before: Gap, after: Gap | None) -> str:
             for one in (before, after)
             if one is not None
         ]
+        if not all(map(isfinite, both)):  # no blade there
+            rows.append((word, *("-" for _ in both)))
+            continue
         change = (f"{100 * (both[1] / both[0] - 1):+.2f} %",) if len(both) > 1 and both[0] else ()
         rows.append((word, *both, *change))
     return f"{before.words}\n{table(rows)}"

@@ -87,6 +87,7 @@ def gaps(
     mesh: Mesh,
     between: Sequence[tuple[str, str]] = (),
     places: Sequence[float] = tuple(PLACES.tolist()),
+    reference: Mesh | None = None,
 ) -> tuple[Gap, ...]:
     """Return the throat between blades, the gaps at their ends, and other smallest distances.
 
@@ -105,6 +106,8 @@ def gaps(
         Other pairs of boundaries to measure.
     places : sequence of float
         Spans and parts of the chord between 0 and 1.
+    reference : Mesh, optional
+        The undeformed mesh, whose period counts: periodic sides of a deformed one need not match.
 
     Raises
     ------
@@ -122,18 +125,19 @@ def gaps(
     0.008
     """
     require_one_zone(mesh, "a gap")
-    return tuple(_Measure(case, without_halo(mesh)[0], np.asarray(places, float)).all(between))
+    return tuple(_Measure(case, mesh, reference or mesh, np.asarray(places, float)).all(between))
 
 
 class _Measure:
     """The surfaces of a mesh with their period and span, and the distances between them."""
 
-    def __init__(self, case: Case, mesh: Mesh, places: FloatArray) -> None:
+    def __init__(self, case: Case, mesh: Mesh, reference: Mesh, places: FloatArray) -> None:
+        base, mesh = (without_halo(each)[0] for each in (reference, mesh))
         self.mesh, self.places = mesh, places
         self._surfaces = {one.name: one for one in find_surfaces(mesh)}
         names = [n for n in case.markers_with("periodic") if len(mesh.marker(n).cells)]
         kind, axis, origin = case.periodic_type, case.axis, case.origin
-        pairs: Sequence[Pair] = pair_up(mesh, names, kind, axis, origin) if names else ()
+        pairs: Sequence[Pair] = pair_up(base, names, kind, axis, origin) if names else ()
         model = pairs[0] if pairs else None
         self.periods = (-1, 0, 1) if model is not None else (0,)
         same = [p.nodes if _same_way(p, pairs[0]) else p.nodes[:, ::-1] for p in pairs]

@@ -200,7 +200,7 @@ def gaps_of(session: Session) -> list[Measured]:
             continue
         cache = _GAPS.setdefault(frame, {})
         if key not in cache:
-            cache[key] = gaps(case, frame.mesh)
+            cache[key] = gaps(case, frame.mesh, reference=session.mesh)
         first = frame is session.first or run is None
         label, series = (
             ("undeformed", UNDEFORMED) if first or run is None else (run.label, series_of(run))

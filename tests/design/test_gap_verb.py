@@ -63,6 +63,16 @@ def test_other_distances_and_no_period():
     assert not len(throat.distances)
 
 
+def test_a_deformed_mesh_has_the_period_of_its_reference():
+    mesh, points = tipped(), tipped().points.copy()
+    points[mesh.marker("per2").nodes, 2] += 0.01
+    moved = mesh.with_points(points)
+    with pytest.raises(MeshError, match="do not match"):
+        sv.gaps(case_of(), moved)
+    throat, *_ = sv.gaps(case_of(), moved, reference=mesh)
+    assert throat.distance == pytest.approx(chord(0.5, 30.0), rel=1e-6)
+
+
 def test_wrong_cases_are_refused():
     mesh = tipped()
     with pytest.raises(CaseError, match="no boundary moves besides hub and shroud"):
