@@ -740,7 +740,8 @@ def test_layers_are_in_reports_and_summaries(channel, tmp_path, capsys):
     assert line in capsys.readouterr().out
     assert run(["quality", str(out), "--json", "-"]) == 0
     alone = json.loads(capsys.readouterr().out)["walls"]
-    assert alone["y_m"] == {key: walls["y_m"][key] for key in ("layered", "after")}
+    assert alone["y_m"]["first_height"] == {"after": walls["y_m"]["first_height"]["after"]}
+    assert alone["y_m"]["growth"] == {"after": walls["y_m"]["growth"]["after"]}
     assert "x_m" in alone
 
 
