@@ -92,8 +92,9 @@ def test_dark_is_dark(window, tmp_path):
 def test_all_pictures_of_a_folder_and_the_film_moves(tmp_path, qapp, monkeypatch):
     start = shots.ShotState("start", lambda window, place: None)
     monkeypatch.setattr(shots, "STATES", (start,))
+    monkeypatch.setattr(shots, "machine_pictures", lambda folder, place: [])
     paths = shots.shots(tmp_path / "new" / "folder")
-    assert [path.name for path in paths] == ["start.png", "passage.gif"]
+    assert [path.name for path in paths] == ["start.png", "passage.gif", "in_time.gif"]
     assert all(path.stat().st_size > 1_000 for path in paths)
     with Image.open(paths[1]) as film:
         first = np.asarray(film.convert("L")).astype(int)
