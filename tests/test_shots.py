@@ -89,6 +89,7 @@ def test_dark_is_dark(window, tmp_path):
         assert np.asarray(image.convert("L")).mean() < 90
 
 
+@pytest.mark.slow
 def test_all_pictures_of_a_folder_and_the_film_moves(tmp_path, qapp, monkeypatch):
     start = shots.ShotState("start", lambda window, place: None)
     monkeypatch.setattr(shots, "STATES", (start,))
