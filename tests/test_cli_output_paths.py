@@ -61,7 +61,7 @@ def test_names_need_not_be_utf_8(square):
         (["run", *CASE, "--json", "./square.cfg"], "square.cfg is the case file"),
         (["run", *CASE, "--json", "square.cfg", "--force"], "square.cfg is the case file"),
         (["run", *CASE, "--history", "link"], r"link is the input mesh \(mesh.su2\)"),
-        (["run", *CASE, "--history", "hard.csv"], r"a displacement file \(displacement.txt\)"),
+        (["run", *CASE, "--history", "hard.csv"], r"a file of a motion \(displacement.txt\)"),
         (["run", *CASE, "--set", "MESH_OUT_FILENAME=mesh.su2"], "mesh.su2 is the input mesh"),
         (["info", "mesh.su2", "--json", "mesh.su2"], "mesh.su2 is the input mesh"),
         (["quality", "mesh.su2", "-o", "link/../mesh.su2"], "mesh.su2"),
@@ -104,7 +104,7 @@ def test_steps_do_not_replace_an_input(square, capsys):
     (square / "sub" / "mesh_1.su2").hardlink_to(square / "displacement.txt")
     before = content(square)
     assert run(["run", *CASE, "--steps-dir", "sub"]) == 1
-    assert "mesh_1.su2 is a displacement file (displacement.txt)" in capsys.readouterr().err
+    assert "mesh_1.su2 is a file of a motion (displacement.txt)" in capsys.readouterr().err
     assert content(square) == before
 
 
@@ -119,7 +119,7 @@ def test_comparison_and_film_spare_their_inputs(square, capsys):
     assert run(["compare", "square.cfg", "-o", "out", "--steps", "1", "--no-pictures"]) == 1
     assert run(["film", "mesh.gif", "-o", "./mesh.gif", "--force", "--steps", "1"]) == 1
     err = capsys.readouterr().err
-    assert "out/compare.csv is a displacement file" in err
+    assert "out/compare.csv is a file of a motion" in err
     assert "mesh.gif is the case file" in err
     assert content(square) == before
 

@@ -264,7 +264,7 @@ def test_copies_need_boundaries_that_match(folder, capsys):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ([], f"one of the arguments --{' --'.join(SECTION_SHAPES)} is required"),
+        ([], f"one of the arguments --{' --'.join(SECTION_SHAPES)} --meridional is required"),
         (["--plane", "z=0.4", "--cylinder", "1"], "not allowed with"),
         (["--plane", "0,0,1,2,3"], "has 5 numbers; write nx,ny,nz,x,y,z"),
         (["--plane", "0,0,one,0,0,0"], "is not nx,ny,nz,x,y,z"),

@@ -9,7 +9,6 @@ from threading import Lock
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, Onto, applies_to
@@ -208,4 +207,6 @@ def _closest(
 
 
 def _corner(corners: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    from scipy.spatial import cKDTree
+
     return corners[cKDTree(corners).query(x)[1]], np.zeros_like(x)

@@ -118,7 +118,7 @@ def gaps(
     --------
     >>> import slideviz as sv
     >>> from slideviz.samples.table import write_sample
-    >>> files = write_sample("turbine-row", "try", 2000)
+    >>> files = write_sample("turbine-row", "try", 5000)
     >>> case = sv.Case.read("try/turbine-row.cfg")
     >>> [throat] = sv.gaps(case, sv.read(case.mesh_file))
     >>> round(throat.distance, 3)

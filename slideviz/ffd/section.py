@@ -27,7 +27,7 @@ from slideviz.ffd.box import (
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.mesh.zones import names_in, zones_of
+from slideviz.mesh.zones import names_in, require_one_zone, with_zones, zones_of
 
 _LETTERS = "IJK"
 _FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
@@ -330,7 +330,10 @@ def with_boxes(
     ``boxes``: changed boxes, matched by name, and new ones; the mesh's other boxes stay.
     ``anew``: whether all boxes that the mesh had are dropped.
     ``renewed``: names of boxes whose surface points have other parametric coordinates than before.
+    Raises MeshError for new boxes of a mesh of several zones, and where two have boxes of one name.
     """
+    if mesh.zone_parts:
+        return _with_boxes_of_zones(mesh, () if anew else boxes, renewed, bool(anew and boxes))
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)
     by_name = {box.name: box for box in boxes}
@@ -348,6 +351,32 @@ def with_boxes(
     text = "".join(lines).encode("utf-8", "surrogateescape")
     text = text if text.endswith(b"\n") else text + b"\n"
     return replace(mesh, origin=replace(mesh.origin, ffd=text, ffd_at=()))
+
+
+def _with_boxes_of_zones(
+    mesh: Mesh, boxes: Sequence[Box], renewed: Collection[str], new: bool
+) -> Mesh:
+    """Return the mesh of several zones with changed boxes, each in the zone that has it."""
+    alone = zones_of(mesh)
+    names = [[box.name for box in boxes_of(zone)] for zone in alone]
+    if new or any(sum(box.name in some for some in names) != 1 for box in boxes):
+        require_one_zone(mesh, "a new FFD box, or one whose name two zones have,")
+    zones = []
+    for part, zone, some in zip(mesh.zone_parts, alone, names, strict=True):
+        in_file = names_in(mesh, part)
+        mine = [
+            replace(
+                box,
+                embedded={
+                    in_file[marker]: (nodes - part.points.start, uvw)
+                    for marker, (nodes, uvw) in box.embedded.items()
+                },
+            )
+            for box in boxes
+            if box.name in some
+        ]
+        zones.append(with_boxes(zone, mine, renewed=renewed) if mine else zone)
+    return with_zones(mesh, zones)
 
 
 def _lines(mesh: Mesh) -> list[str]:

@@ -11,14 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array, kron
-from scipy.sparse.linalg import splu
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import facet_vectors, find_joints, unit
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 SMOOTHNESS = np.geomspace(10.0, 1e-4, 6)
 """Weight of the smoothness of the displacement in each round."""
@@ -109,6 +110,9 @@ def lay_onto(
     walls : sequence of Wall
         What nodes at the boundary's rim stay on.
     """
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import splu
+
     size = float(np.ptp(points, axis=0).max())
     bending = _bending(points, facets)
     guide = _Guide(facets, target, walls)
@@ -185,6 +189,8 @@ class _Guide:
 
     def equations(self, moved: FloatArray) -> tuple[csr_array, FloatArray]:
         """Return matrix and right side of the least squares of the conditions."""
+        from scipy.sparse import coo_array, diags_array
+
         rows, directions, ways, weights = self.conditions(moved)
         dim = moved.shape[1]
         columns = dim * rows[:, None] + np.arange(dim)
@@ -240,6 +246,8 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
 
     Edges weigh as the inverse of their lengths, and the weights of a node are 1 together.
     """
+    from scipy.sparse import coo_array, diags_array, kron
+
     one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     edges = np.sort(np.stack([one, two], axis=1)[one != two], axis=1)
     one, two = np.unique(edges, axis=0).T

@@ -358,11 +358,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
         frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
-        if not unfinished and case.limits:
-            with suppress(SlidevizError):  # the panel of limits says what is wrong
-                frame = replace(frame, limits=check_case_limits(case, measured, step.mesh, mesh))
-        _precompute(frame)
-        report(frame)
+        report(_complete(frame, None if unfinished else case, mesh))
         going_on()
 
 
@@ -395,8 +391,17 @@ def repair(
     measured = quality(step.mesh, undeformed, case.quality_metric)
     names = case.walls(mesh.marker_names)
     frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
+    report(_complete(frame, case, mesh))
+
+
+def _complete(frame: StepFrame, case: Case | None, mesh: Mesh) -> StepFrame:
+    """Return a frame with what views ask for computed, and the limits of a case checked."""
+    if case is not None and case.limits:
+        with suppress(SlidevizError):  # the panel of limits says what is wrong
+            limits = check_case_limits(case, frame.quality, frame.mesh, mesh)
+            frame = replace(frame, limits=limits)
     _precompute(frame)
-    report(frame)
+    return frame
 
 
 def compute_in_file(

@@ -161,10 +161,28 @@ def test_boxes_of_other_cells_and_of_one_zone_stay_in_place(tmp_path):
     body = written(tmp_path).read_text()
     zones = tmp_path / "zones.su2"
     zones.write_text(f"NZONE= 2\nIZONE= 1\n{body}IZONE= 2\n{body}")
-    first = sv.read(zones)
+    first = sv.read(zones, zone=1)
     sv.write(tmp_path / "zones_out.su2", with_boxes(first, [new], anew=True))
     for zone, name in ((1, "NEW"), (2, "MAIN")):
         assert boxes_of(sv.read(tmp_path / "zones_out.su2", zone=zone))[0].name == name
+
+
+def test_boxes_of_several_zones_change_where_they_are(tmp_path):
+    body = written(tmp_path).read_text()
+    text = f"NZONE= 2\nIZONE= 1\n{body}\nIZONE= 2\n{body.replace('MAIN', 'SECOND')}\n"
+    (tmp_path / "zones.su2").write_text(text)
+    mesh = sv.read(tmp_path / "zones.su2")
+    main, second = boxes_of(mesh)
+    change = np.zeros_like(second.points)
+    change[1, 1, 0, 1] = 0.01
+    sv.write(tmp_path / "out.su2", with_boxes(mesh, [second.moved(change)]))
+    first, moved = (boxes_of(sv.read(tmp_path / "out.su2", zone=k))[0] for k in (1, 2))
+    assert np.array_equal(first.points, main.points)
+    assert np.array_equal(moved.points, second.points + change)
+    new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
+    for anew in (False, True):
+        with pytest.raises(MeshError, match="has 2 zones, but a new FFD box"):
+            with_boxes(mesh, [new], anew=anew)
 
 
 def test_lines_of_windows_keep_their_ends(tmp_path):
@@ -245,7 +263,7 @@ def test_box_of_another_zone_is_told_with_its_zone(tmp_path, capsys):
         "MESH_FILENAME= square.su2\nMARKER_MOVING= (y_low)\n"
         "MOTION= (y_low, ffd, MAIN, 1, 0, 0, 0, 0.01, 0)\n"
     )
-    for more in ([], ["--stream"]):
+    for more in (["--zone", "1"], ["--zone", "1", "--stream"]):
         assert run(["run", str(case), "-o", str(tmp_path / "out.su2"), *more]) == 1
         said = "square.su2: the FFD box 'MAIN' is in zone 2, and this is zone 1; choose that zone"
         assert said in capsys.readouterr().err

@@ -111,6 +111,6 @@ def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube
     assert "z" not in session_plots.coordinates(session)
     solid = open_mesh(StepFrame(cube, quality(cube)), None)
     assert session_plots.usual_coordinate(solid) in ("x", "y", "z")
-    assert list(session_plots.coordinates(solid)) == ["r", "z", "y", "x"]
+    assert list(session_plots.coordinates(solid)) == ["r", "span", "z", "y", "x"]
     turned = replace(solid, pairs=(SimpleNamespace(kind="rotational"),))
     assert session_plots.usual_coordinate(turned) == "r"
