@@ -60,6 +60,12 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
     yield from key_problems(case)
+    moved = {name: "MOTION" for motion in case.motions for name in named(motion.marker)}
+    keys = moved | _keys_of_markers(case)
+    several = {name: key for name, key in keys.items() if _of_several_zones(mesh, name)}
+    if several:  # what else is wrong may be so by these names only
+        yield from unknown_markers(mesh, several)
+        return
     yield from (sentence for _, sentence in contradictions(case, exact=True))
     yield from marker_problems(case, mesh)
     yield from _zone_problems(case, mesh)
@@ -101,7 +107,7 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
             if name in moving or name in seen or without_zone(name) in spelt:
                 continue
             seen.add(name)
-            remedy, several = "one of the two is wrong", name.split("+")
+            remedy, several = f"one of the two is wrong{nearest(name, moving)}", name.split("+")
             if set(several) <= set(moving):
                 markers = ", ".join(several)
                 remedy = f"write several in brackets, as in (({markers}), translate, ...)"
@@ -129,14 +135,25 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each marker of the case that the mesh lacks, and if no marker moves."""
     nothing = "no marker moves; name one in MARKER_MOVING"
-    named = {name: ROLES[role].key for name, role in case.roles.items()}
-    limited = {limit.marker: "LIMITS" for limit in case.limits if limit.marker}
     there = [limit for limit in case.limits if limit.marker in mesh.marker_names]
     return (
-        *unknown_markers(mesh, named | limited),
+        *unknown_markers(mesh, _keys_of_markers(case)),
         *not_walls(there, case.walls(mesh.marker_names)),
         *[nothing] * (not case.markers_with("moving")),
     )
+
+
+def _keys_of_markers(case: Case) -> dict[str, str]:
+    """Return the key that names each marker with a role or a limit."""
+    roles = {name: ROLES[role].key for name, role in case.roles.items()}
+    return roles | {limit.marker: "LIMITS" for limit in case.limits if limit.marker}
+
+
+def _of_several_zones(mesh: Mesh, marker: str) -> str:
+    """Return the spellings of a marker that several zones have, as ``1:blade or 2:blade``."""
+    if not mesh.zone_parts or marker in mesh.marker_names:
+        return ""
+    return " or ".join(name for name in mesh.marker_names if without_zone(name) == marker)
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
@@ -144,14 +161,9 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
     known = mesh.marker_names
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"
-    of_zones = {
-        marker: [name for name in known if without_zone(name) == marker]
-        for marker in named
-        if mesh.zone_parts
-    }
     return [
         f"{key}: several zones of {mesh.name} have a marker {marker!r}; write {joined}"
-        if (joined := " or ".join(of_zones.get(marker, ())))
+        if (joined := _of_several_zones(mesh, marker))
         else f"{key}: {mesh.name} has no marker {marker!r}{nearest(marker, known) or f'; {has}'}"
         for marker, key in named.items()
         if marker not in known

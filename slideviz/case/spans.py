@@ -21,14 +21,17 @@ from slideviz.mesh.zones import require_one_zone
 
 HUBS, SHROUDS = ("hub",), ("shroud", "casing")
 """Words in the names of boundaries, by which SPAN= AUTO finds hub and shroud."""
+WALLS_KEY = "SPAN= ( HUB, SHROUD )"
+"""How a case names both."""
 
 _FIELDS: WeakKeyDictionary[Mesh, dict[object, SpanField]] = WeakKeyDictionary()
 _SECTIONS: WeakKeyDictionary[SpanField, dict[object, BladeSections]] = WeakKeyDictionary()
 
 
-def span_ends(case: Case, mesh: Mesh) -> tuple[str, str]:
+def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str]:
     """Return the boundaries where the span is 0 and 1: those of SPAN, else by their names.
 
+    ``remedy``: how the user names them, for the message.
     Raises CaseError if the mesh lacks one of SPAN, or names are ambiguous.
     """
     names = mesh.marker_names
@@ -46,7 +49,7 @@ def span_ends(case: Case, mesh: Mesh) -> tuple[str, str]:
         hubs, shrouds = (", ".join(end) or "none" for end in ends)
         raise CaseError(
             f"{mesh.name}: the names of boundaries do not say between which the span goes (hub: "
-            f"{hubs}; shroud or casing: {shrouds}); name two, as in SPAN= ( HUB, SHROUD ), of "
+            f"{hubs}; shroud or casing: {shrouds}); name two, as in {remedy}, of "
             f"{', '.join(names)}"
         )
     return ends[0][0], ends[1][0]

@@ -71,9 +71,12 @@ def _gap(arguments: argparse.Namespace) -> int:
     case, mesh = read_mesh(case, mesh_file)
     before = gaps(case, mesh, arguments.between)
     if not before:
+        none = "there is no gap at hub or shroud"
+        if mesh.dim == 2:
+            none = "tip gaps by span are for 3D meshes"
         raise CaseError(
-            f"{mesh_file}: there is one blade, which does not repeat, and no gap at hub or shroud, "
-            "so there is nothing to measure; name boundaries by --between"
+            f"{mesh_file}: there is one blade, which does not repeat, and {none}, so there is "
+            "nothing to measure; name boundaries by --between, as in --between SHROUD,BLADE"
         )
     after: tuple[Gap, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -118,7 +121,14 @@ def _gap(arguments: argparse.Namespace) -> int:
 def _lines(before: Gap, after: Gap | None) -> str:
     """Return the lines on a gap: its smallest distance, and a table of those by place."""
     from slideviz.cli.report import table
+    from slideviz.design.gap import TOUCHING
 
+    measured = [one for one in (before, after) if one is not None]
+    words = before.words
+    if not any(one.distance for one in measured):
+        words += f": {TOUCHING}"
+        if not any(isfinite(value) for one in measured for value in one.distances):
+            return words
     listed: list[tuple[str, int | None]] = [("smallest", None)]
     listed += [
         (f"{100 * place:.0f} %", int(abs(before.places - place).argmin()))
@@ -128,17 +138,13 @@ def _lines(before: Gap, after: Gap | None) -> str:
     rows: list[tuple[object, ...]] = [(before.along, "before")]
     rows[0] += ("after", "change") if after is not None else ()
     for word, k in listed:
-        both = [
-            float(one.distance if k is None else one.distances[k])
-            for one in (before, after)
-            if one is not None
-        ]
+        both = [float(one.distance if k is None else one.distances[k]) for one in measured]
         if not all(map(isfinite, both)):  # no blade there
             rows.append((word, *("-" for _ in both)))
             continue
         change = (f"{100 * (both[1] / both[0] - 1):+.2f} %",) if len(both) > 1 and both[0] else ()
         rows.append((word, *both, *change))
-    return f"{before.words}\n{table(rows)}"
+    return f"{words}\n{table(rows)}"
 
 
 def _draw(path: Path, before: tuple[Gap, ...], after: tuple[Gap, ...]) -> None:

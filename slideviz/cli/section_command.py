@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
+WALLS_OPTION = "--between HUB,SHROUD"
 EXAMPLES = """\
 examples:
   slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
@@ -237,7 +238,8 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
         mesh, reference = opened.source.mesh, opened.reference
         base, quality = opened.read_base(), opened.quality(arguments)
     undeformed = base or mesh
-    walls = find_walls(undeformed, case, find_period(undeformed, case), arguments.between)
+    period = find_period(undeformed, case)
+    walls = find_walls(undeformed, case, period, arguments.between, remedy=WALLS_OPTION)
     painted = paint(mesh, quality, arguments.color, base)
     painted = painted.within(*arguments.range) if arguments.range else painted
     bins = meridional_bins(undeformed, walls)
@@ -314,7 +316,8 @@ def _section_and_passages(
         chosen = replace(chosen, direction=pair.axis, origin=pair.origin)
     if chosen.kind == "span":
         about = chosen.direction, chosen.origin
-        walls = find_walls(read_base() or mesh, case, pair, arguments.between, about)
+        base = read_base() or mesh
+        walls = find_walls(base, case, pair, arguments.between, about, WALLS_OPTION)
         chosen = replace(chosen, walls=walls)
     if not arguments.copies:
         return chosen, {0: np.eye(4)}

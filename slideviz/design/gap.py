@@ -21,6 +21,7 @@ from slideviz.machine.gap import (
     turned,
 )
 from slideviz.mesh.halo import without_halo
+from slideviz.mesh.interfaces import ROUNDING
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.surfaces import find_surfaces
@@ -33,6 +34,7 @@ from slideviz.sections.span import SpanWalls, find_walls
 PLACES = frozen_array(np.linspace(0.02, 0.98, 25).round(2), np.float64)
 """Spans, and parts of the chord, at which distances are measured; 0.1, 0.5, 0.9 among them."""
 RIM = 0.1  # the nodes of a blade within this span of its end are its tip
+TOUCHING = "they touch (distance 0)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ class Gap:
     second: str
     """`first`, `second`: the boundaries."""
     distance: float
-    """The smallest one."""
+    """The smallest one; 0 where they touch up to rounding."""
     start: FloatArray
     end: FloatArray
     """`start`, `end` (d,): the points of ``first`` and ``second`` where it is."""
@@ -229,6 +231,8 @@ class _Measure:
 
     def _gap(self, name: str, first: FloatArray, second: FloatArray, level: Any, along: str) -> Gap:
         found = smallest(first, second)
+        if found.distance <= ROUNDING * self.mesh.extent:
+            found = found._replace(distance=0.0)
         gap = Gap(name, "", "", *found)
         if self.walls is None:
             return gap

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -14,7 +15,7 @@ from slideviz.argument_types import check_types
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import Table, read_designs
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import read
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
@@ -147,7 +148,16 @@ def _repeated(
         raise CaseError("the case has no periodic boundaries; passages are merged at these")
     base = without_halo(mesh)[0]
     known = [name for name in names if len(base.marker(name).cells)]  # halos have none
-    pairs = pair_up(base, known, "rotational", case.axis, case.origin)
+    try:
+        pairs = pair_up(base, known, "rotational", case.axis, case.origin)
+    except MeshError:
+        with suppress(MeshError):
+            shift = pair_up(base, known, "translational")[0].describe()
+            raise CaseError(
+                f"{mesh.name}: its periodic boundaries are images by a translation ({shift}), so "
+                "there is no wheel; a wheel needs passages that are turned about an axis"
+            ) from None
+        raise
     period = Wheel((base,), pairs).period
     count = round(2.0 * np.pi / period) if passages == "all" else passages
     if passages == "all" and abs(count * period - 2.0 * np.pi) > 1e-9:

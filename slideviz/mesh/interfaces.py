@@ -56,7 +56,7 @@ def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
 
     In a mesh of one zone, those of the other zone stay.
     """
-    sentences = []
+    sentences = dict[frozenset[object], str]()
     shift = points - mesh.points
     for each in mesh.interfaces:
         apart = shift[each.nodes]
@@ -70,5 +70,8 @@ def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
                 if mesh.zone_parts
                 else "keep it fixed, or deform all zones (without ZONE=)"
             )
-            sentences.append(f"zone {each.zone} no longer fits: {said} {gap:.3g}; {remedy}")
-    return tuple(sentences)
+            # A mesh of all zones has each pair twice, once from either side.
+            pair = frozenset((each.marker, each.other if mesh.zone_parts else each))
+            text = f"zone {each.zone} no longer fits: {said} {gap:.3g}; {remedy}"
+            sentences.setdefault(pair, text)
+    return tuple(sentences.values())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from slideviz.design.gap import Gap
+from slideviz.design.gap import TOUCHING, Gap
 from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
 if TYPE_CHECKING:
@@ -39,5 +39,7 @@ def draw_gaps(
                 *[[at] for at in (place if by_span else place[::-1])], "o", ms=4, color=look.color
             )
             ends.append(gap.distance)
+        if not any(gaps[number].distance for _, _, gaps in measured):
+            axes.set_title(TOUCHING, fontsize=style.size, color=style.scheme.text)
         axes.locator_params(axis="x", nbins=4)
         add_legend(axes, style, loc="best")

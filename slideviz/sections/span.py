@@ -17,7 +17,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
-from slideviz.case.spans import span_ends
+from slideviz.case.spans import WALLS_KEY, span_ends
 from slideviz.errors import CaseError
 from slideviz.machine.span import SpanCurves, find_span
 from slideviz.mesh.model import FloatArray, Mesh
@@ -232,17 +232,18 @@ def find_walls(
     pair: Pair | None = None,
     between: tuple[str, str] | None = None,
     about: tuple[Triple, Triple] | None = None,
+    remedy: str = WALLS_KEY,
 ) -> SpanWalls:
     """Return hub and shroud of a mesh: ``between``, or those of the case, or by their names.
 
     ``pair``: the period. ``about``: the axis of the span, and a point on it; without that it is the
-    axis of the period, and without a period that of the case.
+    axis of the period, and without a period that of the case. ``remedy``: see `span_ends`.
     Raises CaseError where none are known, or passages are not turned about an axis; and MeshError
     as `find_span` does.
     """
     case = case or Case()
     require_one_zone(mesh, "a span")
-    hub, shroud = between or span_ends(case, mesh)
+    hub, shroud = between or span_ends(case, mesh, remedy)
     if pair is not None and pair.kind != "rotational":
         if mesh.dim == 3 and case.markers_with("periodic"):
             raise CaseError(

@@ -64,6 +64,13 @@ def test_good_cases(square, case):
             ),
         ),
         (
+            good(motions=(UP, Translate("UPER", (1.0, 0.0)))),
+            (
+                "motion 2 names 'UPER', which does not move: MARKER_MOVING= (UPPER) does not have "
+                "it; one of the two is wrong; did you mean UPPER?"
+            ),
+        ),
+        (
             good(motions=(Translate("UPPER", (0.0, 0.0, 1.0)),)),
             "motion 1: the shift has 3 components, and the mesh has 2 dimensions; give 2",
         ),

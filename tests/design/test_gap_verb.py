@@ -108,6 +108,33 @@ def test_the_command_reports_before_and_after(files, capsys):
     assert (files / "gap.svg").read_text().count("undeformed") >= 1
 
 
+def test_boundaries_that_touch_are_said_to(files, capsys):
+    words = ["gap", "case.cfg", "--between", "shroud,per1", "--between", "inflow,hub"]
+    assert run([*words, "-o", "gap.svg"]) == 0
+    out = capsys.readouterr().out
+    assert "inflow to hub: they touch (distance 0)\n" in out
+    assert "nan" not in out
+    assert "they touch" in (files / "gap.svg").read_text()
+    assert run([*words, "--json", "gap.json"]) == 0
+    text = (files / "gap.json").read_text()
+    touching = json.loads(text)["gaps"][-1]
+    assert touching["undeformed"]["distance"] == touching["deformed"]["distance"] == 0.0
+    assert "nan" not in text.lower()
+
+
+def test_in_2d_there_are_no_tip_gaps_by_span(files, capsys):
+    mesh = grid((8, 8), hole=((3, 5), (3, 5)))
+    sv.write("plane.su2", mesh)
+    case = sv.Case(mesh_file=files / "plane.su2", roles={"BLOCK": "moving"})
+    case.write("plane.cfg")
+    assert run(["gap", "plane.cfg"]) == 1
+    said = capsys.readouterr().err
+    assert "tip gaps by span are for 3D meshes" in said
+    assert "--between SHROUD,BLADE" in said
+    assert run(["gap", "plane.cfg", "--between", f"{mesh.marker_names[0]},BLOCK"]) == 0
+    assert f"{mesh.marker_names[0]} to BLOCK\n" in capsys.readouterr().out
+
+
 def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
     case = sv.Case.read("case.cfg")
     case.change(motions=()).write("still.cfg")

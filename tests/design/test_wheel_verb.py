@@ -61,6 +61,8 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
     with pytest.raises(MeshError, match="has 2 zones, but a wheel is of one; choose it with ZONE="):
         sv.wheel(path, sv.Case(), join_zones([square(4), square(6)]))
     with pytest.raises(MeshError, match="do not match: with the best rotational"):
+        sv.wheel(path, sv.Case(roles={"x_m": "periodic", "y_p": "periodic"}), square(4))
+    with pytest.raises(CaseError, match=r"images by a translation \(.*\), so there is no wheel"):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "x_p": "periodic"}), square(4))
     with pytest.raises(CaseError, match=r"35°, which is no whole part of a turn; give the number"):
         sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 35.0))

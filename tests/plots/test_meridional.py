@@ -70,3 +70,7 @@ def test_the_command_draws_it_and_reports_the_means(tmp_path, monkeypatch, capsy
     sv.write("cube.su2", cube())
     assert run(["section", "cube.su2", "--meridional", "-o", "m.png"]) == 1
     assert "do not say between which the span goes" in capsys.readouterr().err
+    assert run(["section", "cube.su2", "--span", "0.5", "-o", "m.png"]) == 1
+    said = capsys.readouterr().err
+    assert "name two, as in --between HUB,SHROUD, of " in said
+    assert "SPAN=" not in said

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.case.check import check_case
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks
@@ -84,6 +85,12 @@ def test_a_name_of_several_zones_needs_its_number(tmp_path):
     case = sv.Case(roles={"BLOCK": "moving"}, motions=(turn(""),))
     with pytest.raises(CaseError, match="have a marker 'BLOCK'; write 1:BLOCK or 2:BLOCK"):
         last(case, sv.read(stage(tmp_path)))
+    case = sv.Case(roles={"1:BLOCK": "moving"}, motions=(turn(""),), limits="growth@BLOCK < 2")
+    (said,) = check_case(case, sv.read(stage(tmp_path)))
+    assert said.endswith("have a marker 'BLOCK'; write 1:BLOCK or 2:BLOCK")
+    case = sv.Case(roles={"1:BLOCK": "moving"}, motions=(turn(""),))
+    (said,) = check_case(case, sv.read(stage(tmp_path)))
+    assert said.startswith("MOTION: several zones of ")
 
 
 def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
@@ -153,9 +160,9 @@ def test_both_moved_apart_is_warned_of(tmp_path):
     roles = dict.fromkeys(("BLOCK", "core"), "moving")
     motions = sv.Translate("BLOCK", MOVE), sv.Translate("core", (0.0, 0.0))
     told = last(sv.Case(roles=roles, motions=motions), mesh).warnings
-    assert any(
-        "zone 2 no longer fits: BLOCK" in text and "move both alike" in text for text in told
-    )
+    (said,) = [text for text in told if "no longer fits" in text]
+    assert said.startswith("zone 2 no longer fits: BLOCK")
+    assert "move both alike" in said
 
 
 def test_nodes_that_slide_take_the_other_zone_along(tmp_path):
