@@ -364,7 +364,9 @@ def wall_words(row: dict) -> str:
     ratio, change = row["first_height"]["ratio"], row["angle"]["change"]
     heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
     turned = f"by up to {turn:.2g}°" if (turn := change["max"]) >= 0.01 else "by less than 0.01°"
-    return f"{heights}, first edges turned {turned}"
+    before, after = (row["growth"][when]["max"] for when in ("before", "after"))
+    growing = f", growth up to {after:.3g} ({before:.3g} before)" if before and after else ""
+    return f"{heights}{growing}, first edges turned {turned}"
 
 
 def _statistics(values: FloatArray) -> dict[str, float | None]:
