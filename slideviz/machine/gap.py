@@ -20,7 +20,7 @@ from slideviz.rbf.closest import ClosestPoints
 
 RELATIVE = 1e-7  # a distance is found up to this part of it
 MOST_ROUNDS = 40  # most halvings of a segment
-MOST_SEGMENTS = 20_000
+MOST_SEGMENTS = 1_000
 """Most segments that are halved at a time: those that may have the nearest points. Where more could
 have them, the surfaces are nearly parallel, and the distances of these hardly differ."""
 
