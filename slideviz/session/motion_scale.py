@@ -30,6 +30,12 @@ def scaled(motions: Sequence[Motion], part: float) -> tuple[Motion, ...] | None:
     return tuple(replace(motion, **new) for motion, new in zip(motions, changed, strict=True))
 
 
+def moves_nothing(motion: Motion) -> bool:
+    """Return whether a motion leaves its boundary in place; False for displacement files."""
+    far = [one for _, value, rest in _values(motion) for one in _list(value, rest)]
+    return bool(far) and not any(far)
+
+
 def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | None:
     """Return how many times as far ``motions`` go as ``others``; None where they differ besides."""
     at_rest = scaled(motions, 0.0)

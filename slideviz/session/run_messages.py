@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Motion, Onto, applies_to
+from slideviz.case.model import Case, FromFile, Onto, applies_to
 from slideviz.errors import Note
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
+from slideviz.session.motion_scale import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
@@ -219,19 +220,6 @@ def _lacks_file(motion: FromFile) -> str:
     if path.is_dir():
         return f"{path} is a folder: choose the {what} in it."
     return f"The {what} {path} does not exist."
-
-
-_STILL = dict.fromkeys(("vector", "angle_deg", "distance", "height", "amount"), 0.0)
-_STILL |= {"factors": 1.0, "factor": 1.0}  # by attributes of motions: the value that moves nothing
-
-
-def moves_nothing(motion: Motion) -> bool:
-    """Return whether a motion leaves its boundary in place; False for displacement files."""
-    sizes = {name: getattr(motion, name) for name in _STILL if hasattr(motion, name)}
-    return bool(sizes) and all(
-        set(size if isinstance(size, tuple) else (size,)) == {_STILL[name]}
-        for name, size in sizes.items()
-    )
 
 
 def tolerance_warning(case: Case, extent: float, largest: float) -> str:

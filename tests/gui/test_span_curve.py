@@ -171,3 +171,63 @@ def test_a_motion_over_the_span_is_dragged_typed_and_undone(editor, driver, qtbo
     assert motion().values == (1.0, 0.01), "as small as a chord can be drawn"
     driver.choose(editor.kind, Rotate)
     assert not drawn.isVisibleTo(editor)
+
+
+@pytest.mark.parametrize(
+    ("typed", "rule"),
+    [
+        ("0:0, 2:3", "the spans 0, 2 do not ascend from 0 (hub) to 1 (shroud)"),
+        ("0:0, 1:x", "'x' is not a number"),
+        ("abc", "'abc' is not a number"),
+        ("0:0, 1", "'0:0, 1' is no curve over the span; expected span:value"),
+    ],
+)
+def test_an_invalid_curve_keeps_runs_from_starting(editor, driver, typed, rule):
+    window, field = driver.window, editor.curve
+    run, status = window.run_panel.run, window.statusBar()
+    driver.type(field, "0:0, 1:3")
+    QTest.keyClick(field, KEYS.Key_Return)
+    assert run.isEnabled()
+    driver.type(field, typed)
+    assert field.property("bad")
+    ((place, said),) = driver.session.invalid
+    assert (place, said.startswith(f"Over span: {rule}")) == ("motion", True)
+    assert not run.isEnabled()
+    QTest.keyClick(field, KEYS.Key_F5)
+    window.start_run()
+    assert not driver.session.runs
+    QTest.keyClick(field, KEYS.Key_Tab)
+    assert status.currentMessage().startswith(f"Invalid: {rule}")
+    assert field.text() == typed
+    assert not run.isEnabled()
+    driver.click(field)
+    QTest.keyClick(field, KEYS.Key_Escape)
+    assert (field.text(), driver.session.invalid) == ("0:0, 1:3", ())
+    assert not status.currentMessage()
+    assert run.isEnabled()
+
+
+def test_another_motion_takes_an_invalid_curve_and_its_message_away(editor, driver):
+    window, field = driver.window, editor.curve
+    driver.type(field, "0:0, 1:3")
+    driver.add_motion(SpanMotion)
+    driver.type(field, "abc")
+    QTest.keyClick(field, KEYS.Key_Tab)
+    assert window.statusBar().currentMessage().startswith("Invalid: 'abc'")
+    window.motions.list.setCurrentRow(0)
+    assert (field.text(), driver.session.invalid) == ("0:0, 1:3", ())
+    assert not window.statusBar().currentMessage()
+    assert window.run_panel.run.isEnabled()
+    window.motions.list.setCurrentRow(1)
+    assert field.text() == "0:0, 1:0"
+    assert not field.property("bad")
+
+
+def test_a_curve_that_moves_nothing_is_not_ready(editor, driver):
+    panel = driver.window.run_panel
+    for kind, moves in (("twist", "0:0, 1:3"), ("chord", "0:1, 1:1.1")):
+        driver.choose(editor.change, kind)
+        assert "Nothing moves yet" in panel.text.text()
+        assert not panel.run.isEnabled()
+        driver.type(editor.curve, moves)
+        assert panel.run.isEnabled()

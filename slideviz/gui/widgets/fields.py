@@ -77,11 +77,21 @@ def short_text(value: float, scale: float = 0.0) -> str:
     return exact if len(exact) <= SHORT else f"{float(value):.6g}"
 
 
+INVALID = "Invalid: "  # start of the status bar's message on an invalid text
+
+
 def _report_restored(field: QWidget, problem: str, value: str) -> None:
     """Say in the status bar that a field was left with an invalid text."""
     window = main_window(field)
     if window is not None:
-        window.show_status(f"Invalid: {problem}; the value is still {value}.")
+        window.show_status(f"{INVALID}{problem}; the value is still {value}.")
+
+
+def _clear_report(field: QWidget) -> None:
+    """Take away the message of `_report_restored`, as the text is no longer invalid."""
+    window = main_window(field)
+    if window is not None and window.statusBar().currentMessage().startswith(INVALID):
+        window.show_status("")
 
 
 def _undo_in_field(field: QLineEdit, event: QEvent) -> bool | None:
@@ -132,7 +142,53 @@ class TextField(QLineEdit):
         return super().event(event) if handled is None else handled
 
 
-class CheckedText(TextField):
+class CheckedField(TextField):
+    """The base of fields whose text may be invalid: it is marked then, and Escape replaces it."""
+
+    marked = Signal()
+    """``fault`` has changed."""
+
+    def __init__(self, text: str, tip: str) -> None:
+        super().__init__(text)
+        self._tip = tip
+        self.fault = ""  # why the field is marked as invalid; empty if it is not
+        self.setToolTip(wrapped(tip))
+        self.textEdited.connect(self._edited)
+        self.editingFinished.connect(self._finish)
+
+    @property
+    def problem(self) -> str:
+        """Return why the text is invalid; empty if it is valid."""
+        raise NotImplementedError
+
+    def restore(self) -> None:
+        """Replace an invalid text by the last valid one; nothing is emitted."""
+        raise NotImplementedError
+
+    def _edited(self) -> None:
+        raise NotImplementedError
+
+    def _finish(self) -> None:
+        """Keep a valid text when the editing ends; of an invalid one, the value before it."""
+        raise NotImplementedError
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.problem:
+            self._finish()
+            self.restore()
+        else:
+            super().keyPressEvent(event)
+
+    def _mark(self, problem: str) -> None:
+        """Mark the field as invalid, with the reason as tooltip, or as valid again."""
+        self.setToolTip(wrapped(problem or self._tip))
+        set_style(self, "bad", bool(problem))
+        if problem != self.fault:
+            self.fault = problem
+            self.marked.emit()
+
+
+class CheckedText(CheckedField):
     """A field for a text that may be wrong: it is marked as invalid then, and emits nothing.
 
     Its value is then the one from before the editing, not a valid beginning of what was typed.
@@ -143,14 +199,11 @@ class CheckedText(TextField):
     """The new text, as it is written, after each valid edit."""
 
     def __init__(self, read: Callable[[str], str], tip: str = "") -> None:
-        super().__init__()
-        self._read, self._tip, self.value, self._before = read, tip, "", ""
-        self.setToolTip(wrapped(tip))
-        self.textEdited.connect(self._edited)
+        super().__init__("", tip)
+        self._read, self.value, self._before = read, "", ""
 
     @property
     def problem(self) -> str:
-        """Return why the text is invalid; empty if it is valid."""
         try:
             self._read(self.text())
         except SlidevizError as problem:
@@ -166,9 +219,10 @@ class CheckedText(TextField):
             self.restore()
 
     def restore(self) -> None:
-        """Replace the text by the last valid one; nothing is emitted."""
         self.setText(self.value)
         self.setCursorPosition(0)
+        if self.fault:
+            _clear_report(self)
         self._mark("")
 
     def _edited(self) -> None:
@@ -179,19 +233,14 @@ class CheckedText(TextField):
             self.changed.emit(value)
         self._mark(problem)
 
-    def _mark(self, problem: str) -> None:
-        self.setToolTip(wrapped(problem or self._tip))
-        set_style(self, "bad", bool(problem))
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        super().focusOutEvent(event)
-        if not self.problem:
-            self._before = self.value
-        elif self.isModified():
+    def _finish(self) -> None:
+        if self.problem:
             _report_restored(self, self.problem, self.value)
+        else:
+            self._before = self.value
 
 
-class NumberField(TextField):
+class NumberField(CheckedField):
     """A field for a number, typed as such or as an expression, which its value then replaces.
 
     It shows six digits, and all of them while it is edited. An invalid text is marked at once, and
@@ -203,8 +252,6 @@ class NumberField(TextField):
 
     changed = Signal(float)
     """The new number after each valid edit."""
-    marked = Signal()
-    """``fault`` has changed."""
 
     def __init__(
         self,
@@ -214,21 +261,16 @@ class NumberField(TextField):
         words: Mapping[float, str] | None = None,
     ) -> None:
         self._words = words or {}
-        super().__init__(self._words.get(value, short_text(value)))
+        super().__init__(self._words.get(value, short_text(value)), tip)
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
-        self._tip = tip
-        self.fault = ""  # why the field is marked as invalid; empty if it is not
         self.together = ""  # why it is invalid together with the fields beside it, set by these
-        self.setToolTip(wrapped(tip))
         self._whole = False
         self._twice_ms = float("-inf")
         self.setCursorPosition(0)
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
-        self.textEdited.connect(self._edited)
-        self.editingFinished.connect(self._finish)
 
     @property
     def value(self) -> float:
@@ -241,7 +283,6 @@ class NumberField(TextField):
 
     @property
     def problem(self) -> str:
-        """Return why the text is invalid; empty if it is valid."""
         if self._shows_value:
             return self._allowed(self._value)
         if not self.text().strip():
@@ -298,7 +339,6 @@ class NumberField(TextField):
             self.setCursorPosition(0)
 
     def restore(self) -> None:
-        """Replace an invalid text by the value; nothing is emitted."""
         if self.problem:
             self._write()
             self.mark()
@@ -307,13 +347,6 @@ class NumberField(TextField):
         """Take the text if it was invalid and is valid now, because of another field."""
         if not (self._shows_value or self.problem) and self._typed() != self._value:
             self._edited()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and self.problem:
-            self._finish()
-            self.restore()
-        else:
-            super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.problem:
@@ -362,7 +395,6 @@ class NumberField(TextField):
         self.mark()
 
     def _finish(self) -> None:
-        """Keep a valid number when the editing ends; of an invalid text, the number before it."""
         if not self.problem:
             self._before = self._value
             return
@@ -378,13 +410,8 @@ class NumberField(TextField):
                 self.changed.emit(self._value)
 
     def mark(self) -> None:
-        """Mark the field as invalid, with the reason as tooltip, or as valid again."""
-        problem = self.problem or self.together
-        self.setToolTip(wrapped(problem or self._tip))
-        set_style(self, "bad", bool(problem))
-        if problem != self.fault:
-            self.fault = problem
-            self.marked.emit()
+        """Mark the field as invalid, alone or together with others, or as valid again."""
+        self._mark(self.problem or self.together)
 
 
 class NumberBox(QSpinBox):

@@ -8,7 +8,7 @@ from qtpy.QtCore import QObject
 from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.widgets.fields import NumberBox, NumberField
+from slideviz.gui.widgets.fields import CheckedField, NumberBox
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.session import changes
 from slideviz.session.run_messages import Requirement
@@ -17,13 +17,13 @@ from slideviz.session.store import Store
 
 
 class FieldWatch(QObject):
-    """Watches the number fields of a panel and writes the invalid ones to ``Session.invalid``."""
+    """Watches the checked fields of a panel and writes the invalid ones to ``Session.invalid``."""
 
     def __init__(self, panel: QWidget, store: Store, place: PanelPlace) -> None:
         super().__init__(panel)
         self.panel, self.store, self.place = panel, store, place
-        self._fields: list[NumberField | NumberBox] = [
-            *panel.findChildren(NumberField),
+        self._fields: list[CheckedField | NumberBox] = [
+            *panel.findChildren(CheckedField),
             *panel.findChildren(NumberBox),
         ]
         for field in self._fields:
