@@ -22,14 +22,13 @@ from slideviz.plots.section_picture import (
     require_picture_name,
     section_picture,
 )
-from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange
 from slideviz.sections.span import find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.passages import find_period, show_passages
+from slideviz.session.passages import Period, find_period, matrices, show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, WALL_VALUES, ColorMap, Quantity, quantity_of

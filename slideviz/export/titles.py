@@ -12,7 +12,6 @@ from slideviz.errors import printable
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.surfaces import padded
-from slideviz.scene.color_legend import set_letters
 from slideviz.session.inspect import nodes_of
 from slideviz.session.runs_words import (
     differences_from,
@@ -185,6 +184,8 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     """
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
+
+    from slideviz.scene.color_legend import set_letters
 
     plotter.remove_actor(CELL_LABEL, reset_camera=False, render=False)
     words = mark_words(scene.session)

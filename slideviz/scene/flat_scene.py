@@ -14,7 +14,6 @@ from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
 from slideviz.scene.actors import draw_in_front
 from slideviz.scene.camera import Camera
-from slideviz.scene.passages import Period, matrices
 from slideviz.scene.sections import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Stage
 from slideviz.sections.cut import transformed
@@ -22,7 +21,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import Label
 from slideviz.session.colors import with_drawable_colors
-from slideviz.session.passages import keeps
+from slideviz.session.passages import Period, keeps, matrices
 from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 from slideviz.terms import quantity_of

@@ -8,61 +8,21 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.session.passages import find_period, passages
+from slideviz.session.passages import Period, matrices
 from slideviz.session.state import Session
 
 PALER = 0.45
 """Part of the cells' plain color that is mixed into the colors of a neighbouring passage."""
 
 DIRECTIONS = 200  # number of directions, evenly spread over the sphere, in `outermost`
-UNENDING = 2
-"""Neighbours drawn on each side if all are wanted of a translational period, which is endless."""
 
 CELLS, THRESHOLD = "", "\n"
 """Keys, among names of boundaries, of the cells and of those within the threshold."""
-
-
-class Period:
-    """Finds the period of a session's mesh, and caches it for the last periodic boundaries."""
-
-    def __init__(self) -> None:
-        self._found: tuple[object, Pair | None] | None = None
-
-    def of(self, session: Session) -> Pair | None:
-        """Return the pair of boundaries whose period repeats the mesh; None without a match."""
-        case, mesh = session.case, session.mesh
-        if mesh is None:
-            return None
-        names = case.markers_with("periodic")
-        key = (mesh, session.pairs, names, case.periodic_type, case.axis, case.origin)
-        if self._found is None or self._found[0] != key:
-            try:
-                period = find_period(mesh, case, session.pairs)
-            except SlidevizError:
-                period = None  # periodic boundaries that do not match: said beside the Run button
-            self._found = key, period
-        return self._found[1]
-
-
-def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
-    """Return the transformation (4, 4) of each neighbouring passage shown, by its number.
-
-    The number is the power of the period; 0, the mesh itself, is left out.
-    """
-    count = session.view.passages
-    if pair is None or count == 0:
-        return {}
-    is_wheel = pair.around is not None
-    if count < 0 and not is_wheel:
-        count = UNENDING
-    by_number = passages(pair, "wheel" if count < 0 else count)
-    return {number: matrix for number, matrix in by_number.items() if number != 0}
 
 
 def outermost(points: FloatArray) -> FloatArray:

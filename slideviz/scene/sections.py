@@ -14,13 +14,12 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
 from slideviz.scene.actors import VALUES
 from slideviz.scene.mesh import recolored
-from slideviz.scene.passages import Period, matrices
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.cut import transformed
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.session.passages import keeps
+from slideviz.session.passages import Period, keeps, matrices
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 

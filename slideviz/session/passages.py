@@ -9,16 +9,20 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, agree, find_pairs, pair_up
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.opening import guess_by_name
+from slideviz.session.state import Session
 
 _SAME = 1e-9
 """A section is taken onto itself where it moves by less than this, over its size or distance."""
+
+UNENDING = 2
+"""Neighbours drawn on each side if all are wanted of a translational period, which is endless."""
 
 _PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair | None]] = WeakKeyDictionary()
 """Periodic pairs found before, by mesh, and by the settings of the case that they depend on."""
@@ -111,3 +115,40 @@ def show_passages(
         else:
             cuts[number] = cutter.show(transformed(points, matrix), section, only)
     return cuts
+
+
+class Period:
+    """Finds the period of a session's mesh, and caches it for the last periodic boundaries."""
+
+    def __init__(self) -> None:
+        self._found: tuple[object, Pair | None] | None = None
+
+    def of(self, session: Session) -> Pair | None:
+        """Return the pair of boundaries whose period repeats the mesh; None without a match."""
+        case, mesh = session.case, session.mesh
+        if mesh is None:
+            return None
+        names = case.markers_with("periodic")
+        key = (mesh, session.pairs, names, case.periodic_type, case.axis, case.origin)
+        if self._found is None or self._found[0] != key:
+            try:
+                period = find_period(mesh, case, session.pairs)
+            except SlidevizError:
+                period = None  # periodic boundaries that do not match: said beside the Run button
+            self._found = key, period
+        return self._found[1]
+
+
+def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
+    """Return the transformation (4, 4) of each neighbouring passage shown, by its number.
+
+    The number is the power of the period; 0, the mesh itself, is left out.
+    """
+    count = session.view.passages
+    if pair is None or count == 0:
+        return {}
+    is_wheel = pair.around is not None
+    if count < 0 and not is_wheel:
+        count = UNENDING
+    by_number = passages(pair, "wheel" if count < 0 else count)
+    return {number: matrix for number, matrix in by_number.items() if number != 0}

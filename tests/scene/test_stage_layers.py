@@ -15,11 +15,12 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.ghosts import circles
 from slideviz.scene.legend import COLORS, SIZE
 from slideviz.scene.mesh import ThresholdLayer
-from slideviz.scene.passages import PALER, THRESHOLD, PassageLayer, Period, matrices, outermost
+from slideviz.scene.passages import PALER, THRESHOLD, PassageLayer, outermost
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.inspect import cell_centers
 from slideviz.session.opening import open_mesh
+from slideviz.session.passages import Period, matrices
 from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
 from tests.builders import far_field

@@ -27,9 +27,9 @@ from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.mesh.periodic import Pair
-from slideviz.scene.passages import Period
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
+from slideviz.session.passages import Period
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 from slideviz.terms import (

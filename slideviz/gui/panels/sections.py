@@ -46,9 +46,9 @@ from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services, main_window
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.scene.passages import Period
 from slideviz.sections.model import Section, Triple
 from slideviz.session import changes, section_cuts
+from slideviz.session.passages import Period
 from slideviz.session.section_cuts import can_cut, first_section
 from slideviz.session.state import IN_FILE, Session
 
