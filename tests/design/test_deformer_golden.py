@@ -26,7 +26,13 @@ from tests.test_laws import METHODS, box, box_case, sector, sector_case
 RECORD = Path(__file__).with_name("gradients.csv")
 ACCURACY = 1e-11
 """Allowed change of a number, as a part of the array's length; badly conditioned systems: more."""
-LOOSE = {"thin-plate": 1e-9, "multiquadric": 1e-9, "quadric": 1e-7, "elastic": 1e-10}
+LOOSE = {
+    "thin-plate": 1e-9,
+    "multiquadric": 1e-9,
+    "quadric": 1e-7,
+    "elastic": 1e-10,
+    "annulus-ds": 1e-10,  # processors round differently
+}
 EXACT, LEVELS = None, Reduction(tolerance=1e-4, multilevel=True, criterion="size", level_size=8)
 
 Made = tuple[Mesh, Case]
