@@ -43,6 +43,9 @@ SMALL = 0.45
 ask_unsaved = questions.ask_unsaved
 """That of the program: `open_window` puts one in its place that answers by itself."""
 
+UNEQUAL = ("onto", "repaired")
+"""States that differ from run to run: a temporary folder is seen, rounding decides the repair."""
+
 
 def main(folder: Path) -> None:
     """Put all that the window shows into a folder."""
@@ -51,6 +54,8 @@ def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as place, shots.display():
         write_sample("passage", Path(place) / "flat", 12)
         for state in shots.STATES:
+            if state.name in UNEQUAL:
+                continue
             with shots.open_window(Path(place)) as window:
                 state.bring(window, Path(place))
                 photograph(desk, window, state.name)
