@@ -1,4 +1,4 @@
-"""The layers at walls, facet by facet, from the words of METHOD alone."""
+"""The layers at walls, facet by facet, from their definitions alone."""
 
 from __future__ import annotations
 
