@@ -333,7 +333,7 @@ def with_boxes(
     Raises MeshError for new boxes of a mesh of several zones, and where two have boxes of one name.
     """
     if mesh.zone_parts:
-        return _with_boxes_of_zones(mesh, () if anew else boxes, renewed, bool(anew and boxes))
+        return _with_boxes_of_zones(mesh, boxes, renewed, anew)
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)
     by_name = {box.name: box for box in boxes}
@@ -354,12 +354,12 @@ def with_boxes(
 
 
 def _with_boxes_of_zones(
-    mesh: Mesh, boxes: Sequence[Box], renewed: Collection[str], new: bool
+    mesh: Mesh, boxes: Sequence[Box], renewed: Collection[str], anew: bool
 ) -> Mesh:
     """Return the mesh of several zones with changed boxes, each in the zone that has it."""
     alone = zones_of(mesh)
     names = [[box.name for box in boxes_of(zone)] for zone in alone]
-    if new or any(sum(box.name in some for some in names) != 1 for box in boxes):
+    if anew or any(sum(box.name in some for some in names) != 1 for box in boxes):
         require_one_zone(mesh, "a new FFD box, or one whose name two zones have,")
     zones = []
     for part, zone, some in zip(mesh.zone_parts, alone, names, strict=True):
