@@ -25,7 +25,7 @@ WALLS_KEY = "SPAN= ( HUB, SHROUD )"
 """How a case names both."""
 
 _FIELDS: WeakKeyDictionary[Mesh, dict[object, SpanField]] = WeakKeyDictionary()
-_SECTIONS: WeakKeyDictionary[SpanField, dict[object, BladeSections]] = WeakKeyDictionary()
+_SECTIONS: WeakKeyDictionary[Mesh, dict[object, BladeSections]] = WeakKeyDictionary()
 
 
 def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str]:
@@ -152,8 +152,8 @@ def _blade(
         )
     field = span_field(case, mesh)
     nodes = np.unique(np.concatenate([on[name] for name in names]))
-    cache = _SECTIONS.setdefault(field, {})
-    key = tuple(names), point
+    cache = _SECTIONS.setdefault(mesh, {})  # not by the field, which sections keep alive
+    key = field, tuple(names), point
     if key not in cache:
         boundary = boundary_of(mesh)
         some = boundary.facets[np.isin(boundary.marker, [boundary.names.index(n) for n in names])]

@@ -1,5 +1,8 @@
 """Motions over span in a case: spans kept, sequences, several boundaries, and what is refused."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -48,6 +51,17 @@ def test_motions_of_one_blade_add_up_in_any_order_and_equal_ones_twice(mesh):
     assert np.abs(both - vectors(mesh, TWIST) - vectors(mesh, LEAN)).max() > 1e-6
     double = sv.SpanMotion("blade", "twist", TWIST.spans, tuple(2.0 * v for v in TWIST.values))
     assert vectors(mesh, TWIST, TWIST) == pytest.approx(vectors(mesh, double), abs=1e-14)
+
+
+def test_what_is_computed_for_a_mesh_goes_with_it():
+    mesh = passage((4, 6, 8))
+    vectors(mesh, TWIST)
+    field = weakref.ref(span_field(case_of(TWIST), mesh))
+    gc.collect()
+    assert field() is not None
+    del mesh
+    gc.collect()
+    assert field() is None
 
 
 def test_motions_of_other_kinds_come_before_or_after(mesh):
