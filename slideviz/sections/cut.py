@@ -17,6 +17,8 @@ from slideviz.sections.polygons import CellsInRange, Polygons, offsets_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
+BESIDE = 10.0  # most times as high as a cell that the next one is, across a section
+
 
 @dataclass(frozen=True, eq=False)
 class _Block:
@@ -53,13 +55,17 @@ class Cutter:
 
         ``points`` (n, d): the nodes of the mesh. Convex cells give one polygon, folded ones perhaps
         more. Corners lie on the edges of the cells and, up to rounding, on the section, a curved
-        one too. A side of a cell that lies in the section belongs to the cell where the distance
-        from the section is negative; where no cell is cut so, to the other, since the section is at
-        the rim of the mesh. For ``whole_cells`` see `show`. Raises CaseError if the mesh is 2D, and
-        the section is neither a plane nor a cylinder about z.
+        one too; or at a node next to it (`Shape.near`). A side of a cell that lies in the section
+        belongs to the cell where the distance from the section is negative; where no cell is cut
+        so, to the other, since the section is at the rim of the mesh. For ``whole_cells`` see
+        `show`. Raises CaseError if the mesh is 2D, and the section is neither a plane nor a
+        cylinder about z.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)
+        if section.shape.near:
+            level[_nearly_on(level, low, high, section.shape.near)] = 0.0
+            owners, low, high = self._corners(level)
         if not len(owners):
             owners, low, high = self._corners(-level)
         keep = _distinct(low, high)
@@ -159,6 +165,7 @@ def crossed_cells(
 ) -> np.ndarray:
     """Return a mask (m,) of the cells with nodes on both sides of a section, or on it.
 
+    Cells near enough to touch it count, too, where it goes through nodes near it (`Shape.near`).
     ``matrices``: transformations of the mesh: cells count that are cut after any of them. ``near``:
     nodes at most so far from the section are on it.
     """
@@ -169,8 +176,9 @@ def crossed_cells(
         level = np.nan_to_num(section.distance(points), nan=np.inf)
         level[np.abs(level) <= near] = 0.0
         for ids, nodes in mesh.cells.by_type.values():
-            for side in (level < 0, level <= 0):
-                crossed[ids] |= _patterns(nodes, side) > 0
+            low, high = level[nodes].min(axis=1), level[nodes].max(axis=1)
+            more = BESIDE * section.shape.near * (high - low) if section.shape.near else 0.0
+            crossed[ids] |= (low <= more) & (high >= -more)
     return crossed
 
 
@@ -231,6 +239,13 @@ def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
     for rolled, ends in zip(before, (low, high), strict=True):
         rolled[:, :1] = ends[rows, last][:, None]
     return there & ((low != before[0]) | (high != before[1]))
+
+
+def _nearly_on(level: FloatArray, low: IntArray, high: IntArray, near: float) -> IntArray:
+    """Return the nodes next to which, within a part of it, an edge from low to high is crossed."""
+    a, b = low[low >= 0], high[low >= 0]
+    reach = near * np.abs(level[a] - level[b])
+    return np.concatenate([end[np.abs(level[end]) <= reach] for end in (a, b)])
 
 
 def _crossings(

@@ -96,6 +96,8 @@ class Shape(Protocol):
     """Its functions in 2D meshes; None where it cannot cut these."""
     directed: bool
     """Whether the sign of the direction matters, for signed distances at least."""
+    near: float = 0.0
+    """Part of an edge of a cell within which, next to a node, the section goes through the node."""
 
     # What it cuts ----------------------------------------------------------------------
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:

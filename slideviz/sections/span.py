@@ -108,6 +108,7 @@ class ConstantSpan(AboutAxis):
     terms = SECTION_SHAPES["span"]
     in_plane = None
     directed = True
+    near = 0.02  # layers of nodes, relaxed ones too, are not cut into slivers on either side
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed numbers (n,), positive towards the shroud, that grow as distances do."""

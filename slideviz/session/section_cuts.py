@@ -19,7 +19,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.surfaces import padded
-from slideviz.sections.cut import Cutter, transformed
+from slideviz.sections.cut import BESIDE, Cutter, transformed
 from slideviz.sections.model import ON_SECTION, SHAPES, Section, Triple
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
@@ -62,7 +62,8 @@ class Groups:
     def met_by(self, section: Section) -> IntArray:
         """Return the numbers (k,) of the groups that a section may cut."""
         # The distance from the section changes at most as much as one moves.
-        reach = self.radii * (1.0 + 1e-9) + ON_SECTION * self.scale
+        beside = 1e-9 + 2.0 * BESIDE * section.shape.near
+        reach = self.radii * (1.0 + beside) + ON_SECTION * self.scale
         return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
 
 

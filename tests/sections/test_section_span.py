@@ -23,6 +23,7 @@ from slideviz.session.passages import keeps
 from slideviz.session.saving import view_to_case
 from slideviz.session.section_cuts import can_cut, first_section, position_range
 from slideviz.session.state import StepFrame
+from slideviz.streaming.source import MemorySource, cut_cells
 from tests.builders import cube, pair, passage
 
 HALF = Section("span", span=0.5)
@@ -75,6 +76,24 @@ def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
     assert off.max() < 0.02  # the facets of the walls have edges, which the spline rounds
     assert all(np.isfinite(line).all() for line in frame_of(section, patch))
     assert section.shape.lever(section, 0.0) == pytest.approx(0.3, rel=0.3)
+
+
+def test_layers_of_nodes_that_are_nearly_on_it_are_not_cut_into_slivers():
+    mesh = passage()
+    section, rng = bound(mesh, 0.5), np.random.default_rng(3)
+    regular = Cutter.of(mesh).cut(mesh.points, section)
+    # As a relaxed mesh has it: nodes a hundredth of a cell above and below the layer.
+    shaken = mesh.points * (1.0 + rng.uniform(-1e-3, 1e-3, (len(mesh.points), 1)) * [1, 1, 0])
+    cut = Cutter.of(mesh).cut(shaken, section)
+    assert cut.cells.tolist() == regular.cells.tolist()
+    assert cut.sizes.tolist() == regular.sizes.tolist()
+    assert np.abs(section.shape.positions(section, cut.points) - 0.5).max() < 2e-3
+    # A mesh in its file gets the same cells: those below, which touch it only so, are read too.
+    block = next(MemorySource(mesh.with_points(shaken)).blocks())
+    part = cut_cells([block], section)
+    again = Cutter.of(part.mesh).cut(part.mesh.points, section)
+    assert part.ids[again.cells].tolist() == regular.cells.tolist()
+    assert len(part.ids) < len(mesh.cells)
 
 
 def test_periods_about_its_axis_keep_it():
