@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import Pair, match
+from slideviz.mesh.zones import join_zones
 
 SIDE_TYPE = {2: {2: 3}, 3: {3: 5, 4: 9}}
 """VTK identifier of a side by dimension of the mesh and number of nodes."""
@@ -195,6 +197,17 @@ def passage(shape=(4, 6, 8), angle_deg: float = 30.0, kind: str = "plain") -> Me
             ("blade", lambda p: True),
         ],
     )
+
+
+def stage(angles=(40.0, 30.0), lengths=(1.0, 0.75)) -> Mesh:
+    """Passages of two rows of blades as the zones of one mesh, the second behind the first."""
+    front, behind = (passage((4, 6, 8), angle) for angle in angles)
+    low, high = (0.0, lengths[0]), (lengths[0], lengths[0] + lengths[1])
+    zones = [
+        mesh.with_points(mesh.points * [1.0, 1.0, end - start] + [0.0, 0.0, start])
+        for mesh, (start, end) in ((front, low), (behind, high))
+    ]
+    return join_zones([replace(zone, zone=k, zones=2) for k, zone in enumerate(zones, 1)])
 
 
 def _renamed(shape, names) -> list[Rule]:

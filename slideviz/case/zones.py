@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from slideviz.case.boxes import boxes_for
@@ -19,7 +19,7 @@ from slideviz.case.model import (
 )
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh, ZonePart
-from slideviz.mesh.zones import names_in, spellings
+from slideviz.mesh.zones import names_in, spellings, zones_of
 
 
 def with_marker_names(case: Case, mesh: Mesh) -> Case:
@@ -57,6 +57,8 @@ def zone_cases(case: Case, mesh: Mesh) -> tuple[Case, ...]:
     displacement file is for several: it numbers the nodes of one.
     """
     case = with_marker_names(case, mesh)
+    if not mesh.zone_parts:
+        return (case,)
     moving = case.markers_with("moving")
     problems = [
         f"motion {place}: {problem}"
@@ -66,6 +68,11 @@ def zone_cases(case: Case, mesh: Mesh) -> tuple[Case, ...]:
     if problems:
         raise CaseError("\n".join(problems))
     return tuple(_zone_case(case, mesh, part) for part in mesh.zone_parts)
+
+
+def each_zone(case: Case, mesh: Mesh) -> Iterator[tuple[Case, Mesh]]:
+    """Return the case of each zone with the zone; errors as `zone_cases`."""
+    return zip(zone_cases(case, mesh), zones_of(mesh), strict=True)
 
 
 def _shared(motion: Motion, mesh: Mesh, moved: list[str]) -> str:

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_shared, read_case, read_mesh, require_mesh_file
+from slideviz.cli.options import add_changes, add_shared, read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.section_options import pair_of_names
 from slideviz.cli.terminal import holding
@@ -55,20 +55,15 @@ def gap(arguments: argparse.Namespace) -> int:
 
 def _gap(arguments: argparse.Namespace) -> int:
     from slideviz import deform, gaps, quality
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.cli.terminal import DONE, INVERTED
     from slideviz.errors import CaseError
     from slideviz.plots.section_picture import require_picture_name
 
-    case = read_case(arguments)
-    mesh_file = require_mesh_file(arguments, case)
     if arguments.output is not None:
         require_picture_name(arguments.output)
-    require_output_paths(
-        arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
-    )
-    case, mesh = read_mesh(case, mesh_file)
+    case, mesh = read_inputs(arguments)
+    mesh_file = case.mesh_file
     before = gaps(case, mesh, arguments.between)
     if not before:
         none = "there is no gap at hub or shroud"
@@ -92,6 +87,7 @@ def _gap(arguments: argparse.Namespace) -> int:
         "inverted": inverted,
         "gaps": [
             {
+                **({} if one.zone is None else {"zone": one.zone}),
                 "name": one.name,
                 "between": [one.first, one.second],
                 "along": one.along or None,
@@ -103,11 +99,13 @@ def _gap(arguments: argparse.Namespace) -> int:
         ],
     }
     if arguments.output is not None:
-        if not before[0].along:
-            raise CaseError(
-                f"{mesh_file}: without hub and shroud distances are no curves; set SPAN, or leave "
-                "out -o"
+        if not any(one.along for one in before):
+            why = (
+                "in 2D each distance is one number, not a curve; leave out -o"
+                if mesh.dim == 2
+                else "without hub and shroud distances are no curves; set SPAN, or leave out -o"
             )
+            raise CaseError(f"{mesh_file}: {why}")
         _draw(arguments.output, before, after)
     if not save_json(arguments.json, report) and not arguments.quiet:
         for one, other in zip_longest(before, after):
@@ -152,7 +150,8 @@ def _draw(path: Path, before: tuple[Gap, ...], after: tuple[Gap, ...]) -> None:
     from slideviz.plots.gap import draw_gaps
     from slideviz.plots.session_plots import UNDEFORMED
 
-    figure = empty_figure((3.4 * len(before), 3.0), 300.0, "constrained")
+    plots = len({one.name for one in before})
+    figure = empty_figure((3.4 * plots, 3.0), 300.0, "constrained")
     measured = [("undeformed", UNDEFORMED, before)] + ([("deformed", 0, after)] if after else [])
     draw_gaps(figure, measured)
     write_figure(figure, path)

@@ -135,6 +135,23 @@ def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
     return case.mesh_file
 
 
+def read_inputs(arguments: argparse.Namespace, *, is_mesh: bool = False) -> tuple[Case, Mesh]:
+    """Return the case and its mesh of a command with ``-o`` and ``--json``, which can be written.
+
+    ``is_mesh``: whether ``-o`` is a mesh. Errors as `require_output_paths`.
+    """
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
+
+    case = read_case(arguments)
+    mesh_file = require_mesh_file(arguments, case)
+    require_output_paths(
+        arguments,
+        OutputPath(arguments.output, "-o", is_mesh=is_mesh),
+        OutputPath(arguments.json, "--json"),
+    )
+    return read_mesh(case, mesh_file)
+
+
 def optional_case(arguments: argparse.Namespace) -> Case | None:
     """Return the case of the option ``--case``, or None."""
     from slideviz import Case

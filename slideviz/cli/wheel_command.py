@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
-from slideviz.cli.options import (
-    add_changes,
-    add_shared,
-    integer,
-    read_case,
-    read_mesh,
-    require_mesh_file,
-)
+from slideviz.cli.options import add_changes, add_shared, integer, read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
+
+if TYPE_CHECKING:
+    from slideviz.design.wheel import Count, WheelQuality
 
 MOST_NAMES = 20  # boundaries whose names are all printed
 
@@ -43,7 +39,7 @@ def add_wheel(calls: argparse._SubParsersAction) -> None:
         type=passages,
         default="all",
         metavar="N",
-        help="their number; all for a whole turn (default)",
+        help="their number; all for a whole turn (default); with commas one for each zone",
     )
     call.add_argument(
         "--numbered",
@@ -64,9 +60,11 @@ def add_wheel(calls: argparse._SubParsersAction) -> None:
     call.set_defaults(command=wheel)
 
 
-def passages(text: str) -> int | Literal["all"]:
-    """Return a number of passages, or "all"."""
-    return "all" if text.lower() == "all" else integer(text)
+def passages(text: str) -> Count | list[Count]:
+    """Return a number of passages, or "all"; with commas one for each zone."""
+    words = [word.strip() for word in text.split(",")]
+    counts: list[Count] = ["all" if word.lower() == "all" else integer(word) for word in words]
+    return counts if len(counts) > 1 else counts[0]
 
 
 def wheel(arguments: argparse.Namespace) -> int:
@@ -76,22 +74,12 @@ def wheel(arguments: argparse.Namespace) -> int:
 
 
 def _wheel(arguments: argparse.Namespace) -> int:
-    from dataclasses import fields
-
     from slideviz import wheel as wheel_of
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
     from slideviz.cli.run_outcome import report_limits
     from slideviz.cli.terminal import INVERTED
 
-    case = read_case(arguments)
-    mesh_file = require_mesh_file(arguments, case)
-    require_output_paths(
-        arguments,
-        OutputPath(arguments.output, "-o", is_mesh=True),
-        OutputPath(arguments.json, "--json"),
-    )
-    case, mesh = read_mesh(case, mesh_file)
+    case, mesh = read_inputs(arguments, is_mesh=True)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         made = wheel_of(
             arguments.output,
@@ -103,12 +91,16 @@ def _wheel(arguments: argparse.Namespace) -> int:
             progress=bar,
         )
     limits = limits_report(made.limits)
-    changed = {"path": str(made.path), "limits": limits, "warnings": list(made.warnings)}
-    report = {field.name: getattr(made, field.name) for field in fields(made)} | changed
+    several = {"zones": [_numbers(zone) for zone in made.zones]} if made.zones else {}
+    report = {"path": str(made.path)} | _numbers(made) | several
+    report |= {"limits": limits, "warnings": list(made.warnings)}
     if not save_json(arguments.json, report) and not arguments.quiet:
-        turn = "a whole turn" if made.is_closed else f"{made.passages * made.period:.6g}°"
-        passages = "1 passage" if made.passages == 1 else f"{made.passages} passages"
-        print(f"{made.path}: {passages} of {made.period:.6g}°, {turn}")
+        if made.zones:
+            print(f"{made.path}:")
+            for number, zone in enumerate(made.zones, 1):
+                print(f"  zone {number}: {_passages(zone)}, {zone.cells:,} cells")
+        else:
+            print(f"{made.path}: {_passages(made)}")
         print(f"  {made.cells:,} cells   {made.points:,} points")
         unproven = f", {made.unproven} unproven" if made.unproven else ""
         quality = f"lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted{unproven}"
@@ -121,3 +113,17 @@ def _wheel(arguments: argparse.Namespace) -> int:
     print_remarks(made.warnings, quiet=arguments.quiet)
     code = report_limits(limits)
     return INVERTED if made.inverted else code
+
+
+def _numbers(made: WheelQuality) -> dict[str, object]:
+    """Return what a report has of a wheel, or of that of a zone."""
+    left = ("path", "limits", "warnings", "zones")
+    return {name: value for name, value in vars(made).items() if name not in left}
+
+
+def _passages(made: WheelQuality) -> str:
+    """Return the passages of one zone in words."""
+    assert made.period is not None
+    turn = "a whole turn" if made.is_closed else f"{made.passages * made.period:.6g}°"
+    passages = "1 passage" if made.passages == 1 else f"{made.passages} passages"
+    return f"{passages} of {made.period:.6g}°, {turn}"

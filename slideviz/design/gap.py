@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
+from slideviz.case.zones import zone_cases
 from slideviz.errors import CaseError
 from slideviz.machine.gap import (
     bodies,
@@ -25,7 +26,7 @@ from slideviz.mesh.interfaces import ROUNDING
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.surfaces import find_surfaces
-from slideviz.mesh.zones import require_one_zone
+from slideviz.mesh.zones import names_from, names_in, spellings, zones_of
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
 from slideviz.sections.cut import transformed
@@ -59,15 +60,18 @@ class Gap:
     """(k,): spans, or parts of the chord from the leading edge on."""
     distances: FloatArray = field(default_factory=lambda: np.empty(0))
     """(k,): the smallest distance at each place; NaN where ``first`` is not there."""
+    zone: int | None = None
+    """The number of its zone, where the mesh has several."""
 
     @property
     def words(self) -> str:
-        """Return name and boundaries in words."""
+        """Return zone, name and boundaries in words."""
+        where = "" if self.zone is None else f"zone {self.zone}: "
         if self.name == f"{self.first} to {self.second}":
-            return self.name
+            return where + self.name
         if self.first == self.second:
-            return f"{self.name} of {self.first}"
-        return f"{self.name} between {self.second} and {self.first}"
+            return f"{where}{self.name} of {self.first}"
+        return f"{where}{self.name} between {self.second} and {self.first}"
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers for a report."""
@@ -96,7 +100,8 @@ def gaps(
     Blades are the moving boundaries besides hub and shroud. The throat is the smallest distance
     from a blade to the next one, which may be the same blade one period on; at each span between
     their lines of that span. The gaps are those between blades and a wall that they do not meet; at
-    each part of the chord from the line of the wall there. Distances are exact for the facets.
+    each part of the chord from the line of the wall there. Distances are exact for the facets. Of
+    several zones each has its own; those without blades have none.
 
     Parameters
     ----------
@@ -105,7 +110,7 @@ def gaps(
     mesh : Mesh
         The mesh, deformed or not.
     between : sequence of (str, str)
-        Other pairs of boundaries to measure.
+        Other pairs of boundaries to measure, both of one zone.
     places : sequence of float
         Spans and parts of the chord between 0 and 1.
     reference : Mesh, optional
@@ -114,7 +119,8 @@ def gaps(
     Raises
     ------
     CaseError, MeshError
-        No boundary moves besides hub and shroud, or a boundary is unknown.
+        No boundary moves besides hub and shroud, or a boundary is unknown, or is of another zone
+        than the one it is measured from.
 
     Examples
     --------
@@ -126,14 +132,38 @@ def gaps(
     >>> round(throat.distance, 3)
     0.008
     """
-    require_one_zone(mesh, "a gap")
-    return tuple(_Measure(case, mesh, reference or mesh, np.asarray(places, float)).all(between))
+    at, base = np.asarray(places, float), reference or mesh
+    zones = zip(zone_cases(case, mesh), zones_of(mesh), zones_of(base), strict=True)
+    names = [names_from(mesh, part) for part in mesh.zone_parts] or [{}]
+    each = zip(zones, names, _by_zone(mesh, between), strict=True)
+    out, blades = list[Gap](), False
+    for number, ((one, zone, start), name, pairs) in enumerate(each, 1):
+        if one.markers_with("moving") or pairs or not mesh.zone_parts:
+            measure = _Measure(one, zone, start, at, name)
+            blades = blades or bool(measure.blades)
+            found = measure.all(pairs)
+            out += [replace(gap, zone=number) for gap in found] if mesh.zone_parts else found
+    if not blades and not between:
+        raise CaseError(
+            f"{mesh.name}: no boundary moves besides hub and shroud, so there is no blade; list "
+            "the blades in MARKER_MOVING"
+        )
+    return tuple(out)
 
 
 class _Measure:
     """The surfaces of a mesh with their period and span, and the distances between them."""
 
-    def __init__(self, case: Case, mesh: Mesh, reference: Mesh, places: FloatArray) -> None:
+    def __init__(
+        self,
+        case: Case,
+        mesh: Mesh,
+        reference: Mesh,
+        places: FloatArray,
+        labels: Mapping[str, str],
+    ) -> None:
+        """``labels``: the names of boundaries in results, where the mesh has others."""
+        self._labels = labels
         base, mesh = (without_halo(each)[0] for each in (reference, mesh))
         self.mesh, self.places = mesh, places
         self._surfaces = {one.name: one for one in find_surfaces(mesh)}
@@ -153,15 +183,10 @@ class _Measure:
         self.blades = tuple(n for n in case.markers_with("moving") if n not in ends)
 
     def all(self, between: Sequence[tuple[str, str]]) -> Iterator[Gap]:
-        if not self.blades:
-            raise CaseError(
-                f"{self.mesh.name}: no boundary moves besides hub and shroud, so there is no "
-                "blade; list the blades in MARKER_MOVING"
-            )
-        throat = self.throat()
+        throat = self.throat() if self.blades else None
         if throat is not None:
             yield throat
-        if self.walls is not None:
+        if self.walls is not None and self.blades:
             for name, wall, end in (
                 ("tip gap", self.walls.shroud, 1),
                 ("hub gap", self.walls.hub, 0),
@@ -201,7 +226,7 @@ class _Measure:
                 continue
             one = self._gap("throat", body.placed(corners, self.turn), others, self.spans, "span")
             several = one if several is None else _nearer(several, one)
-        words = ", ".join(self.blades)
+        words = self._words(self.blades)
         return None if several is None else replace(several, first=words, second=words)
 
     def wall_gap(self, name: str, wall: str, end: int) -> Gap:
@@ -222,12 +247,16 @@ class _Measure:
             return (m_prime(at) - low) / (high - low)
 
         gap = self._gap(name, wall_corners, self.images(blades), chord, "chord")
-        return replace(gap, first=wall, second=", ".join(self.blades))
+        return replace(gap, first=self._words([wall]), second=self._words(self.blades))
 
     def distance(self, first: str, second: str) -> Gap:
         one, two = self.corners((first,)), self.images(self.corners((second,)))
+        first, second = self._words([first]), self._words([second])
         gap = self._gap(f"{first} to {second}", one, two, self.spans, "span")
         return replace(gap, first=first, second=second)
+
+    def _words(self, names: Sequence[str]) -> str:
+        return ", ".join(self._labels.get(name, name) for name in names)
 
     def _gap(self, name: str, first: FloatArray, second: FloatArray, level: Any, along: str) -> Gap:
         found = smallest(first, second)
@@ -250,6 +279,26 @@ class _Measure:
             places=self.places,
             distances=np.where(np.isfinite(distances), distances, np.nan),
         )
+
+
+def _by_zone(mesh: Mesh, between: Sequence[tuple[str, str]]) -> list[list[tuple[str, str]]]:
+    """Return pairs of boundaries for each zone, with the names of its file."""
+    if not mesh.zone_parts:
+        return [list(between)]
+    written, out = spellings(mesh), [list[tuple[str, str]]() for _ in mesh.zone_parts]
+    for pair in between:
+        one, other = (mesh.marker(written.get(name, name)).name for name in pair)
+        for some, part in zip(out, mesh.zone_parts, strict=True):
+            names = names_in(mesh, part)
+            if one in names and other in names:
+                some.append((names[one], names[other]))
+                break
+        else:
+            raise CaseError(
+                f"{one} and {other} are of two zones, whose passages repeat differently, so there "
+                "is no one distance between them; name two boundaries of one zone"
+            )
+    return out
 
 
 def _at_corners(corners: FloatArray, level: Any) -> FloatArray:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -14,18 +14,22 @@ from numpy.typing import NDArray
 from slideviz.argument_types import check_types
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
+from slideviz.case.zones import zone_cases
 from slideviz.design.sweeps.table import Table, read_designs
-from slideviz.errors import CaseError, MeshError
+from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.formats.files import read
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
-from slideviz.mesh.quality import quality
-from slideviz.mesh.zones import require_one_zone
+from slideviz.mesh.quality import Quality, quality
+from slideviz.mesh.zones import unique_names, zones_of
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
+
+Count = int | Literal["all"]
+"""A number of passages: "all" for a whole turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +42,8 @@ class WheelQuality:
     """Their number."""
     is_closed: bool
     """Whether they make a whole turn."""
-    period: float
-    """The angle between them, in degrees."""
+    period: float | None
+    """The angle between them, in degrees; None where zones have different ones."""
     cells: int
     points: int
     """`cells`, `points`: their numbers in the wheel."""
@@ -56,6 +60,8 @@ class WheelQuality:
     """The limits of the case, met or not, for each passage that moves in another way."""
     warnings: tuple[str, ...] = ()
     """What the runs of the passages warn of."""
+    zones: tuple[WheelQuality, ...] = ()
+    """The wheel of each zone, with the names of its file, where the mesh has several."""
 
 
 @check_types
@@ -64,7 +70,7 @@ def wheel(
     case: Case,
     mesh: Mesh | None = None,
     *,
-    passages: int | Literal["all"] = "all",
+    passages: Count | Sequence[Count] = "all",
     numbered: bool = False,
     designs: Table | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -72,7 +78,8 @@ def wheel(
     """Deform a passage, and write the wheel that its copies make; return its quality.
 
     The periodic boundaries of the case, images by a rotation, are where passages meet: their nodes
-    are merged. A part of a wheel keeps the two outer ones.
+    are merged. A part of a wheel keeps the two outer ones. Of several zones each has a wheel with
+    its own period, and they are the zones of the file.
 
     Parameters
     ----------
@@ -82,8 +89,8 @@ def wheel(
         What is deformed and how; without motions the passages are the undeformed mesh.
     mesh : Mesh, optional
         The undeformed passage; read from the case's file when left out.
-    passages : int or "all"
-        Their number; "all" for a whole turn.
+    passages : int or "all", or a sequence of these
+        Their number; "all" for a whole turn. Of several zones one number for all, or one for each.
     numbered : bool
         Whether each passage has boundaries of its own (``blade_1``, ``blade_2``), rather than one
         for all.
@@ -122,11 +129,12 @@ def wheel(
         if case.mesh_file is None:
             raise CaseError("the case has no MESH_FILENAME; give the mesh")
         mesh = read(case.mesh_file, case.zone, file_format=case.mesh_format)
-    *_, count = _repeated(case, mesh, passages)
+    counts = [count for *_, count in _repeated(case, mesh, passages)]
     rows = read_designs(case, designs).rows if designs is not None else ()
-    if len(rows) > count:
-        raise CaseError(f"the table has {len(rows)} rows for {count} passages; one for each")
-    cases = [*(row.case for row in rows), *[case] * (len(rows) < count)]
+    if len(rows) > max(counts):
+        raise CaseError(f"the table has {len(rows)} rows for {max(counts)} passages; one for each")
+    _require_passages(case, mesh, [row.case for row in rows], counts)
+    cases = [*(row.case for row in rows), *[case] * (len(rows) < max(counts))]
     points, warnings = [], list[str]()
     for each in cases:
         points.append(mesh.points)
@@ -134,15 +142,52 @@ def wheel(
             *_, last = deform(each, mesh, progress)
             points[-1] = last.mesh.points
             warnings += last.warnings
-    made = write_wheel(Path(path), cases, mesh, points, count, numbered, progress)
+    made = write_wheel(Path(path), cases, mesh, points, counts, numbered, progress)
     return replace(made, warnings=tuple(dict.fromkeys(warnings)))
 
 
+def _require_passages(case: Case, mesh: Mesh, rows: Sequence[Case], counts: Sequence[int]) -> None:
+    """Raise CaseError if a row of a table moves a passage that a zone does not have."""
+    moved = [[zone.motions for zone in zone_cases(each, mesh)] for each in (case, *rows)]
+    for zone, count in enumerate(counts):
+        for number, motions in enumerate(moved[1 + count :], count + 1):
+            if motions[zone] != moved[0][zone]:
+                raise CaseError(
+                    f"row {number} of the table moves zone {zone + 1}, which has {count} passages "
+                    "only; let it move there as the case does"
+                )
+
+
+@contextmanager
+def _in_zone(mesh: Mesh, index: int) -> Iterator[None]:
+    """Let errors begin with the number of the zone, if the mesh has several."""
+    try:
+        yield
+    except SlidevizError as problem:
+        if mesh.zone_parts:
+            problem.args = (f"zone {index + 1}: {problem}",)
+        raise
+
+
 def _repeated(
-    case: Case, mesh: Mesh, passages: int | Literal["all"]
-) -> tuple[Mesh, tuple[Pair, ...], int]:
-    """Return the passage without halo, its periodic sides, and the number of its copies."""
-    require_one_zone(mesh, "a wheel")
+    case: Case, mesh: Mesh, passages: Count | Sequence[Count]
+) -> list[tuple[Mesh, tuple[Pair, ...], int]]:
+    """Return the passage of each zone without halo, its periodic sides, and how many it has."""
+    cases, zones = zone_cases(case, mesh), zones_of(mesh)
+    each = [passages] * len(zones) if isinstance(passages, int | str) else passages
+    if len(each) != len(zones):
+        raise CaseError(
+            f"{len(each)} numbers of passages for {len(zones)} zones; give one for all, or one for "
+            "each"
+        )
+    out = []
+    for index, (one, zone, count) in enumerate(zip(cases, zones, each, strict=True)):
+        with _in_zone(mesh, index):
+            out.append(_repeated_zone(one, zone, count))
+    return out
+
+
+def _repeated_zone(case: Case, mesh: Mesh, passages: Count) -> tuple[Mesh, tuple[Pair, ...], int]:
     names = case.markers_with("periodic")
     if not names:
         raise CaseError("the case has no periodic boundaries; passages are merged at these")
@@ -175,7 +220,7 @@ def write_wheel(
     cases: Sequence[Case],
     mesh: Mesh,
     points: Sequence[FloatArray],
-    passages: int | Literal["all"] = "all",
+    passages: Count | Sequence[Count] = "all",
     numbered: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> WheelQuality:
@@ -184,49 +229,88 @@ def write_wheel(
     ``cases`` and ``points`` (n, d) of passages, one after the other; those of the last one are
     repeated.
     """
-    base, pairs, count = _repeated(cases[-1], mesh, passages)
-    meshes, measured, limits = [], [], list[LimitResult]()
-    for case, moved in zip(cases, points, strict=True):
-        meshes.append(Mesh(moved, base.cells, base.markers, name=base.name))
-        measured.append(quality(meshes[-1], base, case.quality_metric))
-        limits += check_case_limits(case, measured[-1], meshes[-1], base)
-    end = len(cases) - 1  # of which all further passages are copies
-    whole = Wheel([meshes[min(k, end)] for k in range(count)], pairs, numbered)
-    gap, content = whole.require_meeting(), whole.content()
-    _write(path, content, progress or (lambda _: None))
-    qualities = [measured[min(k, end)] for k in range(count)]
+    moved = [mesh.with_points(each) for each in points]
+    measured = [quality(each, mesh, cases[0].quality_metric) for each in moved]
+    limits = [
+        result
+        for case, rated, each in zip(cases, measured, moved, strict=True)
+        for result in check_case_limits(case, rated, each, mesh)
+    ]
+    contents, zones, first = [], [], 0
+    for index, (base, pairs, count) in enumerate(_repeated(cases[-1], mesh, passages)):
+        copies = [base.with_points(zones_of(each)[index].points) for each in moved]
+        size = len(zones_of(mesh)[index].cells)
+        rated = [each.take(np.arange(first, first + size)) for each in measured]
+        end, first = len(cases) - 1, first + size  # of ``end`` all further passages are copies
+        wheel = Wheel([copies[min(k, end)] for k in range(count)], pairs, numbered)
+        with _in_zone(mesh, index):
+            contents.append(wheel.content())
+            zones.append(_rated(path, wheel, [rated[min(k, end)] for k in range(count)]))
+    _write(path, contents, progress or (lambda _: None))
+    return replace(_together(zones), limits=tuple(limits))
+
+
+def _rated(path: Path, wheel: Wheel, rated: Sequence[Quality]) -> WheelQuality:
+    """Return the numbers of the wheel of a zone with the quality of its passages."""
     return WheelQuality(
         path=path,
-        passages=count,
-        is_closed=whole.is_closed,
-        period=float(np.degrees(whole.period)),
-        cells=content.n_cells,
-        points=content.n_points,
-        boundaries=tuple(marker.name for marker in content.markers),
-        min=min(one.min for one in qualities),
-        mean=float(np.mean([one.mean for one in qualities])),
-        inverted=sum(one.inverted for one in qualities),
-        unproven=sum(one.unproven for one in qualities),
-        gap=gap,
-        limits=tuple(limits),
+        passages=len(rated),
+        is_closed=wheel.is_closed,
+        period=float(np.degrees(wheel.period)),
+        cells=wheel.n_cells,
+        points=wheel.n_points,
+        boundaries=tuple(marker.name for marker in wheel.markers()),
+        min=min(one.min for one in rated),
+        mean=float(np.mean([one.mean for one in rated])),
+        inverted=sum(one.inverted for one in rated),
+        unproven=sum(one.unproven for one in rated),
+        gap=wheel.require_meeting(),
     )
 
 
-def _write(path: Path, content: ZoneContent, progress: Callable[[Progress], None]) -> None:
-    """Write a wheel, and call ``progress`` after each block."""
-    done = 0.0
+def _together(zones: Sequence[WheelQuality]) -> WheelQuality:
+    """Return the wheels of all zones as one."""
+    if len(zones) == 1:
+        return zones[0]
+    periods = {zone.period for zone in zones}
+    names = unique_names([zone.boundaries for zone in zones])
+    return WheelQuality(
+        path=zones[0].path,
+        passages=sum(zone.passages for zone in zones),
+        is_closed=all(zone.is_closed for zone in zones),
+        period=periods.pop() if len(periods) == 1 else None,
+        cells=sum(zone.cells for zone in zones),
+        points=sum(zone.points for zone in zones),
+        boundaries=tuple(name for some in names for name in some),
+        min=min(zone.min for zone in zones),
+        mean=float(np.average([zone.mean for zone in zones], weights=[z.cells for z in zones])),
+        inverted=sum(zone.inverted for zone in zones),
+        unproven=sum(zone.unproven for zone in zones),
+        gap=max(zone.gap for zone in zones),
+        zones=tuple(zones),
+    )
 
-    def points(i: int, j: int) -> FloatArray:
-        nonlocal done  # cells come before points, and take as long
-        done = max(done, 0.5 + 0.5 * j / content.n_points)
-        return content.points(i, j)
 
-    def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
-        nonlocal done
-        done = max(done, 0.5 * j / content.n_cells)
-        return content.cells(i, j)
+def _write(
+    path: Path, contents: Sequence[ZoneContent], progress: Callable[[Progress], None]
+) -> None:
+    """Write the wheels of zones, and call ``progress`` after each block."""
+    total, done = sum(each.n_cells + each.n_points for each in contents), 0
+
+    def counted(content: ZoneContent) -> ZoneContent:
+        def points(i: int, j: int) -> FloatArray:
+            nonlocal done
+            done += j - i
+            return content.points(i, j)
+
+        def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+            nonlocal done
+            done += j - i
+            return content.cells(i, j)
+
+        return replace(content, points=points, cells=cells)
 
     def going_on() -> None:
-        progress(Progress(1, 1, "write", done))
+        progress(Progress(1, 1, "write", done / total))
 
-    write_content(path, replace(content, points=points, cells=cells), going_on=going_on)
+    write_content(path, [counted(each) for each in contents], going_on=going_on)

@@ -27,7 +27,7 @@ from slideviz.ffd.box import (
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.mesh.zones import names_in, require_one_zone, with_zones, zones_of
+from slideviz.mesh.zones import names_from, names_in, require_one_zone, with_zones, zones_of
 
 _LETTERS = "IJK"
 _FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
@@ -314,7 +314,7 @@ def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...
 
 def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:
     """Return a box of a zone with the names and nodes that its boundaries have in the mesh."""
-    name = {file: ours for ours, file in names_in(mesh, part).items()}
+    name = names_from(mesh, part)
     embedded = {
         name.get(marker, marker): (nodes + part.points.start, uvw)
         for marker, (nodes, uvw) in box.embedded.items()

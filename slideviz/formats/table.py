@@ -7,7 +7,7 @@ reader or writer: a row names its functions, which are imported at the first use
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -81,7 +81,7 @@ class MeshFormat:
     require: str = ""  # raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``
     zones: bool = False  # whether it keeps several zones apart
     content: str = ""
-    """Yields a file of a mesh whose parts are made by functions: ``blocks(content, name)``."""
+    """Yields a file of zones whose parts are made by functions: ``blocks(contents, name)``."""
     series: str = ""
     """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
     detects: str = ""  # returns whether a file is of this format, by its content: ``detects(path)``
@@ -251,11 +251,11 @@ def write_blocks(path: Path, blocks: Iterable[bytes], options: WriteOptions) -> 
 
 def write_content(
     path: Path,
-    content: ZoneContent,
+    contents: Sequence[ZoneContent],
     replaces: Path | None = None,
     going_on: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write a mesh whose parts are made by functions, as SU2's text or binary, whole or not at all.
+    """Write zones whose parts are made by functions, as SU2's text or binary, whole or not at all.
 
     Raises MeshError if it cannot be written, or a name of a boundary cannot be.
     """
@@ -265,5 +265,5 @@ def write_content(
             f"{path}: such a file is not written piece by piece; end its name in "
             f"{' or '.join(endings(lambda one: one.content))}, and convert it afterwards"
         )
-    blocks = row.function("content")(content, path.name)
+    blocks = row.function("content")(contents, path.name)
     write_blocks(path, blocks, WriteOptions({}, {}, replaces, going_on))

@@ -19,7 +19,7 @@ from slideviz.mesh.check import check_size
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.mesh.nearest import nearest
-from slideviz.mesh.zones import names_in
+from slideviz.mesh.zones import names_from, names_in
 from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
@@ -254,7 +254,7 @@ def pair_up(
 
 def _in_whole(mesh: Mesh, part: ZonePart, pair: Pair) -> Pair:
     """Return a pair of a zone with the names and nodes that its boundaries have in the mesh."""
-    name = {file: ours for ours, file in names_in(mesh, part).items()}
+    name = names_from(mesh, part)
     nodes = frozen_array(pair.nodes + part.points.start, np.int64)
     return replace(pair, first=name[pair.first], second=name[pair.second], nodes=nodes)
 

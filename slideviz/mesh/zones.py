@@ -44,11 +44,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
             f"{first.name}: its zones are {dims}, which cannot be one mesh; choose one with ZONE= "
             "in a case, or --zone"
         )
-    uses = Counter(name for zone in zones for name in zone.marker_names)
-    names = [
-        [numbered(k, name) if uses[name] > 1 else name for name in zone.marker_names]
-        for k, zone in enumerate(zones, 1)
-    ]
+    names = unique_names([zone.marker_names for zone in zones])
     points, cells, markers = (
         [slice(*ends) for ends in pairwise(accumulate(map(len, parts), initial=0))]
         for parts in (
@@ -81,6 +77,15 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     return replace(mesh, halo=_halo(mesh), interfaces=tuple(_interfaces(mesh)))
 
 
+def unique_names(zones: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return the names of the boundaries of zones, numbered as ``1:blade`` where two share one."""
+    uses = Counter(name for names in zones for name in names)
+    return [
+        [numbered(k, name) if uses[name] > 1 else name for name in names]
+        for k, names in enumerate(zones, 1)
+    ]
+
+
 def zones_of(mesh: Mesh) -> tuple[Mesh, ...]:
     """Return each zone of a mesh alone, its boundaries with their names in the file."""
     if not mesh.zone_parts:
@@ -107,6 +112,11 @@ def names_in(mesh: Mesh, part: ZonePart) -> dict[str, str]:
     """Return the names that the boundaries of a zone have in its file, by those in the mesh."""
     names = mesh.marker_names[part.markers]
     return dict(zip(names, part.mesh.marker_names, strict=True))
+
+
+def names_from(mesh: Mesh, part: ZonePart) -> dict[str, str]:
+    """Return the names that the boundaries of a zone have in the mesh, by those in its file."""
+    return {file: name for name, file in names_in(mesh, part).items()}
 
 
 def marker_zones(mesh: Mesh) -> list[int]:
@@ -159,7 +169,7 @@ def _halo(mesh: Mesh) -> Halo | None:
     sides = []
     for part, halo in halos:
         cells[part.cells] = halo.cells
-        name = {file: ours for ours, file in names_in(mesh, part).items()}
+        name = names_from(mesh, part)
         sides += [(name[one], name[other]) for one, other in halo.sides]
 
     def nodes(field: str) -> IntArray:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 Measured = tuple[str, int, Sequence[Gap]]
 """A mesh whose distances were measured: its label, its series number, and its gaps."""
+ZONE_DASHES = ("-", "--", ":", "-.")
 
 
 def draw_gaps(
@@ -21,25 +22,31 @@ def draw_gaps(
     """Draw the smallest distances by place, in a plot for each; without places as points.
 
     Span is the vertical axis, and the chord is the horizontal one. All meshes have the same gaps.
+    Zones share the plots of throat, tip gap and hub gap, and differ by the dashes of their curves.
     """
-    names = [gap.name for gap in measured[0][2]]
+    names = list(dict.fromkeys(gap.name for gap in measured[0][2]))
     for number, name in enumerate(names):
         axes: Any = figure.add_subplot(1, len(names), number + 1)
-        by_span = measured[0][2][number].along != "chord"
+        shown = [
+            (label, series, gap)
+            for label, series, gaps in measured
+            for gap in gaps
+            if gap.name == name
+        ]
+        by_span = not any(gap.along == "chord" for _, _, gap in shown)
         labels = f"{name} [{unit}]", "span [-]" if by_span else "part of the chord [-]"
         style_axes(axes, style, *(labels if by_span else labels[::-1]))
-        ends = []
-        for label, series, gaps in measured:
-            gap, look = gaps[number], style.series(series)
-            values = gap.distances, gap.places
-            looks = {"color": look.color, "linestyle": look.dash, "linewidth": style.width}
-            axes.plot(*(values if by_span else values[::-1]), label=label, gid=label, **looks)
+        for label, series, gap in shown:
+            look, values = style.series(series), (gap.distances, gap.places)
+            dash = look.dash if gap.zone is None else ZONE_DASHES[(gap.zone - 1) % 4]
+            words = label if gap.zone is None else f"{label}, zone {gap.zone}"
+            looks = {"color": look.color, "linestyle": dash, "linewidth": style.width}
+            axes.plot(*(values if by_span else values[::-1]), label=words, gid=words, **looks)
             place = gap.distance, gap.place if gap.along else 0.5
             axes.plot(
                 *[[at] for at in (place if by_span else place[::-1])], "o", ms=4, color=look.color
             )
-            ends.append(gap.distance)
-        if not any(gaps[number].distance for _, _, gaps in measured):
+        if not any(gap.distance for _, _, gap in shown):
             axes.set_title(TOUCHING, fontsize=style.size, color=style.scheme.text)
         axes.locator_params(axis="x", nbins=4)
         add_legend(axes, style, loc="best")

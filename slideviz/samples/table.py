@@ -201,7 +201,7 @@ def write_sample(
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
     if isinstance(made, StreamedSample):
-        write_content(mesh, made.zone, mesh if overwrite else None)
+        write_content(mesh, [made.zone], mesh if overwrite else None)
     else:
         write(mesh, made.mesh, overwrite)
     if made.displacement is not None:

@@ -19,7 +19,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile, Onto
 from slideviz.case.motion import displacements
-from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.case.zones import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
@@ -30,7 +30,6 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.mesh.walls import Walls, walls
-from slideviz.mesh.zones import zones_of
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -158,8 +157,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         if not all(path.is_file() for path in files):
             return "", ""
         found = folded = None
-        cases = zone_cases(case, mesh) if mesh.zone_parts else (case,)
-        for one, zone in zip(cases, zones_of(mesh), strict=True):
+        for one, zone in each_zone(case, mesh):
             if found is None and one.markers_with("moving"):
                 moved = displacements(one, zone)
                 asked = one, zone, moved.nodes, moved.vectors

@@ -9,11 +9,10 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements
-from slideviz.case.zones import zone_cases
+from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
-from slideviz.mesh.zones import zones_of
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDES
 
@@ -100,8 +99,7 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
     if not names or case.periodic == "none":
         return ""
     if mesh.zone_parts:
-        each = zip(zone_cases(case, mesh), zones_of(mesh), strict=True)
-        return next(filter(None, (beyond_pitch(*one) for one in each)), "")
+        return next(filter(None, (beyond_pitch(*one) for one in each_zone(case, mesh))), "")
     try:
         moved = displacements(case, mesh)
         pairs = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)

@@ -16,7 +16,7 @@ from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.interfaces import ROUNDING, torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
-from slideviz.mesh.zones import names_in, with_zones
+from slideviz.mesh.zones import names_from, names_in, with_zones
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.steps import MeshRepair, Progress, Step
@@ -229,7 +229,7 @@ def _kept_layers(mesh: Mesh, steps: Mapping[int, Step]) -> KeptLayers | None:
     for index, step in steps.items():
         if step.kept_layers is None:
             continue
-        name = {file: ours for ours, file in names_in(mesh, mesh.zone_parts[index]).items()}
+        name = names_from(mesh, mesh.zone_parts[index])
         nodes += step.kept_layers.nodes
         walls += [
             (tuple(name[one] for one in boundaries), thickness)

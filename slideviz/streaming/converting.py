@@ -58,7 +58,7 @@ def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:
             points=points,
             markers=tuple(read_markers(source.file, source.place)),
         )
-        yield from content_blocks(content, source.file.name)
+        yield from content_blocks([content], source.file.name)
 
 
 def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | None:

@@ -1,6 +1,7 @@
 """``sv.gaps`` and ``slideviz gap``: throat, tip gap and other distances, before and after."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.gap import PLACES
 from slideviz.errors import CaseError, MeshError
-from tests.builders import _renamed, grid, passage, ring, sector
+from slideviz.mesh.model import Origin
+from tests.builders import _renamed, grid, passage, ring, sector, stage
 
 ROLES = {"blade": "moving", "per1": "periodic", "per2": "periodic", "shroud": "sliding"}
 SHAPE = (8, 8, 8)
@@ -152,4 +154,48 @@ def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
     roles = {"BLOCK": "moving", "per1": "periodic", "per2": "periodic"}
     case.change(mesh_file=files / "flat.su2", motions=(), roles=roles).write("flat.cfg")
     assert run(["gap", "flat.cfg", "-o", "gap.png"]) == 1
-    assert "without hub and shroud distances are no curves" in capsys.readouterr().err
+    assert "in 2D each distance is one number, not a curve; leave out -o" in capsys.readouterr().err
+    case.change(mesh_file=files / "bare.su2", motions=()).write("bare.cfg")
+    bare = sv.read("mesh.su2")
+    names = [replace(one, name=one.name.replace("hub", "inner")) for one in bare.markers]
+    sv.write("bare.su2", replace(bare, markers=tuple(names), origin=Origin()))
+    assert run(["gap", "bare.cfg", "-o", "gap.png"]) == 1
+    assert "without hub and shroud distances are no curves; set SPAN" in capsys.readouterr().err
+
+
+def test_each_zone_has_the_gaps_that_it_has_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mesh = stage()
+    names = [f"{zone}:{name}" for zone in (1, 2) for name in ("per1", "per2")]
+    roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
+    case = case_of(roles=roles, mesh_file=tmp_path / "stage.su2")
+    between = [("2:inflow", "2:blade")]
+    front, behind, far = sv.gaps(case, mesh, between=between)
+    assert [one.words for one in (front, behind, far)] == [
+        "zone 1: throat of 1:blade",
+        "zone 2: throat of 2:blade",
+        "zone 2: 2:inflow to 2:blade",
+    ]
+    for one, part in zip((front, behind), mesh.zone_parts, strict=True):
+        [alone] = sv.gaps(case_of(), part.mesh)
+        assert one.distance == alone.distance
+        assert np.array_equal(one.distances, alone.distances)
+    # One row only moves: the other has no blade.
+    still = case.change(roles=roles | {"1:blade": "fixed"})
+    assert [one.zone for one in sv.gaps(still, mesh)] == [2]
+    assert [one.zone for one in sv.gaps(still, mesh, between=[("1:hub", "1:blade")])] == [1, 2]
+    with pytest.raises(CaseError, match="1:hub and 2:hub are of two zones, whose passages repeat"):
+        sv.gaps(case, mesh, between=[("1:hub", "2:hub")])
+    with pytest.raises(CaseError, match="no boundary moves besides hub and shroud"):
+        sv.gaps(case.change(roles={}), mesh)
+    sv.write("stage.su2", mesh)
+    moved = sv.Translate(("1:blade", "2:blade"), (0.0, 0.0, 0.02))
+    case.change(motions=(moved,), periodic="none").write("stage.cfg")
+    assert run(["gap", "stage.cfg", "-o", "gap.svg", "--json", "gap.json"]) == 0
+    report = json.loads((tmp_path / "gap.json").read_text())
+    assert [(one["zone"], one["name"]) for one in report["gaps"]] == [(1, "throat"), (2, "throat")]
+    drawn = (tmp_path / "gap.svg").read_text()
+    for words in ("undeformed, zone 1", "deformed, zone 2"):
+        assert f'id="{words}"' in drawn
+    assert run(["gap", "stage.cfg"]) == 0
+    assert "zone 2: throat of 2:blade" in capsys.readouterr().out

@@ -9,7 +9,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.zones import join_zones
-from tests.builders import passage, square
+from tests.builders import passage, square, stage
 
 MOVED = sv.Rotate("blade", 4.0, (0.75, 0.2, 0.5), (1.0, 0.3, 0.0))
 
@@ -58,7 +58,7 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
     path = tmp_path / "wheel.su2"
     with pytest.raises(CaseError, match="no periodic boundaries; passages are merged at these"):
         sv.wheel(path, sv.Case(), square(4))
-    with pytest.raises(MeshError, match="has 2 zones, but a wheel is of one; choose it with ZONE="):
+    with pytest.raises(CaseError, match="zone 1: the case has no periodic boundaries"):
         sv.wheel(path, sv.Case(), join_zones([square(4), square(6)]))
     with pytest.raises(MeshError, match="do not match: with the best rotational"):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "y_p": "periodic"}), square(4))
@@ -98,3 +98,75 @@ def test_it_has_the_warnings_of_its_runs(tmp_path):
     made = sv.wheel(tmp_path / "wheel.su2", case, mesh)
     assert last.warnings
     assert set(made.warnings) == set(last.warnings)
+
+
+def stage_case(**changes):
+    roles = {f"{zone}:{name}": "periodic" for zone in (1, 2) for name in ("per1", "per2")}
+    roles |= {"1:blade": "moving", "2:blade": "moving"}
+    motion = sv.Translate(("1:blade", "2:blade"), (0.0, 0.0, 0.0))
+    return case_of(**{"roles": roles, "motions": (motion,), "periodic": "none"} | changes)
+
+
+@pytest.mark.parametrize("ending", [".su2", ".su2b"])
+def test_each_zone_has_a_wheel_with_its_own_period_as_it_has_alone(tmp_path, ending):
+    mesh, case = stage(), stage_case(motions=(sv.Translate("1:blade", (0.01, 0.0, 0.0)),))
+    case = case.change(roles=case.roles | {"2:blade": "fixed"})
+    made = sv.wheel(tmp_path / f"stage{ending}", case, mesh)
+    assert [(zone.passages, zone.period) for zone in made.zones] == [
+        (9, pytest.approx(40.0)),
+        (12, pytest.approx(30.0)),
+    ]
+    assert (made.passages, made.period, made.is_closed) == (21, None, True)
+    whole = sv.read(made.path)
+    assert (whole.zones, len(whole.cells), len(whole.points)) == (2, made.cells, made.points)
+    assert whole.marker_names == made.boundaries
+    assert "2:blade" in made.boundaries
+    *_, last = sv.deform(case, mesh)
+    assert made.min == sv.quality(last.mesh, mesh).min
+    for number, roles in enumerate(({"blade": "moving"}, {}), 1):
+        sides = {"per1": "periodic", "per2": "periodic"}
+        moved = (sv.Translate("blade", (0.01, 0.0, 0.0)),) if roles else ()
+        one = case_of(roles=roles | sides, motions=moved, periodic="none")
+        alone = mesh.zone_parts[number - 1].mesh
+        path = sv.wheel(tmp_path / f"alone{ending}", one, alone).path
+        there, here = sv.read(path), sv.read(made.path, zone=number)
+        assert np.array_equal(there.points, here.points)
+        assert there.cells.same_as(here.cells)
+        assert there.marker_names == here.marker_names
+        path.unlink()
+
+
+def test_zones_have_numbers_of_passages_and_rows_of_a_table_of_their_own(tmp_path):
+    mesh, case, path = stage(), stage_case(), tmp_path / "stage.su2"
+    made = sv.wheel(path, case, mesh, passages=[2, "all"], numbered=True)
+    assert [zone.passages for zone in made.zones] == [2, 12]
+    assert {"1:per1", "2:per1"} & set(made.boundaries) == set()
+    assert {"per1", "1:blade_2", "blade_12"} <= set(made.boundaries)
+    with pytest.raises(CaseError, match="3 numbers of passages for 2 zones; give one for all"):
+        sv.wheel(path, case, mesh, passages=[1, 2, 3])
+    with pytest.raises(MeshError, match=r"zone 1: .*10 passages of 40° are more than a turn"):
+        sv.wheel(path, case, mesh, passages=10)
+    motions = tuple(sv.Translate(f"{zone}:blade", (0.0, 0.0, 0.0)) for zone in (1, 2))
+    case = case.change(motions=motions)
+    rows = [{"1:blade.translate.z": 0.0, "2:blade.translate.z": 0.01 * k} for k in range(3)]
+    made = sv.wheel(path, case, mesh, designs=rows, passages=[2, 3], numbered=True)
+    whole = sv.read(path)
+    shifts = [whole.points[whole.marker(name).nodes, 2].mean() for name in ("2:blade_1", "blade_3")]
+    assert shifts[1] - shifts[0] == pytest.approx(0.02)
+    rows[2]["1:blade.translate.z"] = 0.01
+    with pytest.raises(CaseError, match="row 3 of the table moves zone 1, which has 2 passages"):
+        sv.wheel(path, case, mesh, designs=rows, passages=[2, 3])
+
+
+def test_the_command_reports_each_zone(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    sv.write("stage.su2", stage())
+    stage_case(mesh_file=tmp_path / "stage.su2", motions=()).write("stage.cfg")
+    assert run(["wheel", "stage.cfg", "-o", "w.su2", "--passages", "2,all"]) == 0
+    said = capsys.readouterr().out
+    assert "zone 1: 2 passages of 40°, 80°" in said
+    assert "zone 2: 12 passages of 30°, a whole turn" in said
+    assert run(["wheel", "stage.cfg", "-o", "w.su2", "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert [zone["passages"] for zone in report["zones"]] == [9, 12]
+    assert report["period"] is None

@@ -106,7 +106,7 @@ def test_files_have_the_wheel(tmp_path, ending, name):
     mesh = MESHES[name]
     wheel = Wheel([mesh] * COUNT.get(name, 9), pairs_of(mesh))
     whole, path = in_memory(wheel), tmp_path / f"wheel{ending}"
-    write_content(path, wheel.content())
+    write_content(path, [wheel.content()])
     back = sv.read(path)
     assert np.array_equal(back.points, whole.points)
     assert back.cells.same_as(whole.cells)
@@ -137,4 +137,4 @@ def test_wrong_wheels_are_refused(tmp_path):
         Wheel([mesh, bent, mesh], pairs).require_meeting()
     assert Wheel([mesh] * 9, pairs).require_meeting() < 1e-15
     with pytest.raises(MeshError, match=r"end its name in \.su2 or \.su2b, and convert"):
-        write_content(tmp_path / "wheel.vtu", Wheel([mesh] * 9, pairs).content())
+        write_content(tmp_path / "wheel.vtu", [Wheel([mesh] * 9, pairs).content()])

@@ -15,7 +15,7 @@ from slideviz.case.check import raise_all
 from slideviz.case.displacement import Columns, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Prescribed
-from slideviz.case.zones import zone_cases
+from slideviz.case.zones import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config, problems_of_markers
 from slideviz.design.su2.shapes import Shapes
@@ -25,7 +25,6 @@ from slideviz.ffd.section import boxes_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.mesh.zones import zones_of
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step
 from slideviz.solver.zones import joined_step
@@ -335,8 +334,8 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
 def at_rest(case: Case, mesh: Mesh) -> Step:
     """Return the one step of a design that moves nothing: often the first of an optimiser."""
     if mesh.zone_parts:
-        cases = enumerate(zip(zone_cases(case, mesh), zones_of(mesh), strict=True))
-        steps = {k: at_rest(*each) for k, each in cases if each[0].markers_with("moving")}
+        zones = enumerate(each_zone(case, mesh))
+        steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
         step = joined_step(mesh, mesh, steps, steps)
         return replace(step, warnings=(*case.warnings, *step.warnings))
     setup = make_setup(case, mesh)

@@ -217,19 +217,24 @@ PointsOf = Callable[[int, int], FloatArray]
 """A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
 
 
-def content_blocks(content: ZoneContent, name: str) -> Iterator[bytes]:
-    """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
+def content_blocks(contents: Sequence[ZoneContent], name: str) -> Iterator[bytes]:
+    """Yield the SU2 file of zones whose parts are made by functions, called from several threads.
 
     Raises MeshError if a boundary has a name that cannot stand in an SU2 file.
     """
-    require_text_names(name, (marker.name for marker in content.markers))
+    require_text_names(name, (marker.name for content in contents for marker in content.markers))
 
-    def cells(i: int, j: int) -> Cells:
+    def cells(content: ZoneContent, i: int, j: int) -> Cells:
         types, nodes, _ = content.cells(i, j)
         return Cells.from_types(types, nodes)
 
-    yield from _zone(content.dim, (content.n_cells, cells), (content.n_points, content.points))
-    yield from _markers(content.markers, 0)
+    several = len(contents) > 1
+    yield f"NZONE= {len(contents)}\n".encode() if several else b""
+    for number, content in enumerate(contents, 1):
+        yield f"IZONE= {number}\n".encode() if several else b""
+        made = content.n_cells, partial(cells, content)
+        yield from _zone(content.dim, made, (content.n_points, content.points))
+        yield from _markers(content.markers, 0)
 
 
 def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:

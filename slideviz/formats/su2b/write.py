@@ -8,7 +8,7 @@ that it had.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -87,14 +87,15 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
             )
 
 
-def content_blocks(content: ZoneContent, name: str) -> Iterator[bytes]:
-    """Yield the SU2 binary file of a mesh whose parts are made by functions, block by block.
+def content_blocks(contents: Sequence[ZoneContent], name: str) -> Iterator[bytes]:
+    """Yield the SU2 binary file of zones whose parts are made by functions, block by block.
 
     Raises MeshError if a boundary has a name that cannot stand in such a file.
     """
-    require_binary_names(name, (marker.name for marker in content.markers))
-    yield from file_head(1)
-    yield from zone_blocks(content, 1)
+    require_binary_names(name, (marker.name for content in contents for marker in content.markers))
+    yield from file_head(len(contents))
+    for number, content in enumerate(contents, 1):
+        yield from zone_blocks(content, number)
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
