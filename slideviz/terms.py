@@ -565,7 +565,9 @@ WALL_VALUES: dict[WallValue, MetricTerm] = {
     "first-height": MetricTerm(
         "first height", "Distance of the first node from the wall.", unit="[mesh units]"
     ),
-    "height-ratio": MetricTerm("height ratio", "First height after over before. 1 is best."),
+    "height-ratio": MetricTerm(
+        "height ratio", "First height after over before. 1 is best.", compares=True
+    ),
     "growth": MetricTerm(
         "growth", "Largest ratio of two successive edges that leave the wall.", best="low"
     ),
@@ -574,7 +576,11 @@ WALL_VALUES: dict[WallValue, MetricTerm] = {
         "wall angle", "Angle of the first edge to the wall. 90 is best.", unit="[°]"
     ),
     "angle-change": MetricTerm(
-        "angle change", "Change of the angle of the first edge.", unit="[°]", best="low"
+        "angle change",
+        "Change of the angle of the first edge.",
+        unit="[°]",
+        best="low",
+        compares=True,
     ),
 }
 """The numbers of `slideviz.mesh.walls`: values of the cells at walls with layers, or at all walls

@@ -340,6 +340,48 @@ def test_metrics_and_walls_are_in_files_for_paraview(channel, tmp_path, ending):
     assert "height_ratio" not in alone
 
 
+def test_a_run_says_that_file_and_motions_move_a_boundary_one_after_the_other(
+    channel, tmp_path, capsys
+):
+    mesh, _ = channel
+    nodes = mesh.marker("y_m").nodes
+    (tmp_path / "moved.txt").write_text("".join(f"{node} 0 1e-4\n" for node in nodes))
+    call = ["run", f"{tmp_path}/case.cfg", "-o", str(tmp_path / "out.su2")]
+    file = f"DEFORMATION_FILENAME={tmp_path / 'moved.txt'}"
+    assert run([*call, "--set", file, "--json", str(tmp_path / "report.json")]) == 0
+    note = (
+        "moved.txt moves y_m first (DEFORMATION_FILENAME), and then MOTION does so: y_m: translate "
+        "by (0, 0.0001); DEFORMATION_FILENAME= NONE leaves the file out"
+    )
+    assert f"slideviz: note: {note}\n" in capsys.readouterr().err
+    assert note in json.loads((tmp_path / "report.json").read_text())["warnings"]
+    both = sv.read(tmp_path / "out.su2").points[nodes] - mesh.points[nodes]
+    np.testing.assert_allclose(both[:, 1], 2e-4)
+    for one in (file, "MOTION=NONE"), ("DEFORMATION_FILENAME=NONE", "STEPS=1"):
+        assert run([*call, "--set", one[0], "--set", one[1]]) == 0
+        assert "moves y_m first" not in capsys.readouterr().err
+
+
+def test_numbers_of_walls_are_printed_as_metrics(channel, square, tmp_path, capsys):
+    names = ["--metrics", "growth,height_ratio"]
+    out = tmp_path / "out.su2"
+    assert run(["run", f"{tmp_path}/case.cfg", "-o", str(out), *names]) == 0
+    printed = capsys.readouterr().out
+    values = sv.walls(sv.read(out), channel[0]).summary()["y_m"]
+    growth, ratio = values["growth"], values["first_height"]["ratio"]
+    for label, one in (
+        ("growth at y_m", growth["after"]),
+        ("  undeformed", growth["before"]),
+        ("height_ratio at y_m", ratio),
+    ):
+        numbers = " +".join(f"{one[end]:.6g}" for end in ("min", "mean", "max"))
+        assert re.search(rf"^  {label} +{numbers}$", printed, re.MULTILINE)
+    assert run(["quality", str(square / "mesh.su2"), "--metrics", "growth"]) == 0
+    assert "metrics:\n  growth: no boundary layers at LEFT, RIGHT, " in capsys.readouterr().out
+    assert run(["quality", str(out), *names]) == 1
+    assert "height-ratio compares with the undeformed mesh; give a ref" in capsys.readouterr().err
+
+
 def test_a_run_reports_metrics_before_and_after(square, tmp_path, capsys):
     call = ["run", str(square / "square.cfg"), "--metrics", "skewness"]
     assert run([*call, "--json", str(tmp_path / "r.json")]) == 0
@@ -713,11 +755,11 @@ def test_quality_checks_limits(square, tmp_path, capsys):
     mesh = str(square / "mesh.su2")
     assert run(["quality", mesh, "--limits", "min > 0.9, skew > 0.9"]) == 0
     assert "skew > 0.9  1  met" in capsys.readouterr().out
-    assert run(["quality", mesh, "--limits", "min > 1", "--json", "-"]) == 4
+    assert run(["quality", mesh, "--limits", "largest_angle < 61", "--json", "-"]) == 4
     (entry,) = json.loads(capsys.readouterr().out)["limits"]
     assert entry["failing"] == 620
     assert len(entry["cells"]) == 100
-    assert run(["quality", mesh, "--stream", "--limits", "skew > 1"]) == 1
+    assert run(["quality", mesh, "--stream", "--limits", "skew > 0.5"]) == 1
     assert run(["quality", mesh, "--limits", "mni > 1"]) == 2
     assert "did you mean min?" in capsys.readouterr().err
     assert run(["quality", mesh, "--limits", " "]) == 2
@@ -754,7 +796,9 @@ def test_a_number_without_end_is_infinite_and_one_of_no_cell_has_no_value(tmp_pa
     assert run([*call, "--json", str(tmp_path / "report.json")]) == 3
     said = capsys.readouterr()
     assert re.search(r"expansion < 5 +infinite +not met, in \d cells", said.out)
-    assert re.search(r"growth < 3 +no value +not met\n", said.out)
+    none = "no boundary layers at x_m, x_p, y_m, ..."
+    assert re.search(rf"growth < 3 +{re.escape(none)} +not met\n", said.out)
+    assert f"limit growth < 3 is not met: {none}\n" in said.err
     assert "the limit expansion < 5 is not met, in " in said.err
     assert [
         each["actual"] for each in json.loads((tmp_path / "report.json").read_text())["limits"]

@@ -28,6 +28,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.motion_words import describe
 from slideviz.case.spans import span_problems
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Note, nearest
@@ -359,6 +360,23 @@ def idle_settings(case: Case) -> tuple[str, ...]:
         and key.get(case) != key.get(usual)
     ]
     return tuple(Note(text) for text in notes)
+
+
+def file_before_motions(case: Case) -> tuple[Note, ...]:
+    """Return a note for each sequence of motions that begins with a file for all boundaries."""
+    sequences: dict[tuple[Motion, ...], list[str]] = {}
+    for marker in case.markers_with("moving"):
+        sequence = tuple(motion for motion in case.motions if applies_to(motion, marker))
+        sequences.setdefault(sequence, []).append(marker)
+    return tuple(
+        Note(
+            f"{first.path.name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), and "
+            f"then MOTION does so: {'; '.join(map(describe, others))}; DEFORMATION_FILENAME= NONE "
+            "leaves the file out"
+        )
+        for (first, *others), markers in sequences.items()
+        if type(first) is FromFile and not first.marker and others
+    )
 
 
 def _with_switch(key: Key, case: Case) -> str:

@@ -81,7 +81,8 @@ class LimitNumber:
     streamed: bool = False  # whether it is known of a mesh in a file
     compares: bool = False
     """Whether it compares with the undeformed mesh, and has no value without it."""
-    range: tuple[float, float] = (-inf, inf)  # the values that are possible
+    range: tuple[float, float] = (-inf, inf)  # its values, but those of folded cells
+    counts: bool = False  # whether it is a whole number
 
 
 def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
@@ -122,11 +123,15 @@ def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
     return values
 
 
-def _wall(
-    name: str, meaning: str, signs: str, range_: tuple[float, float] = (-inf, inf)
-) -> LimitNumber:
-    row = LimitNumber(meaning, signs, _of_walls(name), on_boundary=True, range=range_)
-    return replace(row, compares=name in CHANGES)
+def _wall(name: str, meaning: str, signs: str, low: float = 0.0, high: float = inf) -> LimitNumber:
+    row = LimitNumber(meaning, signs, _of_walls(name), on_boundary=True, range=(low, high))
+    return replace(row, compares=name in CHANGES, counts=name == "equal_layers")
+
+
+def _count(meaning: str, total: Callable[[Quality], float], status: int) -> LimitNumber:
+    return LimitNumber(
+        meaning, "<=", None, total, status, streamed=True, range=(0.0, inf), counts=True
+    )
 
 
 NUMBERS: Mapping[str, LimitNumber] = {
@@ -141,21 +146,9 @@ NUMBERS: Mapping[str, LimitNumber] = {
     "mean": LimitNumber(
         "mean quality", ">", total=lambda q: q.mean, streamed=True, range=(0.0, 1.0)
     ),
-    "inverted": LimitNumber(
-        "inverted cells",
-        "<=",
-        total=lambda q: q.inverted,
-        status=INVERTED,
-        streamed=True,
-        range=(0.0, inf),
-    ),
-    "unproven": LimitNumber(
-        "cells neither proved valid nor found inverted",
-        "<=",
-        total=lambda q: q.unproven,
-        status=UNPROVEN,
-        streamed=True,
-        range=(0.0, inf),
+    "inverted": _count("inverted cells", lambda q: q.inverted, INVERTED),
+    "unproven": _count(
+        "cells neither proved valid nor found inverted", lambda q: q.unproven, UNPROVEN
     ),
     "margin": LimitNumber(
         "least coefficient of a cell's Jacobian over that before; 0 folds",
@@ -165,14 +158,14 @@ NUMBERS: Mapping[str, LimitNumber] = {
     ),
     "first_height": _wall("first_height", "distance of the first node from its wall", "<>"),
     "height_ratio": _wall("height_ratio", "first height over that before", "<>"),
-    "growth": _wall("growth", "ratio of successive layers, the first five", "<", (1.0, inf)),
+    "growth": _wall("growth", "ratio of successive layers, the first five", "<", 1.0),
     "equal_layers": _wall(
-        "equal_layers", "first layers of equal height, up to five", ">", (0.0, LAYERS)
+        "equal_layers", "first layers of equal height, up to five", ">", high=LAYERS
     ),
     "wall_angle": _wall(
-        "wall_angle", "between first edge and wall in degrees, 90 best", ">", (-90.0, 90.0)
+        "wall_angle", "between first edge and wall in degrees, 90 best", ">", -90.0, 90.0
     ),
-    "angle_change": _wall("angle_change", "change of that angle in degrees", "<", (0.0, 180.0)),
+    "angle_change": _wall("angle_change", "change of that angle in degrees", "<", high=180.0),
     **{
         field_of(name): LimitNumber(
             f"{term.label} {term.unit}".strip(),
@@ -217,9 +210,15 @@ class Limit(CheckedFields):
         if not np.isfinite(self.value):
             raise CaseError(f"{self}: expected a finite number as the limit")
         low, high = row.range
-        if not low <= self.value <= high:
-            ends = f"a number from {low:g} to {high:g}" if high < inf else f"at least {low:g}"
-            raise CaseError(f"{self}: expected {ends}, for {self.name} ({row.meaning}) is that")
+        ends = (low,) * (self.sign == "<") + (high,) * (self.sign == ">")  # which nothing passes
+        fits = low <= self.value <= high and self.value not in ends
+        if not fits or (row.counts and not float(self.value).is_integer()):
+            upper = f" and below {high:g}" if self.sign == ">" else f" to {high:g}"
+            raise CaseError(
+                f"{self}: expected a {'whole ' * row.counts}number "
+                f"{'above' if self.sign == '<' else 'from'} {low:g}{upper if high < inf else ''}, "
+                f"for {self.name} ({row.meaning}) is that"
+            )
 
     def __str__(self) -> str:
         place = f"@{name_text(self.marker)}" if self.marker else ""
@@ -240,12 +239,32 @@ class LimitResult:
     where no cell has a value."""
     cells: IntArray  # (k,): the cells that fail, the worst first; none for a mean
     boundaries: tuple[str, ...] = ()
-    """Of a number of walls, the boundaries where it fails, the worst first."""
+    """Of a number of walls, the boundaries where it fails, the worst first; where no cell has a
+    value, all that were to have one."""
 
     @property
     def passed(self) -> bool:
         """Return whether the limit is met; it is not where no cell has a value."""
         return bool(self.limit.holds(self.actual))
+
+    @property
+    def value_words(self) -> str:
+        """Return the number as text; "infinite", or why there is none."""
+        return value_words(self.actual, len(self.cells), self.boundaries)
+
+
+def value_words(actual: float | None, failing: int, boundaries: Sequence[str]) -> str:
+    """Return the number of a limit as text: ``failing`` cells and ``boundaries`` where it fails."""
+    if actual is not None and np.isfinite(actual):
+        return f"{actual:.6g}"
+    if failing:
+        return "infinite"
+    return f"no boundary layers at {names_text(boundaries)}" if boundaries else "no value"
+
+
+def names_text(names: Sequence[str]) -> str:
+    """Return the first three of some names."""
+    return ", ".join(names[:3]) + ", ..." * (len(names) > 3)
 
 
 def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
@@ -290,11 +309,7 @@ MET = "met"  # what `outcome` returns where all limits are met
 
 def outcome(results: Sequence[LimitResult]) -> str:
     """Return a cell of a table: `MET`, or as ``min > 0.3: 0.21; inverted = 0: 5``; "" if none."""
-    missed = [
-        f"{one.limit}: {'no value' if np.isnan(one.actual) else f'{one.actual:.6g}'}"
-        for one in results
-        if not one.passed
-    ]
+    missed = [f"{one.limit}: {one.value_words}" for one in results if not one.passed]
     return "; ".join(missed) or MET * bool(results)
 
 
@@ -330,7 +345,10 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
     found = np.concatenate(failing)[order]
     at = [] if boundary is None else np.concatenate(places)[order].tolist()
     first_of = np.sort(np.unique(found, return_index=True)[1])  # a cell may have several walls
-    return LimitResult(limit, actual, found[first_of], tuple(names[k] for k in dict.fromkeys(at)))
+    fails_at = tuple(names[k] for k in dict.fromkeys(at))
+    if row.on_boundary and np.isnan(actual):
+        fails_at = (limit.marker,) if limit.marker else tuple(measured.boundaries or names)
+    return LimitResult(limit, actual, found[first_of], fails_at)
 
 
 def require_streamed(limits: Iterable[Limit]) -> None:

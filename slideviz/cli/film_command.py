@@ -116,9 +116,8 @@ def film(arguments: argparse.Namespace) -> int:
             bar.count(drawn.done, drawn.total, "image")
     if not arguments.quiet:
         _print_film(arguments, film_options, runs)
-    for run in runs:
-        _print_inverted(arguments, run)
-    return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
+    folded = [_print_inverted(arguments, run) for run in runs]
+    return INVERTED if any(folded) else DONE
 
 
 def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
@@ -168,20 +167,31 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks
+    from slideviz.design.sweeps.columns import TIME, number_of
     from slideviz.design.sweeps.table import read_designs
     from slideviz.session.state import StepFrame
 
-    frames = []
-    cases = [case]
+    frames, warnings = [], list[str]()
+    cases = [("", case)]
     if arguments.designs is not None:
-        cases = [design.case for design in read_designs(case, arguments.designs).rows]
+        designs = read_designs(case, arguments.designs).rows
+        cases = [
+            (
+                f"design {design.number} of {len(designs)}"
+                if design.values.get(TIME, "") == ""
+                else f"time {number_of(design.values[TIME]):g}",
+                design.case,
+            )
+            for design in designs
+        ]
     with Bar(not arguments.quiet) as bar:
-        for one in cases:
+        for label, one in cases:
             steps = list(deform(one, mesh, bar))
-            for step in steps if arguments.designs is None else steps[-1:]:
+            for step in steps[-1:] if label else steps:
                 measured = quality(step.mesh, reference=mesh, metric=one.quality_metric)
-                frames.append(StepFrame(step.mesh, measured, step))
-    print_remarks(step.warnings, quiet=arguments.quiet)
+                frames.append(StepFrame(step.mesh, measured, step, label=label))
+            warnings += step.warnings
+    print_remarks(dict.fromkeys(warnings), quiet=arguments.quiet)
     return tuple(frames)
 
 
@@ -189,9 +199,10 @@ def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: 
     from slideviz.case.words import counted
 
     for run in runs:
-        last = run.frames[-1].quality
+        last_frame = run.frames[-1]
+        last = last_frame.quality
         name = f"{run.name}: " if run.name else ""
-        steps = counted(len(run.frames), "step")
+        steps = counted(len(run.frames), "design" if last_frame.label else "step")
         print(f"{name}{steps}, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
     most = 1 + max(len(run.frames) for run in runs)
     images, pace = film_options.count(most), film_options.pace(most)
@@ -200,12 +211,19 @@ def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: 
         print("few steps; --between 20 puts 20 images between two of them")
 
 
-def _print_inverted(arguments: argparse.Namespace, run: Run) -> None:
-    last = run.frames[-1].quality
-    if last.inverted:
-        name = f"{run.name}: " if run.name else ""
+def _print_inverted(arguments: argparse.Namespace, run: Run) -> bool:
+    """Print how many cells are inverted in the last step, or in designs; return whether any are."""
+    last = [frame for frame in run.frames if frame.label] or run.frames[-1:]
+    folded = [frame for frame in last if frame.quality.inverted]
+    name = f"{run.name}: " if run.name else ""
+    command = f"slideviz run {arguments.case}"
+    if arguments.designs is not None:
+        command = f"slideviz sweep {arguments.case} {arguments.designs} --meshes"
+    for frame in folded:
         print(
-            f"slideviz: {name}{last.inverted} of {len(last)} cells are inverted in the last step; "
-            f"`slideviz run {arguments.case}` says which, and what may help",
+            f"slideviz: {name}{frame.quality.inverted} of {len(frame.quality)} cells are inverted "
+            f"{f'at {frame.label}' if frame.label else 'in the last step'}; `{command}` says "
+            "which, and what may help",
             file=sys.stderr,
         )
+    return bool(folded)

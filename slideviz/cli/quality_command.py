@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.formats.table import holds_quality, own_endings
-from slideviz.terms import METRICS, RATED, SKEW_METRICS, field_of
+from slideviz.terms import METRICS, RATED, SKEW_METRICS, WALL_VALUES, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -98,6 +98,9 @@ def quality(arguments: argparse.Namespace) -> int:
     with open_mesh(arguments, case) as opened:
         if opened.reference is None and arguments.metrics == tuple(RATED):
             arguments.metrics = tuple(k for k, term in RATED.items() if not term.compares)
+        for name in arguments.metrics:
+            if name in WALL_VALUES and RATED[name].compares and opened.reference is None:
+                raise CaseError(f"{name} compares with the undeformed mesh; give a reference")
         rated: dict[Metric, MetricValues | None]
         rated = dict.fromkeys(name for name in METRICS if name in arguments.metrics)
         mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)
@@ -174,8 +177,8 @@ def _report(
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
         print("cells by quality:")
         print(histogram_lines(found))
-        if report["metrics"]:
-            print(f"metrics:\n{metric_lines(report['metrics'])}")
+        if arguments.metrics:
+            print(metric_lines(arguments.metrics, report["metrics"], walls=walls))
         if report["limits"]:
             print(f"limits:\n{limit_lines(report['limits'])}")
     code = report_limits(report["limits"])

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.limits import LimitResult, check_case_limits
+from slideviz.case.limits import LimitResult, check_case_limits, names_text, value_words
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.onto import Remaining
@@ -23,14 +23,14 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.mesh.walls import Walls, wall_words
+from slideviz.mesh.walls import Walls, statistics_of, wall_words
 from slideviz.mesh.zones import marker_zones
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
 from slideviz.solver.steps import MeshRepair, safe_fraction_of
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
-from slideviz.terms import Metric, field_of
+from slideviz.terms import WALL_VALUES, Metric, Quantity, field_of
 
 LISTED = 100  # most inverted cells listed in a report
 MOST_WALLS = 6  # most boundaries whose layers a summary has
@@ -159,18 +159,42 @@ def metrics_report(found: Mapping[Metric, MetricValues]) -> dict[str, Any]:
     return {field_of(name): values.summary() for name, values in found.items()}
 
 
-def metric_lines(after: Mapping[str, Any], before: Mapping[str, Any] | None = None) -> str:
-    """Return metrics of a mesh, and of the undeformed one, as a text table."""
+def metric_lines(
+    names: Sequence[Quantity],
+    after: Mapping[str, Any],
+    before: Mapping[str, Any] | None = None,
+    walls: Mapping[str, Any] | None = None,
+) -> str:
+    """Return metrics of a mesh, and of the undeformed one, as text: a heading and a table.
+
+    ``after``, ``before``: from `metrics_report`. ``walls``: the summary of `Walls`, for those of
+    ``names`` that are numbers of walls: they are of boundaries with layers.
+    """
     rows: list[tuple[str, ...]] = [("", "min", "mean", "max", "worst at", "beyond limit")]
     for name, entry in after.items():
         for label, one in ((name, entry), ("  undeformed", (before or {}).get(name))):
-            if one is None:
-                continue
-            numbers = ("inf" if one[k] is None else f"{one[k]:.6g}" for k in ("min", "mean", "max"))
-            beyond = "" if one["limit"] is None else f"{one['beyond']} ({one['limit']:g})"
-            unit = f" [{one['unit']}]" if one["unit"] and one is entry else ""
-            rows.append((f"{label}{unit}", *numbers, f"{one['of'][:-1]} {one['worst_at']}", beyond))
-    return table(rows)
+            if one is not None:
+                beyond = "" if one["limit"] is None else f"{one['beyond']} ({one['limit']:g})"
+                unit = f" [{one['unit']}]" if one["unit"] and one is entry else ""
+                worst = f"{one['of'][:-1]} {one['worst_at']}"
+                rows.append((f"{label}{unit}", *_ends(one), worst, beyond))
+    layered = {marker: row for marker, row in (walls or {}).items() if row["layered"]}
+    numbers = [field_of(name) for name in names if name in WALL_VALUES]
+    for number in numbers:
+        for marker, row in layered.items():
+            now, old = statistics_of(row, number)
+            rows += [(f"{number} at {marker}", *_ends(now))] if now else []
+            rows += [("  undeformed", *_ends(old))] if old else []
+    lines = [table(rows)] if len(rows) > 1 else []
+    if numbers and not layered:
+        lines.append(
+            f"  {', '.join(numbers)}: no boundary layers at {names_text([*(walls or ())])}"
+        )
+    return "\n".join(["metrics:", *lines])
+
+
+def _ends(one: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple("inf" if one[k] is None else f"{one[k]:.6g}" for k in ("min", "mean", "max"))
 
 
 def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
@@ -181,13 +205,12 @@ def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
 
 def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4`` or "", ``not met``."""
-    none = "infinite" if entry["failing"] else "no value"
-    value = none if entry["actual"] is None else f"{entry['actual']:.6g}"
+    names = entry["boundaries"]
+    value = value_words(entry["actual"], entry["failing"], names)
     before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
     if before and not entry["passed"] and not entry["undeformed_passed"]:
         before = f"the undeformed mesh misses it, too: {entry['undeformed']:.6g}"
-    names = entry["boundaries"]
-    place = f" at {', '.join(names[:3])}{', ...' * (len(names) > 3)}" if names else ""
+    place = f" at {names_text(names)}" if names and entry["failing"] else ""
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
     return value, before, "met" if entry["passed"] else f"not met{place}{cells}"
 

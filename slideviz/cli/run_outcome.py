@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.terms import Quantity
 
 CELLS = "quality of each cell"  # what the summary calls the file of qualities
 QUALITY_BYTES = 20  # most bytes of a line in the file of qualities: 16 or 17 digits
@@ -102,7 +103,7 @@ def report_outcome(
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
-        _print_run(report, found, before, files)
+        _print_run(report, found, before, files, getattr(arguments, "metrics", ()))
     return report_warnings(report, folded, advice, quiet=arguments.quiet)
 
 
@@ -163,7 +164,11 @@ def write_qualities(path: Path, found: Quality) -> None:
 
 
 def _print_run(
-    report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
+    report: dict,
+    found: Quality,
+    before: Quality,
+    files: dict[str, Path | None],
+    metrics: Sequence[Quantity],
 ) -> None:
     from slideviz.case.words import counted
     from slideviz.cli.report import (
@@ -224,7 +229,7 @@ def _print_run(
     if report["limits"]:
         print(f"limits:\n{limit_lines(report['limits'])}")
     if rated := report.get("metrics"):
-        print(f"metrics:\n{metric_lines(rated['after'], rated['before'])}")
+        print(metric_lines(metrics, rated["after"], rated["before"], report["walls"]))
     if report["tried"]:
         print(f"  steps tried: {', '.join(map(_trial_words, report['tried']))}")
     parts = {k: v for k, v in spent.items() if k != "total"}

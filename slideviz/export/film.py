@@ -304,11 +304,21 @@ def film_frame_at(
     ``position`` is the number of the step, 0 the undeformed mesh; ``frames`` are all of these.
     """
     step, steps = int(position), len(frames) - 1
-    place = place_words(position, steps)
+    place = frame_words(frames, position)
     if position == step:
         return FilmFrame(frames[step], place or f"step {step} of {steps}", place)
     frame = _blend(frames[step], frames[step + 1], position - step, frames[0], going_on)
     return FilmFrame(frame, place, place)
+
+
+def frame_words(frames: Sequence[StepFrame], position: float) -> str:
+    """Return what is shown at a position in words, as `place_words`, by the labels of frames."""
+    last, following = frames[int(position)], frames[min(int(position) + 1, len(frames) - 1)]
+    if not following.label:
+        return place_words(position, len(frames) - 1)
+    if position == int(position):
+        return last.label or "undeformed"
+    return f"{last.label or 'undeformed'} to {following.label}"
 
 
 def _blend(
@@ -362,12 +372,14 @@ def _titles_of_runs(
             return f"{run.name}{DETAIL if detail else ''}\n{text}"
         return text + (DETAIL if detail else "")
 
+    def longest_place(frames: Sequence[StepFrame]) -> str:
+        last = len(frames) - 1
+        places = (frame_words(frames, min(k + 0.25 * between, last)) for k in range(last + 1))
+        return max((*places, "step 1 of 1"), key=len)
+
     # The letters' size must not change from image to image: it follows from the longest line.
-    far = LONGEST if between else "step {0} of {0}"
     every = [
-        words(one, far.format(len(one.frames) - 1), frame.quality)
-        for one in runs
-        for frame in one.frames
+        words(one, longest_place(one.frames), frame.quality) for one in runs for frame in one.frames
     ]
     longest = max((line for text in every for line in text.splitlines()), key=len)
     letters = letters_across(panes(options, options.gap)[0] if pair else options)

@@ -410,7 +410,7 @@ def metric_data(
 ) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
     """Return metrics, and numbers of walls among ``names``, as data of cells and of points.
 
-    Those of `quality_data` are left out, as are numbers that need a reference where there is none.
+    Those of `quality_data` are left out.
     """
     rows = [(field_of(name), one) for name, one in found.items() if name not in SIZE_SKEW]
     cells = {field: one.of_cells for field, one in rows}
@@ -418,7 +418,7 @@ def metric_data(
     if layers is not None:
         fields = (field_of(name) for name in names if name in WALL_VALUES)
         at_walls = layers.with_layers()
-        cells |= {field: at_walls.at_cells(field) for field in fields if field in layers.values}
+        cells |= {field: at_walls.at_cells(field) for field in fields}
     return cells, points
 
 

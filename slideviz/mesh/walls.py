@@ -29,8 +29,9 @@ Sources: AIAA drag prediction workshops 4 to 7, gridding guidelines (growth, equ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -367,6 +368,19 @@ def wall_words(row: dict) -> str:
     before, after = (row["growth"][when]["max"] for when in ("before", "after"))
     growing = f", growth up to {after:.3g} ({before:.3g} before)" if before and after else ""
     return f"{heights}{growing}, first edges turned {turned}"
+
+
+def statistics_of(row: Mapping[str, Any], number: str) -> tuple[dict | None, dict | None]:
+    """Return smallest, mean and largest of one of `VALUES` or `CHANGES`, after and before.
+
+    ``row`` is an entry of `Walls.summary`. None for what it does not have.
+    """
+    for name, (value, comparison, change) in _REPORTED.items():
+        if number == value:
+            return row[name]["after"], row[name].get("before")
+        if number == change:
+            return row[name].get(comparison), None
+    raise KeyError(number)
 
 
 def _statistics(values: FloatArray) -> dict[str, float | None]:

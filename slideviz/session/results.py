@@ -51,6 +51,8 @@ class StepFrame:
     walls: Walls | None = None
     """The layers at boundaries, compared with those of the undeformed mesh; None where only the
     skin is in memory. Colors show those of its ``markers``."""
+    label: str = ""
+    """What it is called in a film, as a time; empty: by its number."""
 
     def has(self, cell: int | None) -> bool:
         """Return whether the frame has a cell of that number, its own or of ``extra``."""

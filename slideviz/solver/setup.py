@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.check import idle_settings, require_valid
+from slideviz.case.check import file_before_motions, idle_settings, require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, Note
@@ -258,7 +258,13 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         shift=frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None,
         reach=REACH * conditions.largest,
     )
-    warnings = *domain.warnings, *conditions.warnings, *loose, *idle_settings(case)
+    warnings = (
+        *domain.warnings,
+        *conditions.warnings,
+        *loose,
+        *idle_settings(case),
+        *file_before_motions(case),
+    )
     warnings += _not_relaxed(case, mesh)
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0

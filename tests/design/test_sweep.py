@@ -200,6 +200,15 @@ def test_markers_that_differ_in_capitals_alone():
     ("names", "said"),
     [
         (["airfoil.rotat.angle_deg"], r"no such key; did you mean airfoil.rotate.angle_deg\?$"),
+        (
+            ["airfoil.scale.x"],
+            r"the case has no motion \(airfoil, scale, ...\); add one to MOT",
+        ),
+        (
+            ["airfoil.ffd.y"],
+            r"no motion \(airfoil, ffd, ...\); .* the motions have airfoil.r",
+        ),
+        (["airfoi.rotate.angle_deg"], r"did you mean airfoil.rotate.angle_deg\?$"),
         (["zzz"], r"the motions have airfoil.rotate.angle_deg, .*airfoil.translate.y"),
         (["MESH_FILENAME"], "files and the view are those of the case"),
         (["STEPS", "steps"], "means the same as column STEPS"),

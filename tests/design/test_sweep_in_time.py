@@ -1,6 +1,7 @@
 """Sweeps whose designs have times: meshes with the numbers of iterations, in memory or streamed."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.sweeps.table import iterations, read_designs
 from slideviz.errors import CaseError
+from slideviz.export import film
 from tests.builders import square
 
 CASE = sv.Case(
@@ -110,12 +112,35 @@ def test_the_command_and_a_film_take_a_table_in_time(filed, tmp_path, capsys, mo
     assert "block.cfg: 2 designs of time, BLOCK.translate.y" in capsys.readouterr().out
     assert (tmp_path / "out" / "mesh_00002.su2").is_file()
     call = ["film", "block.cfg", "--designs", "motion.csv", "-o", "film_%02d.png"]
+    titles = []
+    drawn = film.film_frame_at
+
+    def noted(*arguments):
+        titles.append(drawn(*arguments))
+        return titles[-1]
+
+    monkeypatch.setattr(film, "film_frame_at", noted)
     assert run([*call, "--size", "320x200"]) == 0
+    assert [one.words for one in titles] == ["undeformed", "time 1", "time 2"]
+    assert "2 designs, min " in capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.glob("film_*")) == [
         "film_00.png",
         "film_01.png",
         "film_02.png",
     ]
+
+
+def test_a_film_says_which_designs_fold_cells(filed, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    filed.write("block.cfg")
+    (tmp_path / "motion.csv").write_text("BLOCK.translate.y\n0.35\n0.02\n")
+    monkeypatch.setattr(film, "film", lambda session, *_, **__: iter(()))
+    call = ["film", "block.cfg", "--designs", "motion.csv", "-o", "film.gif", "-q"]
+    monkeypatch.setattr("slideviz.cli.film_command.closing", nullcontext)
+    assert run(call) == 3
+    error = capsys.readouterr().err
+    assert "cells are inverted at design 1 of 2; `slideviz sweep block.cfg motion.csv --m" in error
+    assert "design 2" not in error
 
 
 def test_a_motion_that_is_rounding_moves_nothing(filed, tmp_path):

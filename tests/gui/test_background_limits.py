@@ -25,7 +25,7 @@ def test_limits_are_checked_on_what_is_shown_and_rings_are_at_cells_that_fail(wi
     assert results() == ()
     values = store.session.frame.quality.values
     bound = float(sorted(values)[5])
-    store.change(changes.set_case, limits=f"min >= {bound!r}, inverted = 0, growth < 1")
+    store.change(changes.set_case, limits=f"min >= {bound!r}, inverted = 0, growth < 1.01")
     low, folded, growth = results()
     assert (low.passed, folded.passed, growth.passed) == (False, True, False)
     assert low.actual == values.min()

@@ -22,7 +22,7 @@ def test_limits_are_known_for_the_frame_and_the_limits_they_were_checked_with():
     mesh = grid((4, 4))
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), None)
     assert session.limit_results == ()
-    limited = replace(session, case=session.case.change(limits="min > 1, inverted = 0"))
+    limited = replace(session, case=session.case.change(limits="largest_angle < 61, inverted = 0"))
     assert limited.limit_results is None
     assert limited.limit_chosen is None
     known = choose_limit(checked(limited), 0)
@@ -39,7 +39,7 @@ def test_limits_are_known_for_the_frame_and_the_limits_they_were_checked_with():
 
 def test_limits_do_not_make_a_result_outdated():
     case = Case(roles={"BLOCK": "moving"})
-    assert result_settings(case) == result_settings(case.change(limits="min > 1"))
+    assert result_settings(case) == result_settings(case.change(limits="min > 0.5"))
 
 
 def test_a_mesh_in_its_file_has_the_numbers_of_all_cells_and_the_cells_in_memory():

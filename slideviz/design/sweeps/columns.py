@@ -10,6 +10,7 @@ point, ``BLADE.twist.0.5``. The name of a key is that of ``--set``, ``STEPS``.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Real
@@ -30,7 +31,7 @@ from slideviz.case.model import (
     SpanMotion,
     named,
 )
-from slideviz.case.motion_text import VERB_OF
+from slideviz.case.motion_text import VERB_OF, VERBS
 from slideviz.case.words import number
 from slideviz.errors import CaseError, nearest, shown
 
@@ -202,11 +203,26 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
     there = (
         f"the motions have {_names_text(shortest)}" if shortest else "the motions have no numbers"
     )
+    if absent := _absent_motion(case, name):
+        raise CaseError(f"the case has no motion {absent}; add one to MOTION, for {there}")
     close = nearest(name, [*shortest, *KEYS])
     raise CaseError(
         "there is no such number of a motion, and no such key"
         f"{close or f'; {there}; `slideviz keys` lists the keys'}"
     )
+
+
+def _absent_motion(case: Case, name: str) -> str:
+    """Return the motion of a moving boundary that a column is about, if the case has none such."""
+    match = re.match(rf"\s*(.+?)\.({'|'.join(VERBS)})(?:\.|\s*\Z)", name, re.IGNORECASE)
+    if match is None or match[1].lower() not in {
+        "*",
+        *(marker.lower() for marker in case.markers_with("moving")),
+    }:
+        return ""
+    begin = f"{match[1]}.{match[2]}.".lower()
+    has = any(f"{_head(motion)}.".lower().startswith(begin) for motion in case.motions)
+    return "" if has else f"({match[1]}, {match[2].lower()}, ...)"
 
 
 def _all_names(case: Case) -> dict[str, NumberPlace]:
