@@ -33,12 +33,7 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
 
     ``values`` are in the frame. Coinciding nodes and periodic images share one block of unknowns.
     Sliding nodes that are not among ``nodes`` do not move along their normals. Nodes of no cell
-    have displacement zero.
-
-    Raises
-    ------
-    DeformError
-        Coinciding nodes are asked to move differently.
+    have displacement zero. Raises DeformError if coinciding nodes are asked to move differently.
     """
     same = problem.same_as
     first, data = merge(problem, nodes, values)

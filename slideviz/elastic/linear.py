@@ -96,15 +96,12 @@ class Equilibrium:
     def displacement(self, data: Array) -> Array:
         """Return the displacement (..., n, d) in the frame, of all nodes.
 
+        Raises DeformError if the equations cannot be solved well enough.
+
         Parameters
         ----------
         data : (..., m, d)
             Displacement of the known nodes, in the frame.
-
-        Raises
-        ------
-        DeformError
-            The equations cannot be solved well enough.
         """
         known = self._known(data)
         right = -value(self._collected(self._force(known)))
@@ -267,13 +264,8 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
 
     Sliding nodes move in the tangent planes of their boundary. Where a boundary is curved, or a
     node slid past its end, sliding nodes are then projected on it, and a second solution has them
-    as known nodes.
-
-    Raises
-    ------
-    DeformError
-        A cell has no volume, the solver does not converge, or coinciding nodes are asked to
-        move differently.
+    as known nodes. Raises DeformError if a cell has no volume, the solver does not converge, or
+    coinciding nodes are asked to move differently.
     """
     nodes, values = problem.known, problem.values
     displacement, warnings = _equilibrium(problem, timer, body, nodes, values)
@@ -351,10 +343,7 @@ def _equilibrium(
 def _warnings(found: LinearSolution) -> tuple[str, ...]:
     """Return a warning if the solver did not reach its tolerance; empty if it did.
 
-    Raises
-    ------
-    DeformError
-        The residual ratio is above `HOPELESS`.
+    Raises DeformError if the residual ratio is above `HOPELESS`.
     """
     if found.converged:
         return ()

@@ -152,16 +152,13 @@ def assemble(
 ) -> tuple[bsr_array, FloatArray]:
     """Return the matrix (k d, k d) and the right-hand side (k d,) of the unknowns z.
 
+    Raises DeformError if an element has no volume.
+
     Parameters
     ----------
     points : (n, d)
         Current positions. Inverted elements count with the absolute value of their Jacobian, so
         that the matrix stays positive definite.
-
-    Raises
-    ------
-    DeformError
-        An element has no volume.
     """
     count, d = len(conditions.free), points.shape[1]
     indptr, indices = _pattern(parts, conditions.place, count)

@@ -7,7 +7,6 @@ cell ``c`` has the number ``first[c] + k``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, IntArray, sealed
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
+from slideviz.system.weak_cache import weak_cache
 
 NONE, SEVERAL = -1, -2
 """In place of a neighbour: there is no other cell, or more than one (a non-manifold mesh)."""
@@ -28,11 +28,6 @@ for _row in ELEMENTS.values():
     SIDES[_row.vtk] = len(_row.facets)
     for _k, _local in enumerate(_row.facets):
         SIDE_NODES[_row.vtk, _k, : len(_local)] = _local
-
-_SIDES: WeakKeyDictionary[Cells, Sides] = WeakKeyDictionary()
-"""Results of `sides_of`."""
-_AROUND: WeakKeyDictionary[Cells, CellsAround] = WeakKeyDictionary()
-"""Results of `cells_around`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,34 +52,29 @@ class CellsAround:
     """(k,) int8: the local number of the node in that cell."""
 
 
+@weak_cache
 def sides_of(cells: Cells) -> Sides:
     """Return the sides of cells with their neighbours, cached as long as the cells live."""
-    if cells not in _SIDES:
-        first = np.concatenate(([0], np.cumsum(SIDES[cells.types])))
-        n_nodes = int(cells.connectivity.max(initial=-1)) + 1
-        owner = np.repeat(np.arange(len(cells)), np.diff(first))
-        table = cells.types, cells.offsets, cells.connectivity, SIDE_NODES, first, owner
-        least = np.empty(first[-1], np.int64)
-        in_parts(lambda part: _write_least(*table, part.start, part.stop, least), len(least))
-        begins, order = np.zeros(n_nodes + 1, np.int64), np.empty(first[-1], np.int64)
-        _sort(least, begins, order)
-        neighbour = np.full(first[-1], NONE, np.int32)
-        in_parts(
-            lambda part: _match(*table, begins, order, part.start, part.stop, neighbour), n_nodes
-        )
-        _SIDES[cells] = Sides(sealed(first), sealed(neighbour))
-    return _SIDES[cells]
+    first = np.concatenate(([0], np.cumsum(SIDES[cells.types])))
+    n_nodes = int(cells.connectivity.max(initial=-1)) + 1
+    owner = np.repeat(np.arange(len(cells)), np.diff(first))
+    table = cells.types, cells.offsets, cells.connectivity, SIDE_NODES, first, owner
+    least = np.empty(first[-1], np.int64)
+    in_parts(lambda part: _write_least(*table, part.start, part.stop, least), len(least))
+    begins, order = np.zeros(n_nodes + 1, np.int64), np.empty(first[-1], np.int64)
+    _sort(least, begins, order)
+    neighbour = np.full(first[-1], NONE, np.int32)
+    in_parts(lambda part: _match(*table, begins, order, part.start, part.stop, neighbour), n_nodes)
+    return Sides(sealed(first), sealed(neighbour))
 
 
+@weak_cache
 def cells_around(cells: Cells, n_points: int) -> CellsAround:
     """Return the cells of each of ``n_points`` nodes, cached as long as the cells live."""
-    known = _AROUND.get(cells)
-    if known is None or len(known.offsets) != n_points + 1:
-        offsets, count = np.zeros(n_points + 1, np.int64), len(cells.connectivity)
-        owner, local = np.empty(count, np.int32), np.empty(count, np.int8)
-        _write_around(cells.connectivity, cells.offsets, offsets, owner, local)
-        known = _AROUND[cells] = CellsAround(sealed(offsets), sealed(owner), sealed(local))
-    return known
+    offsets, count = np.zeros(n_points + 1, np.int64), len(cells.connectivity)
+    owner, local = np.empty(count, np.int32), np.empty(count, np.int8)
+    _write_around(cells.connectivity, cells.offsets, offsets, owner, local)
+    return CellsAround(sealed(offsets), sealed(owner), sealed(local))
 
 
 @njit(nogil=True, cache=True)

@@ -20,10 +20,7 @@ Z_AXIS = (0.0, 0.0, 1.0)
 def axis_basis(axis: Vector) -> FloatArray:
     """Return unit vectors e1, e2, e3 as rows (3, 3), right-handed, with e3 along ``axis``.
 
-    Raises
-    ------
-    MeshError
-        The axis has length zero.
+    Raises MeshError if the axis has length zero.
     """
     return _basis_of(*map(float, axis)).copy()
 

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from slideviz.mesh.adjacency import NONE, sides_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import find_pieces
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, Cells, IntArray, Marker, Mesh
-from slideviz.mesh.topology import Boundary, find_boundary
+from slideviz.mesh.topology import find_boundary
+from slideviz.system.weak_cache import weak_cache
 
 _MOST_PARTS = 64
 """Most parts that `smooth_parts` returns; a surface with more is rough, its edges no borders."""
 _VTK = {2: 3, 3: 5, 4: 9}
 """VTK identifier of a facet by its number of nodes."""
-
-_BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
-"""Results of `boundary_of`."""
-_SHELLS: WeakKeyDictionary[Mesh, IntArray] = WeakKeyDictionary()
-"""Results of `shell_of`."""
 
 
 def outer_facets(mesh: Mesh) -> Cells:
@@ -71,29 +65,16 @@ def _as_cells(facets: IntArray) -> Cells:
     return Cells.from_blocks([(5, facets[triangle][:, :3]), (9, facets[~triangle])])
 
 
-def boundary_of(mesh: Mesh) -> Boundary:
-    """Return the oriented boundary of all markers of a mesh; cached as long as the mesh lives.
-
-    Raises
-    ------
-    MeshError
-        A marker element is no side of any cell.
-    """
-    found = _BOUNDARIES.get(mesh)
-    if found is None:
-        found = _BOUNDARIES[mesh] = find_boundary(mesh)
-    return found
+boundary_of = weak_cache(find_boundary)
+"""Returns the `Boundary` of a mesh, cached as long as the mesh lives."""
 
 
+@weak_cache
 def shell_of(mesh: Mesh) -> IntArray:
     """Return the sides that only one cell has, oriented outward: nodes (f, 2) or (f, 4); cached.
 
     They count in a marker or not, so that they enclose the mesh even where markers do not: where a
     boundary has no marker, or where a halo continues the cells beyond the periodic sides.
     """
-    found = _SHELLS.get(mesh)
-    if found is None:
-        marker = Marker("shell", outer_facets(mesh))
-        found = find_boundary(Mesh(mesh.points, mesh.cells, (marker,), name=mesh.name)).facets
-        _SHELLS[mesh] = found
-    return found
+    marker = Marker("shell", outer_facets(mesh))
+    return find_boundary(Mesh(mesh.points, mesh.cells, (marker,), name=mesh.name)).facets

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
-from slideviz.system.threads import in_parts
 
 LARGEST = 1e50
 """Largest absolute coordinate that is computed with, so that products of several are finite."""
@@ -49,16 +46,15 @@ def no_node(node: str, n_points: int) -> str:
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the index of the first element that has a node twice, and that node, or None."""
     repeated: list[tuple[int, int]] = []
-    for ids, nodes in cells.by_type.values():
 
-        def look(part: slice, ids: IntArray, nodes: IntArray) -> None:
-            ordered = np.sort(nodes[part], axis=1)
-            same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
-            if same.any():
-                k = int(np.argmax(same.any(axis=1)))
-                repeated.append((int(ids[part][k]), int(ordered[k, int(np.argmax(same[k]))])))
+    def look(_vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        ordered = np.sort(nodes, axis=1)
+        same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
+        if same.any():
+            k = int(np.argmax(same.any(axis=1)))
+            repeated.append((int(ids[k]), int(ordered[k, int(np.argmax(same[k]))])))
 
-        in_parts(partial(look, ids=ids, nodes=nodes), len(ids))
+    cells.in_parts(look)
     return min(repeated, default=None)
 
 
@@ -75,11 +71,8 @@ def unused_nodes(mesh: Mesh) -> IntArray:
 def check_mesh(mesh: Mesh) -> None:
     """Raise if the coordinates, elements or marker names of a mesh cannot be used.
 
-    Raises
-    ------
-    MeshError
-        A coordinate is not finite, an element has the wrong dimension or wrong nodes, or two
-        markers have one name.
+    Raises MeshError if a coordinate is not finite, an element has the wrong dimension or wrong
+    nodes, or two markers have one name.
     """
     check_points(mesh)
     if len(mesh.cells) == 0:
@@ -105,10 +98,7 @@ def check_mesh(mesh: Mesh) -> None:
 def check_points(mesh: Mesh) -> None:
     """Raise if a coordinate is not finite.
 
-    Raises
-    ------
-    MeshError
-        A coordinate is NaN or infinite.
+    Raises MeshError if a coordinate is NaN or infinite.
     """
     if not within(mesh.points, np.finfo(float).max):
         k = int(np.argmax(~np.isfinite(mesh.points).all(axis=1)))
@@ -126,10 +116,7 @@ def within(points: FloatArray, largest: float) -> bool:
 def check_size(mesh: Mesh, name: str = "") -> None:
     """Raise if a finite coordinate is too large to be computed with; ``name`` is for the message.
 
-    Raises
-    ------
-    MeshError
-        The absolute value of a coordinate is above ``LARGEST``.
+    Raises MeshError if the absolute value of a coordinate is above ``LARGEST``.
     """
     if within(mesh.points, LARGEST):
         return

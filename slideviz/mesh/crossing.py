@@ -57,6 +57,8 @@ def first_crossing(
 ) -> Crossing | None:
     """Return a place where the moved boundary crosses another, the first that it crosses, or None.
 
+    Raises MeshError if an element has another dimension than a boundary.
+
     Parameters
     ----------
     points : (n, d) float64
@@ -66,11 +68,6 @@ def first_crossing(
     others : sequence of (str, Cells)
         The other boundaries by name. Leave out those that will move along, such as periodic
         ones with periodic displacement: their place in ``points`` is the old one.
-
-    Raises
-    ------
-    MeshError
-        An element has another dimension than a boundary.
     """
     points = np.asarray(points, np.float64)
     body = FacetSimplices.of(moved, points.shape[1])
@@ -93,6 +90,7 @@ def swept_crossing(
 
     Paths are straight. So a body is found that has jumped over a wall. Facets of the others that
     move themselves are not tested. For a curved path, call it for one short piece after the other.
+    Raises MeshError if an element has another dimension than a boundary.
 
     Parameters
     ----------
@@ -100,11 +98,6 @@ def swept_crossing(
         All points of the mesh, before and after the motion.
     moved, others
         As in `first_crossing`.
-
-    Raises
-    ------
-    MeshError
-        An element has another dimension than a boundary.
     """
     before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
     goes = reduce(np.logical_or, (before != after).T)
@@ -168,18 +161,14 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
 def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
     """Return where a boundary intersects itself (point, both facets), or None.
 
-    Facets that share a node are not compared.
+    Facets that share a node are not compared. Raises MeshError if an element has another dimension
+    than a boundary.
 
     Parameters
     ----------
     points : (n, d) float64
     cells : Cells
         As ``moved`` in `first_crossing`.
-
-    Raises
-    ------
-    MeshError
-        An element has another dimension than a boundary.
     """
     surface = FacetSimplices.of(cells, points.shape[1])
     if not len(surface):

@@ -8,8 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.jacobians import LANES, OPTIONS, add3, cross3, dot3, edge, half_sum, minus3
-from slideviz.mesh.shape_loops import gather3
+from slideviz.mesh.jacobians import (
+    LANES,
+    OPTIONS,
+    add3,
+    cross3,
+    dot3,
+    edge,
+    gather,
+    half_sum,
+    minus3,
+)
 from slideviz.system.jit_cache import njit
 
 
@@ -69,11 +78,11 @@ def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ig
 
     A cell is divided into pyramids on its faces, their tops at the mean of the faces' centres.
     """
-    at = np.empty((3, nodes.shape[1], LANES))
+    at = np.zeros((3, nodes.shape[1], LANES))
     areas, middles = np.empty((2, len(polygons), 3, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
-        gather3(points, nodes, start, count, at)
+        gather(points, nodes, start, count, at)
         for k in range(len(polygons)):
             _face(at, polygons[k], count, areas[k], middles[k])
         for c in range(count):
@@ -115,13 +124,13 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
     angle, skewness, expansion : (M,)
         Written, at ``ids``: non-orthogonality in degrees, skewness, ratio of volumes.
     """
-    at = np.empty((3, nodes.shape[1], LANES))
+    at = np.zeros((3, nodes.shape[1], LANES))
     area, middle, across = np.empty((3, 3, LANES))
     share, ratio, worst = np.empty(LANES), np.empty(LANES), np.empty((3, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
         cells = ids[start : start + count]
-        gather3(points, nodes, start, count, at)
+        gather(points, nodes, start, count, at)
         worst[0], worst[1], worst[2] = 1.0, 0.0, 1.0
         for k in range(len(sides)):
             _face(at, sides[k], count, area, middle)

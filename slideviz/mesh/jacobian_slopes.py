@@ -53,9 +53,9 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
         _weights(alpha, spread, turn[here], powers, sums[here])
         slope[:] = 0.0
         if points.shape[1] == 2:
-            pull_plane(vtk, at, table, count, alpha, spread, slope)
+            _pull_plane(vtk, at, table, count, alpha, spread, slope)
         else:
-            pull_solid(vtk, at, table, count, alpha, spread, slope)
+            _pull_solid(vtk, at, table, count, alpha, spread, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -92,7 +92,7 @@ def _power(base, exponent):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
 
     ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
@@ -118,8 +118,8 @@ def pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-
 
 
 @njit(**OPTIONS)
-def pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `pull_plane` for 3D cells."""
+def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
     for k in range(len(table)):
         o, i, j, h = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
         for c in range(count):
@@ -176,8 +176,7 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
     points, nodes, table
         As of `slideviz.mesh.jacobians.measure`.
     weights : (k, m)
-        Factors of the coefficients: the 27 of a hexahedron and the 9 of a prism, in the order of
-        `jacobians.hexahedron_coefficients` and `jacobians.prism_coefficients`, else the corners.
+        Factors of the coefficients, in the order of `jacobians.write_coefficients`.
     out : (m, n, d)
         Written.
     """
@@ -189,18 +188,28 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
         gather(points, nodes, first, count, at)
         part[:, :count] = weights[:, first : first + count]
         slope[:] = 0.0
-        if vtk == 12:
-            pull_hexahedron(at, count, part.reshape(3, 3, 3, LANES), slope)
-        elif vtk == 13:
-            pull_prism(at, count, part.reshape(3, 3, LANES), slope)
-        elif points.shape[1] == 2:
-            pull_plane(5, at, table, count, part, none, slope)
-        else:
-            pull_solid(14, at, table, count, part, none, slope)
+        pull_proof(vtk, at, table, count, part, none, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
                     out[first + c, j, axis] = slope[axis, j, c]
+
+
+@njit(**OPTIONS)
+def pull_proof(vtk, at, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
+    """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES).
+
+    ``none`` (k, LANES) are zeros.
+    """
+    if vtk == 12:
+        _pull_hexahedron(at, count, weights.reshape(3, 3, 3, LANES), slope)
+    elif vtk == 13:
+        weights = weights.reshape(3, 3, LANES)
+        _pull_heights(at, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
+    elif at.shape[0] == 2:
+        _pull_plane(5, at, table, count, weights, none, slope)
+    else:
+        _pull_solid(14, at, table, count, weights, none, slope)
 
 
 _U, _V = NODE.transpose(1, 0, 2), NODE
@@ -213,25 +222,19 @@ _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 
 
 @njit(**OPTIONS)
-def pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
+def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
     heights, factors = NODE.reshape(4, 2), np.empty((3, 4, LANES))
     for i in range(2):
         for j in range(2):
             for p in range(2):
                 for q in range(2):
-                    # As in `jacobians.hexahedron_coefficients`.
+                    # As in `jacobians.write_hexahedron`.
                     weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
                     for n in range(3):
                         for c in range(count):
                             factors[n, 2 * p + q, c] = weight * weights[i + p, j + q, n, c]
             _pull_heights(at, count, _SIDES[i, j], heights, factors, slope)
-
-
-@njit(**OPTIONS)
-def pull_prism(at, count, weights, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives of the coefficients of prisms, times ``weights`` (3, 3, ...)."""
-    _pull_heights(at, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
 
 
 @njit(**OPTIONS)

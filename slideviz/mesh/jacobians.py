@@ -48,8 +48,8 @@ def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status
         1, or -1 for a cell that is numbered the other way round.
     """
     if vtk == 12:
-        return subdivide(hexahedron_coefficients(at) * signs)
-    low, middle, top = prism_coefficients(at) * signs
+        return subdivide(coefficients(12, at).reshape(3, 3, 3, -1) * signs)
+    low, middle, top = coefficients(13, at).reshape(3, 3, -1) * signs
     # A quadratic with these coefficients has minimum zero if middle = -√(low · top).
     product = low * top  # negative by rounding only
     positive = (product >= 0) & (middle + np.sqrt(np.maximum(product, 0.0)) > 0)
@@ -91,6 +91,12 @@ VALID, INVERTED, UNPROVEN = range(len(CELL_STATES))
 
 CORNERS = {vtk: np.array(row.corners, np.int64) for vtk, row in ELEMENTS.items() if row.corners}
 """``ElementType.corners`` (k, 3) in 2D, (k, 4) in 3D, by VTK identifier."""
+CORNER_AT = {
+    **{vtk: np.arange(len(table)) for vtk, table in CORNERS.items()},
+    12: np.array([0, 18, 24, 6, 2, 20, 26, 8]),
+    13: np.array([0, 1, 2, 6, 7, 8]),
+}
+"""Which coefficient is the Jacobian of each corner, by VTK identifier."""
 
 
 def check_cells(mesh: Mesh) -> None:
@@ -220,7 +226,12 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def write_prism(at, count, found):  # type: ignore[no-untyped-def]
-    """Write the coefficients that `prism_coefficients` describes into ``found`` (3, 3, ...)."""
+    """Write the Bernstein coefficients of det J of prisms into ``found`` (3, 3, ...).
+
+    The determinant is linear over the triangle and quadratic along the height: the entry
+    ``[c, i]`` is coefficient c of the quadratic above corner i. Entries 0 and 2 are the corner
+    Jacobians, and the volume is the sum of all, divided by 18.
+    """
     for c in range(count):
         a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
         p, q = edge(at, 3, 4, c), edge(at, 3, 5, c)
@@ -239,7 +250,15 @@ NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 
 @njit(**OPTIONS)
 def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
-    """Write those that `hexahedron_coefficients` describes into ``found`` (3, 3, 3, ...)."""
+    """Write the Bézier coefficients of det J of hexahedra into ``found`` (3, 3, 3, ...).
+
+    The derivatives along u, v and w are bilinear, with the twelve edges as coefficients; so the
+    coefficient (a, b, c) of their triple product, which is quadratic in each parameter, is the
+    mean of the triple products of edges u[j, k], v[i, k'], w[i', j'] with i + i' = a,
+    j + j' = b and k + k' = c. No subtraction is left, hence no cancellation either. The corner
+    coefficients are the corner Jacobians, and the mean of all is the volume (A. Johnen,
+    J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
+    """
     found[:] = 0.0
     for i in range(2):
         for j in range(2):
@@ -319,28 +338,22 @@ def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
             states[c] = states[c] if 0.0 < value < np.inf else as_
 
 
-def prism_coefficients(at: FloatArray) -> FloatArray:
-    """Return (3, 3, m) Bernstein coefficients of det J of prisms, ``at`` (3, 6, m).
+@njit(**OPTIONS)
+def write_coefficients(vtk, at, table, count, found):  # type: ignore[no-untyped-def]
+    """Write the coefficients of the proof of validity of cells of one type into ``found`` (k, m).
 
-    The determinant is linear over the triangle and quadratic along the height: the entry
-    ``[c, i]`` is coefficient c of the quadratic above corner i. Entries 0 and 2 are the corner
-    Jacobians, and the volume is the sum of all, divided by 18.
+    They are the 27 of a hexahedron, the 9 of a prism, else the corner Jacobians.
     """
-    coefficients = np.empty((3, 3, at.shape[2]))
-    write_prism(np.ascontiguousarray(at), at.shape[2], coefficients)
-    return coefficients
+    if vtk == 12:
+        write_hexahedron(at, count, found.reshape(3, 3, 3, found.shape[1]))
+    elif vtk == 13:
+        write_prism(at, count, found.reshape(3, 3, found.shape[1]))
+    else:
+        corners(at, table, count, found)
 
 
-def hexahedron_coefficients(at: FloatArray) -> FloatArray:
-    """Return (3, 3, 3, m) Bézier coefficients of det J of hexahedra, ``at`` (3, 8, m).
-
-    The derivatives along u, v and w are bilinear, with the twelve edges as coefficients; so the
-    coefficient (a, b, c) of their triple product, which is quadratic in each parameter, is the
-    mean of the triple products of edges u[j, k], v[i, k'], w[i', j'] with i + i' = a,
-    j + j' = b and k + k' = c. No subtraction is left, hence no cancellation either. The corner
-    coefficients are the corner Jacobians, and the mean of all is the volume (A. Johnen,
-    J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
-    """
-    coefficients = np.empty((3, 3, 3, at.shape[2]))
-    write_hexahedron(np.ascontiguousarray(at), at.shape[2], coefficients)
-    return coefficients
+def coefficients(vtk: int, at: FloatArray) -> FloatArray:
+    """Return the coefficients (k, m) of the proof of validity of cells, ``at`` (d, n, m)."""
+    found = np.empty(({12: 27, 13: 9}.get(vtk, len(CORNERS[vtk])), at.shape[2]))
+    write_coefficients(vtk, np.ascontiguousarray(at), CORNERS[vtk], at.shape[2], found)
+    return found

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
-from functools import partial
 from math import floor
 from typing import TYPE_CHECKING, Any
 
@@ -27,14 +26,11 @@ from slideviz.mesh.jacobians import (
     LANES,
     LEVELS,
     OPTIONS,
-    corners,
     gather,
-    write_hexahedron,
-    write_prism,
+    write_coefficients,
 )
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import njit
-from slideviz.system.threads import in_parts
 from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
@@ -101,15 +97,14 @@ def margins(
     """
     found = np.empty(len(cells))
     turns = np.ones(len(cells), np.int8) if signs is None else signs
-    for vtk, (ids, nodes) in cells.by_type.items():
 
-        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
-            here, values = ids[part], np.empty(part.stop - part.start)
-            arrays = points, displacement, nodes[part], CORNERS[vtk], turns[here]
-            _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
-            found[here] = values
+    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        values = np.empty(len(ids))
+        arrays = points, displacement, nodes, CORNERS[vtk], turns[ids]
+        _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
+        found[ids] = values
 
-        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
+    cells.in_parts(of_part, going_on)
     return found
 
 
@@ -237,12 +232,7 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, fou
                 for j in range(nodes.shape[1]):
                     for c in range(count):
                         at[axis, j, c] = a * start[axis, j, c] + b * motion[axis, j, c]
-            if vtk == 12:
-                write_hexahedron(at, count, values[k].reshape(3, 3, 3, LANES))
-            elif vtk == 13:
-                write_prism(at, count, values[k].reshape(3, 3, LANES))
-            else:
-                corners(at, table, count, values[k])
+            write_coefficients(vtk, at, table, count, values[k])
         safe = _write_polynomials(dim, values, errors, turn[first : first + count], cap / scale)
         for c in range(count):
             found[first + c], end = cap, cap / scale[c]

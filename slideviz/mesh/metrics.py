@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from threading import Lock
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -192,7 +191,11 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         return MetricValues(name, values, values, counted)
     signs = reference_of(mesh if reference is None else reference)[1]
     turned = hash(signs.tobytes()) if (signs < 0).any() else 0
-    values = _cached(mesh, (name, turned), lambda: _computed(mesh, name, turned, signs))
+    values = _cached(
+        mesh,
+        (name, turned),
+        lambda: {(each, turned): v for each, v in _FAMILIES[name](mesh, signs).items()},
+    )
     if METRICS[name].where == "cells":
         return MetricValues(name, values, values, counted)
     place, best = ("cells", name, turned), METRICS[name].best
@@ -201,13 +204,6 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     if mesh.halo is not None:
         used[mesh.halo.outer] = False
     return MetricValues(name, values, of_cells, used)
-
-
-def _computed(
-    mesh: Mesh, name: Metric, turned: int, signs: NDArray[np.int8]
-) -> dict[object, FloatArray]:
-    """Return a metric and those that are computed with it, by key of the cache."""
-    return {(each, turned): values for each, values in _FAMILIES[name](mesh, signs).items()}
 
 
 def _cached(mesh: Mesh, key: object, compute: Callable[[], dict[object, FloatArray]]) -> FloatArray:
@@ -259,17 +255,14 @@ Made = Mapping[Metric, FloatArray]
 def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     """Return the metrics of `shape_loops.SHAPES`, which need one cell only."""
     found = np.empty((len(shape_loops.SHAPES), len(mesh.cells)))
-    for vtk, (ids, nodes) in mesh.cells.by_type.items():
 
-        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
-            values = np.empty((len(found), part.stop - part.start))
-            tables = shape_loops.CORNERS[vtk], shape_loops.EDGES[vtk], shape_loops.POLYGONS[vtk]
-            shape_loops.write_shapes(
-                vtk, mesh.points, nodes[part], signs[ids[part]], *tables, values
-            )
-            found[:, ids[part]] = values
+    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        values = np.empty((len(found), len(ids)))
+        tables = shape_loops.CORNERS[vtk], shape_loops.EDGES[vtk], shape_loops.POLYGONS[vtk]
+        shape_loops.write_shapes(vtk, mesh.points, nodes, signs[ids], *tables, values)
+        found[:, ids] = values
 
-        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids))
+    mesh.cells.in_parts(of_part)
     return dict(zip(shape_loops.SHAPES, found, strict=True))
 
 
@@ -278,25 +271,20 @@ def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     cells, sides = mesh.cells, sides_of(mesh.cells)
     centres, volumes = np.empty((len(cells), 3)), np.empty(len(cells))
     found = np.empty((3, len(cells)))
-    blocks = [(vtk, *block) for vtk, block in cells.by_type.items()]
-    for vtk, ids, nodes in blocks:
 
-        def find_centres(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
-            centre, volume = np.empty((part.stop - part.start, 3)), np.empty(part.stop - part.start)
-            polygons, turns = shape_loops.POLYGONS[vtk], signs[ids[part]]
-            face_loops.write_centres(mesh.points, nodes[part], turns, polygons, centre, volume)
-            centres[ids[part]], volumes[ids[part]] = centre, volume
+    def find_centres(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        centre, volume = np.empty((len(ids), 3)), np.empty(len(ids))
+        polygons = shape_loops.POLYGONS[vtk]
+        face_loops.write_centres(mesh.points, nodes, signs[ids], polygons, centre, volume)
+        centres[ids], volumes[ids] = centre, volume
 
-        in_parts(partial(find_centres, vtk=vtk, ids=ids, nodes=nodes), len(ids))
-    for vtk, ids, nodes in blocks:
+    def rate_faces(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        around = (sides.first, sides.neighbour), (centres, volumes)
+        own = mesh.points, nodes, ids, signs[ids], SIDE_NODES[vtk, : SIDES[vtk]]
+        face_loops.write_faces(*own, *around, *found)
 
-        def rate_faces(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
-            here, local = ids[part], SIDE_NODES[vtk, : SIDES[vtk]]
-            around = (sides.first, sides.neighbour), (centres, volumes)
-            cells = mesh.points, nodes[part], here, signs[here], local
-            face_loops.write_faces(*cells, *around, *found)
-
-        in_parts(partial(rate_faces, vtk=vtk, ids=ids, nodes=nodes), len(ids))
+    cells.in_parts(find_centres)
+    cells.in_parts(rate_faces)
     return {"non-orthogonality": found[0], "skewness": found[1], "expansion": found[2]}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from slideviz.argument_types import check_fields, check_types
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS, SIZES
+from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
@@ -127,6 +128,22 @@ class Cells:
                 nodes = self.connectivity[self.offsets[ids][:, None] + np.arange(width)]
             blocks[vtk] = sealed(ids), sealed(nodes)
         return blocks
+
+    def in_parts(
+        self,
+        work: Callable[[int, IntArray, IntArray], object],
+        going_on: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Call ``work(vtk, ids, nodes)`` for parts of the elements of each type, on all cores.
+
+        ``going_on`` is called every few thousand elements; what it raises ends the work.
+        """
+        for vtk, (ids, nodes) in self.by_type.items():
+            in_parts(
+                lambda part: work(vtk, ids[part], nodes[part]),  # noqa: B023
+                len(ids),
+                lambda _: going_on(),
+            )
 
     @cached_property
     def nodes(self) -> IntArray:

@@ -8,7 +8,6 @@ way traverse it in opposite directions, whatever their shape.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, write_corners
 from slideviz.mesh.model import Mesh, sealed
 from slideviz.mesh.skew import ordered_sum
-from slideviz.system.threads import in_parts
+from slideviz.system.weak_cache import weak_cache
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,43 +24,30 @@ if TYPE_CHECKING:
 
     from slideviz.mesh.model import Cells, FloatArray, IntArray
 
-_REFERENCES: WeakKeyDictionary[Mesh, tuple[FloatArray, NDArray[np.int8]]] = WeakKeyDictionary()
-"""Results of `reference_of`."""
 
-
+@weak_cache
 def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
     """Return what deformed cells are compared with: sums of corner Jacobians (m,), and signs (m,).
 
     The signs are those of `orientation`; the sums are multiplied by them, so that they are positive
     but for folded cells. Both are cached as long as the mesh lives.
     """
-    reference = _REFERENCES.get(mesh)
-    if reference is None:
-        sums = corner_sums(mesh)
-        signs = orientation(mesh.cells, sums)
-        sums *= signs
-        reference = _REFERENCES[mesh] = sealed(sums), sealed(signs)
-    return reference
+    sums = corner_sums(mesh)
+    signs = orientation(mesh.cells, sums)
+    sums *= signs
+    return sealed(sums), sealed(signs)
 
 
 def corner_sums(mesh: Mesh) -> FloatArray:
     """Return the sum (m,) of each cell's corner Jacobians, without `orientation`'s sign."""
     sums = np.empty(len(mesh.cells))
-    for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        sums[ids] = _sums_of(mesh.points, vtk, nodes)
-    return sums
 
+    def add(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        alpha = np.empty((len(CORNERS[vtk]), len(ids)))
+        write_corners(mesh.points, nodes, CORNERS[vtk], alpha)
+        sums[ids] = ordered_sum(alpha)
 
-def _sums_of(points: FloatArray, vtk: int, nodes: IntArray) -> FloatArray:
-    """Return the sums (m,) of `corner_sums` for cells of one type, ``nodes`` (m, n)."""
-    sums, table = np.empty(len(nodes)), CORNERS[vtk]
-
-    def add(part: slice) -> None:
-        alpha = np.empty((len(table), part.stop - part.start))
-        write_corners(points, nodes[part], table, alpha)
-        sums[part] = ordered_sum(alpha)
-
-    in_parts(add, len(nodes))
+    mesh.cells.in_parts(add)
     return sums
 
 

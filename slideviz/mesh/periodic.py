@@ -112,13 +112,9 @@ def match(
 ) -> Pair:
     """Return the pair of two markers, ``second`` being the image of ``first``.
 
-    ``auto`` tries a translation, then a rotation about the given axis.
-
-    Raises
-    ------
-    MeshError
-        They have different numbers of nodes, or do not match to ``TOLERANCE``: then the message
-        has the best transformation tried and its largest mismatch.
+    ``auto`` tries a translation, then a rotation about the given axis. Raises MeshError if they
+    have different numbers of nodes, or do not match to ``TOLERANCE``: then the message has the best
+    transformation tried and its largest mismatch.
     """
     a, b = mesh.marker(first).nodes, mesh.marker(second).nodes
     where = f"{mesh.name}: periodic markers {first!r} and {second!r} do not match"
@@ -204,12 +200,8 @@ def pair_up(
     """Return the pairs that the named markers form, whatever their order.
 
     All pairs of a zone have the same transformation or its inverse. If a marker matches several
-    others (two halves of a straight side), the partner with this transformation is chosen.
-
-    Raises
-    ------
-    MeshError
-        A marker has no partner, or the pairs have different transformations.
+    others (two halves of a straight side), the partner with this transformation is chosen. Raises
+    MeshError if a marker has no partner, or the pairs have different transformations.
     """
     if mesh.zone_parts:
         of_zones = [(part, names_in(mesh, part)) for part in mesh.zone_parts]
@@ -321,12 +313,8 @@ def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tup
 
     Translations are tried first, then rotations about z, x and y through 0. The pairs are a guess,
     to be confirmed by the user: the opposite sides of every box match. ``going_on`` is called
-    before each try; what it raises ends the search.
-
-    Raises
-    ------
-    MeshError
-        Coordinates are too large to be computed with.
+    before each try; what it raises ends the search. Raises MeshError if coordinates are too large
+    to be computed with.
     """
     check_size(mesh)
     if mesh.zone_parts:

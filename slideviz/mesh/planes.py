@@ -44,10 +44,7 @@ class FacetSimplices:
     def of(cls, cells: Cells, dim: int) -> FacetSimplices:
         """Return the simplices of the facets ``cells`` of a mesh of dimension ``dim``.
 
-        Raises
-        ------
-        MeshError
-            An element has another dimension than a boundary.
+        Raises MeshError if an element has another dimension than a boundary.
         """
         parts, facets = [np.empty((0, dim), np.int64)], [np.empty(0, np.int64)]
         for vtk, (ids, nodes) in cells.by_type.items():

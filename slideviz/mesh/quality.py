@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +31,6 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.skew import SKEW_METRICS, ordered_sum
-from slideviz.system.threads import in_parts
 from slideviz.terms import SkewMetric
 
 if TYPE_CHECKING:
@@ -338,15 +337,13 @@ def quality(
     sums, signs = reference_of(mesh if reference is None else checked_reference(reference, mesh))
     values, size, skew = np.empty((3, len(mesh.cells)))
     status = np.empty(len(mesh.cells), np.uint8)
-    for vtk, (ids, nodes) in mesh.cells.by_type.items():
 
-        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
-            here = ids[part]
-            result = cell_quality(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
-            size[here], skew[here], status[here] = result
-            values[here] = np.sqrt(result[0]) * result[1]
+    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        result = cell_quality(mesh.points, vtk, nodes, signs[ids], sums[ids], metric)
+        size[ids], skew[ids], status[ids] = result
+        values[ids] = np.sqrt(result[0]) * result[1]
 
-        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
+    mesh.cells.in_parts(of_part, going_on)
     result = Quality(
         values=sealed(values),
         size=sealed(size),
@@ -403,6 +400,8 @@ def checked_reference(reference: Mesh, mesh: Mesh) -> Mesh:
 def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
     """Return the corner Jacobians (k,) of one cell, in the order of its corners.
 
+    Raises MeshError if there is no such cell.
+
     Parameters
     ----------
     mesh : Mesh
@@ -411,11 +410,6 @@ def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
         Index of the cell, from 0.
     sign : int
         ``Quality.signs[cell]``, so that a valid cell has positive Jacobians.
-
-    Raises
-    ------
-    MeshError
-        There is no such cell.
     """
     if not 0 <= cell < len(mesh.cells):
         raise MeshError(f"no cell {cell}; {mesh.name} has the cells 0 to {len(mesh.cells) - 1}")

@@ -22,13 +22,7 @@ import numpy as np
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
-from slideviz.mesh.jacobians import (
-    CORNERS,
-    INVERTED,
-    corners,
-    hexahedron_coefficients,
-    prism_coefficients,
-)
+from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, corners
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
@@ -267,12 +261,7 @@ def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
     count = at.shape[2]
     jacobians = np.empty((len(CORNERS[vtk]), count))
     corners(at, CORNERS[vtk], count, jacobians)
-    if vtk == 12:
-        inner = hexahedron_coefficients(at).reshape(27, count)
-        return np.concatenate((jacobians, np.delete(inner, [0, 2, 6, 8, 18, 20, 24, 26], axis=0)))
-    if vtk == 13:
-        return np.concatenate((jacobians, prism_coefficients(at)[1]))
-    return jacobians
+    return np.concatenate((jacobians, np.delete(coefficients(vtk, at), CORNER_AT[vtk], axis=0)))
 
 
 def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
@@ -335,10 +324,7 @@ class SmoothMargin:
 def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
     """Return the margin (m,) of each cell (`SmoothMargin`).
 
-    Raises
-    ------
-    MeshError
-        An undeformed cell has no positive volume to compare with.
+    Raises MeshError if an undeformed cell has no positive volume to compare with.
     """
     out, blocks = np.empty(len(mesh.cells)), _blocks(mesh)
     _, signs = reference_of(reference)
@@ -420,18 +406,10 @@ def _ratios(
     The factor is the cell's sign over the coefficient's undeformed value.
     """
     vtk, ids, nodes = block
-    before = signs[ids] * _proved(vtk, _at(reference, nodes))
+    before = signs[ids] * coefficients(vtk, _at(reference, nodes))
     scale = np.maximum(before, LEAST_SCALE * before.mean(axis=0))
     flat = ~(scale > 0).all(axis=0)
     if flat.any():
         raise MeshError(_flat_sentence(int(ids[flat.argmax()]), mesh))
     factor = signs[ids] / scale
-    return factor, factor * _proved(vtk, _at(mesh, nodes))
-
-
-def _proved(vtk: int, at: FloatArray) -> FloatArray:
-    """Return all coefficients (k, m) of the proof of validity, ordered as `pull_coefficients`."""
-    if vtk in (12, 13):
-        every = hexahedron_coefficients(at) if vtk == 12 else prism_coefficients(at)
-        return every.reshape(-1, at.shape[2])
-    return _coefficients(vtk, at)
+    return factor, factor * coefficients(vtk, _at(mesh, nodes))

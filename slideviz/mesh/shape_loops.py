@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import LANES, OPTIONS, add3, cross3, dot3, edge
+from slideviz.mesh.jacobians import LANES, OPTIONS, add3, cross3, dot3, edge, gather
 from slideviz.mesh.model import IntArray
 from slideviz.system.jit_cache import njit
 from slideviz.terms import Metric
@@ -41,29 +41,19 @@ POLYGONS = {
 
 
 @njit(**OPTIONS)
-def gather3(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
-    """Write the coordinates of ``count`` cells, from number ``first`` on, into ``at`` (3, n, …)."""
-    at[2] = 0.0
-    for c in range(count):
-        for j in range(nodes.shape[1]):
-            for axis in range(points.shape[1]):
-                at[axis, j, c] = points[nodes[first + c, j], axis]
-
-
-@njit(**OPTIONS)
 def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  # type: ignore[no-untyped-def]
     """Write the metrics of `SHAPES` of cells of one type into ``found`` (5, m).
 
     ``nodes`` are (m, n), ``signs`` (m,) are -1 for cells that are numbered the other way round; the
     tables are those of this module.
     """
-    at = np.empty((3, nodes.shape[1], LANES))
+    at = np.zeros((3, nodes.shape[1], LANES))
     lengths = np.empty((nodes.shape[1], nodes.shape[1], LANES))
     angles, ends = np.empty((4, LANES)), np.empty((2, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
         here = slice(start, start + count)
-        gather3(points, nodes, start, count, at)
+        gather(points, nodes, start, count, at)
         _lengths(at, edges, count, lengths, ends)
         _scaled_jacobians(vtk, at, corners, count, lengths, found[0, here])
         _angles(at, polygons, count, lengths, angles)

@@ -54,10 +54,7 @@ class Boundary:
 def find_boundary(mesh: Mesh) -> Boundary:
     """Return the oriented boundary of a mesh, without the facets that belong to its halo.
 
-    Raises
-    ------
-    MeshError
-        A marker element is no side of any cell.
+    Raises MeshError if a marker element is no side of any cell.
     """
     mesh, ids = without_halo(mesh)
     width = 2 if mesh.dim == 2 else 4
@@ -104,12 +101,8 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     """Return the index (f,) of the cell that each facet (f, k) is a side of.
 
     ``marker_of`` (f,) is for the message. Only sides whose nodes are all on the boundary are
-    compared, so that the cost grows with the boundary, not with the volume.
-
-    Raises
-    ------
-    MeshError
-        A facet is no side of any cell.
+    compared, so that the cost grows with the boundary, not with the volume. Raises MeshError if a
+    facet is no side of any cell.
     """
     on_boundary = np.zeros(len(mesh.points), bool)
     on_boundary[facets.ravel()] = True

@@ -32,7 +32,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -44,6 +43,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import checked_reference
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
+from slideviz.system.weak_cache import weak_cache
 
 LAYERS = 5
 """Layers that growth and equal layers are found from."""
@@ -106,10 +106,7 @@ class Columns:
 def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
     """Return the columns of at most ``layers`` layers that leave all boundaries of a mesh.
 
-    Raises
-    ------
-    MeshError
-        A marker element is no side of any cell.
+    Raises MeshError if a marker element is no side of any cell.
     """
     boundary, cells = boundary_of(mesh), mesh.cells
     facets, owner = boundary.facets, boundary.owner
@@ -392,23 +389,17 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
     return {"min": float(low), "mean": float(mean), "max": float(high)}
 
 
-_COLUMNS: WeakKeyDictionary[Mesh, tuple[Columns, frozenset[str]]] = WeakKeyDictionary()
-"""The columns of a mesh and its boundaries with layers, cached as long as the mesh lives."""
-
-
+@weak_cache
 def _columns_of(mesh: Mesh) -> tuple[Columns, frozenset[str]]:
     """Return the columns of a mesh, and the boundaries with layers."""
-    known = _COLUMNS.get(mesh)
-    if known is None:
-        columns = find_columns(mesh)
-        boundary, flat = columns.boundary, columns.stack_thickness(mesh.points) > 0
-        names = (
-            name
-            for k, name in enumerate(boundary.names)
-            if 2 * np.count_nonzero(flat[boundary.marker == k]) > (boundary.marker == k).sum()
-        )
-        known = _COLUMNS[mesh] = columns, frozenset(names)
-    return known
+    columns = find_columns(mesh)
+    boundary, flat = columns.boundary, columns.stack_thickness(mesh.points) > 0
+    names = (
+        name
+        for k, name in enumerate(boundary.names)
+        if 2 * np.count_nonzero(flat[boundary.marker == k]) > (boundary.marker == k).sum()
+    )
+    return columns, frozenset(names)
 
 
 @check_types

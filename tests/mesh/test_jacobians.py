@@ -10,8 +10,7 @@ from slideviz.mesh.jacobians import (
     LEVELS,
     UNPROVEN,
     VALID,
-    hexahedron_coefficients,
-    prism_coefficients,
+    coefficients,
     subdivide,
 )
 from slideviz.mesh.model import Cells, Mesh
@@ -63,7 +62,7 @@ def last(cells):
 
 def test_hexahedron_coefficients_are_those_of_the_sampled_determinant():
     cells = shaken(12, 30, 0.6)
-    found = hexahedron_coefficients(last(cells))
+    found = coefficients(12, last(cells)).reshape(3, 3, 3, -1)
     for i, points in enumerate(cells):
         expected = oracle.hexahedron_bezier(points)
         np.testing.assert_allclose(found[..., i], expected, rtol=0, atol=1e-12)
@@ -71,7 +70,7 @@ def test_hexahedron_coefficients_are_those_of_the_sampled_determinant():
 
 def test_hexahedron_coefficients_hold_corners_and_volume():
     cells = shaken(12, 30, 0.6)
-    found = hexahedron_coefficients(last(cells))
+    found = coefficients(12, last(cells)).reshape(3, 3, 3, -1)
     corners = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2)]
     for i, points in enumerate(cells):
         alpha = oracle.jacobians(12, points)
@@ -82,7 +81,7 @@ def test_hexahedron_coefficients_hold_corners_and_volume():
 
 def test_prism_coefficients_hold_corners_middle_and_volume():
     cells = shaken(13, 30, 0.6)
-    found = prism_coefficients(last(cells))
+    found = coefficients(13, last(cells)).reshape(3, 3, -1)
     for i, points in enumerate(cells):
         alpha = oracle.jacobians(13, points)
         np.testing.assert_allclose(found[[0, 2], :, i].ravel(), alpha, rtol=0, atol=1e-14)
@@ -128,7 +127,7 @@ def test_hexahedron_with_a_negative_coefficient_is_proved_by_subdivision():
 
 def test_prism_with_a_negative_coefficient_is_decided_exactly():
     points = np.array(PRISM_VALID_WITH_NEGATIVE_COEFFICIENT) / 20
-    assert prism_coefficients(last([points])).min() < -1.4
+    assert coefficients(13, last([points])).min() < -1.4
     assert oracle.least_determinant(13, points, 41) > 0
     assert judged(13, [points]).status[0] == VALID
 

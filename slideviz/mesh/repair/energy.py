@@ -17,28 +17,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.jacobian_slopes import pull_hexahedron, pull_plane, pull_prism, pull_solid
+from slideviz.mesh.jacobian_slopes import pull_proof
 from slideviz.mesh.jacobians import (
+    CORNER_AT,
     CORNERS,
     LANES,
     OPTIONS,
-    corners,
+    coefficients,
     gather,
-    write_hexahedron,
-    write_prism,
+    write_coefficients,
 )
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.jit_cache import njit
-
-COEFFICIENTS = {5: 1, 9: 4, 10: 1, 12: 27, 13: 9, 14: 4}
-"""Number of coefficients of the proof, by VTK identifier."""
-
-CORNER_AT = {
-    **{vtk: np.arange(len(CORNERS[vtk])) for vtk in COEFFICIENTS},
-    12: np.array([0, 18, 24, 6, 2, 20, 26, 8]),
-    13: np.array([0, 1, 2, 6, 7, 8]),
-}
-"""Which coefficient is the Jacobian of each corner, by VTK identifier."""
 
 LEAST_SCALE = 0.1
 """Least coefficient of a target, over its mean one."""
@@ -76,11 +66,8 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     signs : (m,)
         1, or -1 for a target that is numbered the other way round.
     """
-    (m, n, d), table = at.shape, CORNERS[vtk]
-    found = np.empty((COEFFICIENTS[vtk], m))
-    each = np.arange(m * n).reshape(m, n)
-    write_coefficients(vtk, np.ascontiguousarray(at.reshape(-1, d)), each, table, found)
-    found *= signs
+    (m, _, d), table = at.shape, CORNERS[vtk]
+    found = coefficients(vtk, at.T) * signs
     edges = at[:, table[:, 1:]] - at[:, table[:, :1]]
     gram = edges @ np.swapaxes(edges, 2, 3)
     length = np.sqrt(np.einsum("mcii->mci", gram))
@@ -116,42 +103,6 @@ def _opened(gram: FloatArray, length: FloatArray) -> tuple[FloatArray, FloatArra
     value = np.maximum(value, LEAST_SINE)
     inverse = (vector / value[:, None, :]) @ np.swapaxes(vector, 1, 2) / outer
     return inverse, np.sqrt(value.prod(axis=1)) * length.prod(axis=1)
-
-
-@njit(**OPTIONS)
-def _coefficients(vtk, at, table, count, found):  # type: ignore[no-untyped-def]
-    """Write the coefficients of the proof of cells of one type into ``found`` (k, LANES)."""
-    if vtk == 12:
-        write_hexahedron(at, count, found.reshape(3, 3, 3, LANES))
-    elif vtk == 13:
-        write_prism(at, count, found.reshape(3, 3, LANES))
-    else:
-        corners(at, table, count, found)
-
-
-@njit(**OPTIONS)
-def _pull(vtk, at, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
-    """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES)."""
-    if vtk == 12:
-        pull_hexahedron(at, count, weights.reshape(3, 3, 3, LANES), slope)
-    elif vtk == 13:
-        pull_prism(at, count, weights.reshape(3, 3, LANES), slope)
-    elif at.shape[0] == 2:
-        pull_plane(5, at, table, count, weights, none, slope)
-    else:
-        pull_solid(14, at, table, count, weights, none, slope)
-
-
-@njit(**OPTIONS)
-def write_coefficients(vtk, points, nodes, table, out):  # type: ignore[no-untyped-def]
-    """Write the coefficients of the proof of cells into ``out`` (k, m)."""
-    at = np.empty((points.shape[1], nodes.shape[1], LANES))
-    found = np.empty((len(out), LANES))
-    for first in range(0, len(nodes), LANES):
-        count = min(LANES, len(nodes) - first)
-        gather(points, nodes, first, count, at)
-        _coefficients(vtk, at, table, count, found)
-        out[:, first : first + count] = found[:, :count]
 
 
 @njit(inline="always", **OPTIONS)
@@ -213,7 +164,7 @@ def write_energy(  # type: ignore[no-untyped-def]
         gather(points, nodes, first, count, at)
         factors[:, :count] = scale[:, first : first + count]
         shapes[:, :, :count] = shape[:, :, first : first + count]
-        _coefficients(vtk, at, table, count, found)
+        write_coefficients(vtk, at, table, count, found)
         value[:] = 0.0
         lowest[:] = np.inf
         for k in range(parts):
@@ -237,7 +188,7 @@ def write_energy(  # type: ignore[no-untyped-def]
                 value[c] += weight[c] * total[c]
                 pull[at_corner, c] -= power * weight[c] * total[c] / root * shapes[k, 0, c]
             _pull_squares(at, table[k], shapes[k], count, weight, slope)
-        _pull(vtk, at, table, count, pull, none, slope)
+        pull_proof(vtk, at, table, count, pull, none, slope)
         for c in range(count):
             values[first + c], least[first + c] = value[c], lowest[c]
             for j in range(n):
@@ -262,7 +213,7 @@ def write_curvatures(  # type: ignore[no-untyped-def]
     for first in range(low, high, LANES):
         count = min(LANES, high - first)
         gather(points, nodes, first, count, at)
-        _coefficients(vtk, at, table, count, found)
+        write_coefficients(vtk, at, table, count, found)
         blocks[:] = 0.0
         for k in range(parts):
             for c in range(count):
@@ -289,7 +240,7 @@ def write_curvatures(  # type: ignore[no-untyped-def]
             unit[:] = 0.0
             unit[k] = 1.0
             slope[:] = 0.0
-            _pull(vtk, at, table, count, unit, none, slope)
+            pull_proof(vtk, at, table, count, unit, none, slope)
             for j in range(n):
                 for a in range(d):
                     for b in range(d):

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.fans import components
-from slideviz.mesh.jacobians import CORNERS, LANES
+from slideviz.mesh.jacobians import CORNER_AT, CORNERS, LANES
 from slideviz.mesh.margin import margins
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.mesh.repair.energy import CORNER_AT, Targets, write_curvatures, write_energy
+from slideviz.mesh.repair.energy import Targets, write_curvatures, write_energy
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import cores

@@ -149,6 +149,8 @@ def repair(
 ) -> Repaired:
     """Return the mesh's points with bad cells mended: those not proved valid, or too low.
 
+    Raises MeshError as `quality` does.
+
     Parameters
     ----------
     mesh : Mesh
@@ -164,11 +166,6 @@ def repair(
         Of the quality (`slideviz.mesh.quality.Quality`).
     report : callable
         Called with the fraction that is done; may raise, to cancel.
-
-    Raises
-    ------
-    MeshError
-        As `quality` raises it.
     """
     shapes = None if reference is None else checked_reference(reference, mesh)
     before = np.flatnonzero(is_bad(quality(mesh, shapes, metric), below))
