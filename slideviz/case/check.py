@@ -61,14 +61,18 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
     yield from key_problems(case)
+    if len(case.interfaces) % 2:
+        yield f"MARKER_ZONE_INTERFACE: {', '.join(case.interfaces)} are no pairs of boundaries"
+        return
     moved = {name: "MOTION" for motion in case.motions for name in named(motion.marker)}
-    keys = moved | _keys_of_markers(case)
+    keys = moved | _keys_of_markers(case) | dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE")
     several = {name: key for name, key in keys.items() if _of_several_zones(mesh, name)}
     if several:  # what else is wrong may be so by these names only
         yield from unknown_markers(mesh, several)
         return
     yield from (sentence for _, sentence in contradictions(case, exact=True))
     yield from marker_problems(case, mesh)
+    yield from unknown_markers(mesh, dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE"))
     yield from _zone_problems(case, mesh)
     if not case.markers_with("periodic"):
         yield from _periodic_problems(case, mesh)

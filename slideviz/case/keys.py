@@ -17,6 +17,7 @@ from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import (
     AXIS,
+    COUPLES,
     ENDS,
     NAMES,
     PAIRS,
@@ -196,6 +197,17 @@ _ROWS = (
         NAMES,
         "internal",
         "Boundaries treated as inner nodes: they move freely, only their rim is kept in place.",
+    ),
+    Key(
+        "MARKER_ZONE_INTERFACE",
+        BOUNDARIES,
+        COUPLES,
+        "Pairs of boundaries of two zones whose nodes stay together where they coincide. Without "
+        "it all that coincide do.",
+        lambda case, names: case.change(interfaces=names),
+        lambda case: case.interfaces or None,
+        field="interfaces",
+        run_label="",
     ),
     Key(
         "MARKER_BDRY",

@@ -343,6 +343,8 @@ class Case(CheckedFields):
     * ``repair``: whether cells that are inverted, or whose quality is below ``repair_below``, are
       mended: after each step if ``repair_steps``, else after the last.
     * ``idw_power``: None: the number of dimensions.
+    * ``interfaces``: pairs of boundaries of two zones that stay together; (): all that coincide.
+      ``zone_settings``: a case for each zone, whose settings the zone has; (): those of this one.
     * ``limits``: what the deformed mesh must meet; changes no mesh.
     * ``view``: how the window showed the case, by key; changes no result.
     * ``ffd_boxes``: boxes for free-form deformation that are not in the mesh file: name and 8
@@ -373,6 +375,8 @@ class Case(CheckedFields):
     zone: int | None = None
     roles: Annotated[Mapping[str, Role], _ROLES] = field(default_factory=dict)
     motions: Annotated[tuple[Motion, ...], "a tuple of motions, as Translate(...)"] = ()
+    interfaces: tuple[str, ...] = ()
+    zone_settings: tuple[Case, ...] = ()
     ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
     ffd_degrees: tuple[tuple[int, int, int], ...] = ()
     ffd_blending: FfdBlending = field(default="BEZIER", metadata=FFD_BLENDINGS)

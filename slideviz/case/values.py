@@ -209,6 +209,16 @@ def _read_pairs(text: str) -> tuple[str, ...]:
     return _names(items)
 
 
+def _read_couples(text: str) -> tuple[str, ...]:
+    names = tuple(item.text for item in list_of(text))
+    if len(names) % 2:
+        raise CaseError(
+            f"{shown(text)} has {counted(len(names), 'name')}; expected pairs of boundaries, one "
+            "of each zone: ( out_1, in_2, out_2, in_3 )"
+        )
+    return names
+
+
 def _remark_pairs(text: str) -> str:
     if not _is_su2_form(list_of(text)):
         return ""
@@ -270,5 +280,6 @@ ENDS = Kind(
     lambda names: "AUTO" if names is None else _write_names(names),
 )
 PAIRS = Kind("( A, B, ... ), also with SU2's numbers", _read_pairs, _write_names, _remark_pairs)
+COUPLES = Kind("( A, B, ... )", _read_couples, _write_names)
 AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text, entry="axis")
 POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text, entry="point")

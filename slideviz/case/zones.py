@@ -28,11 +28,13 @@ def with_marker_names(case: Case, mesh: Mesh) -> Case:
     A case may name each with the number of its zone, as ``1:blade``; a mesh does so only where
     another zone has a boundary of that name.
     """
-    return _renamed(case, spellings(mesh))
+    return renamed(case, spellings(mesh))
 
 
-def _renamed(case: Case, names: Mapping[str, str]) -> Case:
-    if not any(name in names for name in (*case.roles, *(limit.marker for limit in case.limits))):
+def renamed(case: Case, names: Mapping[str, str]) -> Case:
+    """Return a case with other names of boundaries: ``names`` by those that it has."""
+    known = *case.roles, *case.interfaces, *(limit.marker for limit in case.limits)
+    if not any(name in names for name in known):
         return case
     motions = []
     for motion in case.motions:
@@ -42,6 +44,7 @@ def _renamed(case: Case, names: Mapping[str, str]) -> Case:
     hub, shroud = (names.get(name, name) for name in case.span or ("", ""))
     return case.change(
         span=(hub, shroud) if case.span else None,
+        interfaces=tuple(names.get(name, name) for name in case.interfaces),
         roles={names.get(name, name): role for name, role in case.roles.items()},
         motions=tuple(motions),
         limits=tuple(
@@ -67,7 +70,9 @@ def zone_cases(case: Case, mesh: Mesh) -> tuple[Case, ...]:
     ]
     if problems:
         raise CaseError("\n".join(problems))
-    return tuple(_zone_case(case, mesh, part) for part in mesh.zone_parts)
+    settings = case.zone_settings or (case,) * mesh.zones
+    each = zip(settings, mesh.zone_parts, strict=True)
+    return tuple(_zone_case(case, one, mesh, part) for one, part in each)
 
 
 def each_zone(case: Case, mesh: Mesh) -> Iterator[tuple[Case, Mesh]]:
@@ -95,21 +100,23 @@ def _shared(motion: Motion, mesh: Mesh, moved: list[str]) -> str:
     return ""
 
 
-def _zone_case(case: Case, mesh: Mesh, part: ZonePart) -> Case:
+def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
     names = names_in(mesh, part)
     roles = {names[name]: role for name, role in case.roles.items() if name in names}
     periodic = "periodic" in roles.values()
     span = None
-    if case.span is not None and all(name in names for name in case.span):
-        span = names[case.span[0]], names[case.span[1]]
-    zone = case.change(
+    if settings.span is not None and all(name in names for name in settings.span):
+        span = names[settings.span[0]], names[settings.span[1]]
+    zone = settings.change(
         roles=roles,
         motions=(),
         limits=(),
         zone=None,
         span=span,
         warnings=(),
-        periodic=case.periodic if periodic else "none",
+        interfaces=(),
+        zone_settings=(),
+        periodic=settings.periodic if periodic else "none",
     )
     moved = [_zone_motion(case, motion, part, names, zone) for motion in case.motions]
     return zone.change(motions=tuple(motion for motion in moved if motion is not None))

@@ -42,17 +42,19 @@ def add_config(call: argparse.ArgumentParser) -> None:
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
-    from slideviz import read
     from slideviz.cli.output_paths import add_case_inputs
-    from slideviz.design.su2.config import on_mesh, own_changes, read_config
+    from slideviz.design.su2.config import own_changes, read_config
+    from slideviz.design.su2.on_mesh import on_mesh, read_mesh
     from slideviz.errors import CaseError
 
     own, others = own_changes(arguments.set)
     config = read_config(arguments.case, own)
-    config = replace(config, case=changed(config.case, others))
-    add_case_inputs(arguments, config.case)
-    if config.variables[0].kind == "SURFACE_FILE":
-        arguments.inputs.setdefault(config.files["DV_FILENAME"], "the surface file")
+    zones = (replace(zone, case=changed(zone.case, others)) for zone in config.zones)
+    config = replace(config, case=changed(config.case, others), zones=tuple(zones))
+    for each in (config, *config.zones):
+        add_case_inputs(arguments, each.case)
+        if each.variables[0].kind == "SURFACE_FILE":
+            arguments.inputs.setdefault(each.files["DV_FILENAME"], "the surface file")
     if not arguments.quiet and config.ignored:
         count = len(config.ignored)
         words = f"{count} other key{'s' * (count > 1)} of SU2 in {arguments.case} not needed here"
@@ -70,7 +72,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
             f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
             f"{hints[0] if hints else 'name the mesh to deform'}"
         )
-    mesh = read(file, zone=config.case.zone, file_format=config.case.mesh_format)
+    mesh = read_mesh(config)
     return on_mesh(config, mesh), mesh
 
 
@@ -118,7 +120,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
         return surface, run_steps(arguments, case, mesh)
 
-    say("warning", warning_of_losses(output, first.displacer.boxed(mesh), kind))
+    say("warning", warning_of_losses(output, first.boxed(mesh), kind))
     with _relaxation_told(config):
         part, (surface, steps), said = convex_part(
             config, mesh, attempt, lambda each: each[1][-1].mesh
@@ -131,7 +133,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     layers = walls(steps[-1].mesh, mesh, case.walls(mesh.marker_names))
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    deformed = surface.displacer.boxed(steps[-1].mesh)
+    deformed = surface.boxed(steps[-1].mesh)
     write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
     if rated:
         write_qualities(rated, measured)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -49,6 +49,28 @@ def find_interfaces(
                 )
                 found.append(ZoneInterface(marker.name, zone, name, here, other))
     return tuple(found)
+
+
+def named_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[ZoneInterface, ...]:
+    """Return the interfaces of a mesh that are among pairs of ``names``; all without these."""
+    pairs = {frozenset(pair) for pair in zip(names[::2], names[1::2], strict=True)}
+    each = (one for one in mesh.interfaces if not pairs or {one.marker, one.other} in pairs)
+    return tuple(each)
+
+
+def apart_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence for each pair of ``names`` whose boundaries have no nodes in common."""
+    sentences = []
+    joined = {frozenset((one.marker, one.other)) for one in mesh.interfaces}
+    for pair in zip(names[::2], names[1::2], strict=True):
+        if frozenset(pair) not in joined:
+            one, other = (mesh.points[mesh.marker(name).nodes] for name in pair)
+            gap = nearest(other, one, np.inf, COINCIDENT * mesh.extent)[0].min(initial=np.inf)
+            sentences.append(
+                f"MARKER_ZONE_INTERFACE: {pair[0]} and {pair[1]} coincide nowhere, their nodes are "
+                f"{gap:.3g} apart or more; each moves by its own role, as beside a mixing plane"
+            )
+    return tuple(sentences)
 
 
 def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:

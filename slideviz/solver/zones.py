@@ -14,7 +14,12 @@ from slideviz.case.model import Case, Prescribed
 from slideviz.case.motion import displacements
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Note, SlidevizError
-from slideviz.mesh.interfaces import ROUNDING, torn_interfaces
+from slideviz.mesh.interfaces import (
+    ROUNDING,
+    apart_interfaces,
+    named_interfaces,
+    torn_interfaces,
+)
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
 from slideviz.mesh.zones import names_from, names_in, with_zones
 from slideviz.rbf.layers import KeptLayers
@@ -38,6 +43,7 @@ class InterfaceMotion:
 
     def __init__(self, case: Case, mesh: Mesh) -> None:
         self.mesh, self.roles = mesh, case.roles
+        self.interfaces = named_interfaces(mesh, case.interfaces)
         self.cases = list(zone_cases(case, mesh))
         """The case of each zone."""
         self.led = np.zeros(len(mesh.points), bool)
@@ -67,7 +73,7 @@ class InterfaceMotion:
                 and each.zone - 1 in zones
                 and self.roles.get(each.marker, "fixed") == "fixed"
                 and self.roles.get(each.other, "fixed") == "sliding"
-                for each in self.mesh.interfaces
+                for each in self.interfaces
             )
 
         return min(zones, key=led)
@@ -82,7 +88,7 @@ class InterfaceMotion:
     def _lead(
         self, index: int, shift: FloatArray, roles: Collection[str], zones: Collection[int]
     ) -> None:
-        for each in self.mesh.interfaces:
+        for each in self.interfaces:
             mine, other = (self.roles.get(name, "fixed") for name in (each.marker, each.other))
             moves = mine in roles and (mine == "moving" or shift[each.nodes].any())
             concerned = self._zone[each.marker] == index and each.zone - 1 in zones
@@ -128,7 +134,7 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
     """
     case = with_marker_names(case, mesh)
     require_valid(case, mesh)
-    motion = InterfaceMotion(case, mesh)
+    motion, apart = InterfaceMotion(case, mesh), apart_interfaces(mesh, case.interfaces)
     ahead, runs = set(range(len(motion.cases))), dict[int, list[Step]]()
     while moving := motion.moving(sorted(ahead)):
         index = motion.first(moving)
@@ -161,7 +167,7 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
             index=leader.index,
             total=len(longest),
             part=leader.part,
-            warnings=(*case.warnings, *_warnings(steps), *torn),
+            warnings=(*case.warnings, *apart, *_warnings(steps), *torn),
         )
         before = steps
 

@@ -155,6 +155,35 @@ def test_an_interface_follows_the_zone_that_moves_it(tmp_path, lead, steps):
     np.testing.assert_allclose(shift, np.tile(MOVE, (9, 1)), atol=0.002)  # the middle overshoots
 
 
+def test_named_pairs_are_the_interfaces(tmp_path):
+    mesh = pair(tmp_path)
+    case = sv.Case(roles={"BLOCK": "moving"}, motions=(sv.Translate("BLOCK", MOVE),))
+    known = last(case, mesh)
+    path = tmp_path / "c.cfg"
+    case.change(interfaces=("BLOCK", "2:core")).write(path)
+    assert "MARKER_ZONE_INTERFACE= ( BLOCK, 2:core )" in path.read_text()
+    named = sv.Case.read(path)
+    step = last(named, mesh)
+    assert np.array_equal(step.mesh.points, known.mesh.points)
+    assert not [text for text in step.warnings if "INTERFACE" in text or "fits" in text]
+    step = last(case.change(interfaces=("x_m", "core")), mesh)
+    assert np.array_equal(zones_of(step.mesh)[1].points, zones_of(mesh)[1].points)
+    said = " ".join(step.warnings)
+    assert "MARKER_ZONE_INTERFACE: x_m and core coincide nowhere, their nodes are 0.3" in said
+    assert "zone 2 no longer fits: BLOCK" in said
+    told = sv.Deformer(mesh, case.change(interfaces=("x_m", "core"))).warnings
+    assert any("coincide nowhere" in text for text in told)
+    with pytest.raises(CaseError, match=r"MARKER_ZONE_INTERFACE: .* has no marker 'cor'; did you"):
+        last(case.change(interfaces=("BLOCK", "cor")), mesh)
+    with pytest.raises(CaseError, match="MARKER_ZONE_INTERFACE: BLOCK are no pairs of boundaries"):
+        last(case.change(interfaces=("BLOCK",)), mesh)
+    path.write_text(path.read_text().replace(", 2:core", ""))
+    with pytest.raises(
+        CaseError, match=r"MARKER_ZONE_INTERFACE: '\( BLOCK \)' has 1 name; expected"
+    ):
+        sv.Case.read(path)
+
+
 def test_both_moved_apart_is_warned_of(tmp_path):
     mesh = pair(tmp_path)
     roles = dict.fromkeys(("BLOCK", "core"), "moving")

@@ -18,7 +18,8 @@ from slideviz.case.boxes import (
 from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.words import list_of
-from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config, problems_of_markers
+from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
+from slideviz.design.su2.on_mesh import problems_of_markers
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
@@ -246,12 +247,12 @@ class MovedBoxes:
         where = self._at_rest if undeformed else self.at_design
         return where.slope(self._places.index((place, part)))[:, : self.mesh.dim]
 
-    def boxed(self, mesh: Mesh) -> Mesh:
-        """Return a deformed mesh with its FFD boxes moved by the design."""
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return the boxes after the design, and whether their nodes are placed anew."""
         moved, renewed = self.at_design.moved(), self.at_design.uvw()
         for name, (places, uvw) in renewed.items():
             moved[name] = replace(moved[name], embedded=self._listed(moved[name], places, uvw))
-        return with_boxes(mesh, list(moved.values()), renewed=renewed)
+        return {name: (box, name in renewed) for name, box in moved.items()}
 
     def _listed(
         self, box: Box, places: IntArray, uvw: FloatArray

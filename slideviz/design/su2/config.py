@@ -12,19 +12,21 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.check import unknown_markers
 from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import NEW, Case
 from slideviz.case.values import YES_NO, integer, real
 from slideviz.case.words import list_of, number
-from slideviz.case.zones import with_marker_names
-from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
+from slideviz.design.su2.variables import (
+    NOTHING,
+    DesignVariable,
+    misspelt,
+    read_variables,
+    supported,
+)
 from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
 from slideviz.formats.table import FILE_FORMATS
-from slideviz.mesh.model import Mesh
-from slideviz.mesh.zones import spellings
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import ROLES, Role
@@ -139,6 +141,7 @@ WORDS = {
     "CONVEXITY_CHECK_DEPTH": "3",
     "OPT_LINE_SEARCH_BOUND": "1E6",
     "REF_LENGTH": "1.0",
+    "MULTIZONE_MESH": "YES",
 }
 """Other keys of one value or list, with SU2's defaults; except FFD_CONTINUITY, which is empty:
 control points are held only if the key is given."""
@@ -170,6 +173,8 @@ ALIKE, ALIKE_OWN = 0.9, 0.8
 """Similarity (``difflib``, 0 to 1) from which an unread key may be a mistyped one; the second for
 keys in `OWN`. SU2 has keys as similar as MARKER_INTERFACE (0.84 to MARKER_INTERNAL) and
 SOLUTION_FILENAME (0.895 to SOLUTION_ADJ_FILENAME)."""
+ZONE_KEYS = {"CONFIG_LIST", "MULTIZONE", "SOLVER"}
+"""Keys that are read where the first of them is there."""
 CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
 """Values of FFD_CONTINUITY, and how many planes of control points each holds at a side."""
 
@@ -186,6 +191,13 @@ class Su2Config:
     ignored: tuple[str, ...]  # the keys that are not read
     named: dict[str, str]  # for each marker with a role, the key that lists it
     present: frozenset[str]  # the keys that it has
+    zone: int | None = None  # of a configuration in CONFIG_LIST: the number of its zone, from 1
+    zones: tuple[Su2Config, ...] = ()
+    """The configurations in CONFIG_LIST; (): it has none, and is that of all zones of the mesh."""
+
+    def of_zone(self, index: int) -> Su2Config:
+        """Return the configuration that holds for a zone, from 0."""
+        return self.zones[index] if self.zones else self
 
     @property
     def source(self) -> Path:
@@ -226,8 +238,45 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     """Return what of a configuration concerns a deformation. Paths are those of the working folder.
 
     ``changes`` are values of SU2's keys that stand in place of those in the file. Raises CaseError
-    if it cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    if it cannot be read, or has mistakes: a line ``file:line: sentence`` for each. With
+    CONFIG_LIST the fields are those of the first zone, until `on_mesh` joins all.
     """
+    rows, problems, warnings = _rows(path)
+    given = {key: Entry(key, value, 0) for key, value in (changes or {}).items()}
+    rows |= given
+    if "CONFIG_LIST" not in rows:
+        return _config(path, rows, problems, warnings)
+    files = _listed_files(rows, problems)
+    if problems:
+        raise CaseError(listed(path, problems))
+    zones, faults = [], dict[str, None]()
+    # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
+    inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
+    for zone, file in enumerate(files, 1):
+        try:
+            own, problems, said = _rows(file)
+            zones.append(_config(file, inherited | own | given, problems, said, path, zone))
+        except CaseError as problem:
+            faults |= dict.fromkeys(str(problem).splitlines())
+    if not faults and not any("DV_KIND" in zone.present for zone in zones):
+        faults[f"{path}: DV_KIND is missing, in the files of CONFIG_LIST, too"] = None
+    if faults:
+        raise CaseError("\n".join(faults))
+    first, reader = zones[0], _Reader(rows, problems)
+    mesh, out = (reader.file(key, FILES[key]) for key in ("MESH_FILENAME", "MESH_OUT_FILENAME"))
+    strange = [key for key in rows if key not in _read_keys(rows)]
+    case = first.case.change(
+        source=path,
+        mesh_file=mesh if first.words["MULTIZONE_MESH"].upper() == "YES" else first.case.mesh_file,
+        mesh_out=_with_ending(out, first.case),
+        warnings=(*warnings, *_perhaps_ours(path, strange, rows)),
+    )
+    ignored = dict.fromkeys(key for zone in zones for key in zone.ignored)
+    return replace(first, case=case, zone=None, zones=tuple(zones), ignored=tuple(ignored))
+
+
+def _rows(path: Path) -> tuple[dict[str, Entry], list[Problem], tuple[str, ...]]:
+    """Return the keys of a configuration, with what is wrong, and warnings of reading the file."""
     text, warnings = read_text(path, "case file")
     entries, problems = entries_of(text, "%")  # other signs have a meaning in some values
     require_no_mesh(path, entries)
@@ -236,7 +285,32 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         if rows[entry.key] is not entry:
             sentence = f"{entry.key} is given again in line {rows[entry.key].line}; keep one"
             problems.append((entry.line, sentence))
-    rows |= {key: Entry(key, value, 0) for key, value in (changes or {}).items()}
+    return rows, problems, warnings
+
+
+def _listed_files(rows: dict[str, Entry], problems: list[Problem]) -> list[Path]:
+    """Return the configurations of zones in CONFIG_LIST; appends to ``problems``."""
+    entry, reader = rows["CONFIG_LIST"], _Reader(rows, problems)
+    if _word(rows, "MULTIZONE") != "YES" and _word(rows, "SOLVER") != "MULTIPHYSICS":
+        reader.note(entry, "needs MULTIZONE= YES, or SOLVER= MULTIPHYSICS: SU2 takes one zone else")
+    if "ZONE" in rows:
+        reader.note(entry, "is for all zones, and ZONE= for one; leave out one of the two")
+    try:
+        return [Path(word.text) for word in list_of(entry.value)]
+    except CaseError as problem:
+        reader.note(entry, str(problem))
+        return []
+
+
+def _config(
+    path: Path,
+    rows: dict[str, Entry],
+    problems: list[Problem],
+    warnings: tuple[str, ...],
+    main: Path | None = None,
+    zone: int | None = None,
+) -> Su2Config:
+    """Return a configuration; ``main`` has the keys with lines below 0, of a ``zone``."""
     reader = _Reader(rows, problems)
     case, markers = reader.case()
     notes = reader.warnings
@@ -245,22 +319,32 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     files = {key: reader.file(key, default) for key, default in FILES.items()}
     words = {key: reader.word(key, default) for key, default in WORDS.items()}
     reader.check(words)
+    if zone is None and "DV_KIND" not in rows:
+        sentence = (
+            f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
+        )
+        last = max((entry.line for entry in rows.values()), default=1)
+        problems.append((last, sentence + misspelt("DV_KIND", rows)))
     if problems:
-        raise CaseError(listed(path, problems))
+        own = [problem for problem in problems if problem[0] >= 0]
+        texts = [listed(path, own)] if own else []
+        if main is not None and len(own) < len(problems):
+            texts.append(listed(main, [(-line, said) for line, said in problems if line < 0]))
+        raise CaseError("\n".join(texts))
     case = case.change(
         source=path,
         mesh_file=files["MESH_FILENAME"],
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
         warnings=(*warnings, *notes, *_perhaps_ours(path, ignored, rows)),
     )
-    keys = frozenset(rows)
-    return Su2Config(case, markers, variables, files, words, ignored, reader.named, keys)
+    variables, keys = variables or NOTHING, frozenset(rows)
+    return Su2Config(case, markers, variables, files, words, ignored, reader.named, keys, zone)
 
 
-def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
+def _perhaps_ours(path: Path, ignored: Iterable[str], rows: dict[str, Entry]) -> list[str]:
     """Return a warning for each ignored key that resembles one that is read."""
     messages = []
-    for key in ignored:
+    for key in (key for key in ignored if rows[key].line >= 0):
         close = (
             get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN)
             or get_close_matches(key, _read_keys() - set(rows), n=1, cutoff=ALIKE)
@@ -284,7 +368,8 @@ def _one_letter_off(one: str, other: str) -> bool:
 def _read_keys(rows: Mapping[str, Entry] | None = None) -> set[str]:
     """Return the names of all keys that are read, of a configuration if it is given."""
     formats = {"MESH_FORMAT", "MESH_OUT_FORMAT"}
-    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats, *radial_keys(rows or {})}
+    zones = ZONE_KEYS if rows and "CONFIG_LIST" in rows else ()
+    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats, *zones, *radial_keys(rows or {})}
 
 
 def _with_ending(path: Path, case: Case) -> Path:
@@ -374,12 +459,13 @@ class _Reader:
         return formats
 
     def check(self, words: dict[str, str]) -> None:
-        """Note unsupported values, a missing DV_KIND, and keys that belong in a case file."""
+        """Note unsupported values, and keys that belong in a case file."""
         for key, allowed in (
             ("FFD_CONTINUITY", ("", *CONTINUITIES)),
             ("FFD_SYMMETRY_PLANE", ("YES", "NO")),
             ("FFD_INTPREV", ("YES", "NO")),
             ("CONVEXITY_CHECK", ("YES", "NO")),
+            ("MULTIZONE_MESH", ("YES", "NO")),
             ("DV_SENSITIVITY_FORMAT", ("SU2_NATIVE", "UNORDERED_ASCII")),
         ):
             if words[key].upper() not in allowed:
@@ -404,77 +490,3 @@ class _Reader:
                     raise CaseError(f"{shown(words[key])} is no {needed} above {least:g}")
             except CaseError as problem:
                 self.note(self.rows[key], str(problem))
-        if "CONFIG_LIST" in self.rows:
-            sentence = (
-                "CONFIG_LIST has a configuration for each zone, but one is read at a time: name "
-                "all boundaries in one, as 1:blade, or take each one with --set ZONE=1 and so on"
-            )
-            self.problems.append((self.rows["CONFIG_LIST"].line, sentence))
-        elif "DV_KIND" not in self.rows:
-            sentence = (
-                f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
-            )
-            close = misspelt("DV_KIND", self.rows)
-            self.problems.append(
-                (max((e.line for e in self.rows.values()), default=1), sentence + close)
-            )
-
-
-PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
-"""Keys whose markers are ignored if the mesh does not have them."""
-
-
-def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
-    """Return the configuration without markers that the mesh lacks, with a warning for each key.
-
-    A periodic pair of which one is missing stays, and so does all that would move where all of it
-    is missing: `problems_of_markers` tells them. Boundaries get the names that they have in the
-    mesh, where they are written as ``1:blade``.
-    """
-    known = spellings(mesh)
-    config = replace(
-        config,
-        case=with_marker_names(config.case, mesh),
-        markers=tuple(known.get(name, name) for name in config.markers),
-        named={known.get(name, name): key for name, key in config.named.items()},
-    )
-    lacking = [name for name in config.named if name not in mesh.marker_names]
-    passed = {name: key for name in lacking if (key := config.named[name]) in PASSED_OVER}
-    roles = config.case.roles
-    if sum(roles[name] == "periodic" for name in passed) % 2:
-        # Without its partner, the other one could not repeat.
-        passed = {name: key for name, key in passed.items() if roles[name] != "periodic"}
-    markers = tuple(name for name in config.markers if name not in passed)
-    if not markers:
-        passed = {name: key for name, key in passed.items() if name not in config.markers}
-        markers = config.markers
-    named = {name: key for name, key in config.named.items() if name not in passed}
-    left = {name: role for name, role in roles.items() if name not in passed}
-    case = config.case.change(
-        roles=left, warnings=(*config.case.warnings, *_warnings(config, mesh, passed))
-    )
-    if passed and "periodic" not in left.values():
-        case = case.change(periodic="none")
-        if "sliding" not in left.values():
-            case = case.change(sliding="none")
-    return replace(config, case=case, named=named, markers=markers)
-
-
-def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> list[str]:
-    """Return that nothing would move, if some are ``needed``, or each that the mesh lacks."""
-    if needed and not config.markers:
-        return [f"{config.source}: DV_MARKER names no boundary; nothing would move"]
-    return [f"{config.source}: {text}" for text in unknown_markers(mesh, config.named)]
-
-
-def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:
-    """Return a warning for each key with ignored markers; ``passed`` maps these to keys."""
-    messages = []
-    for key in dict.fromkeys(passed.values()):
-        names = [name for name in passed if passed[name] == key]
-        close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
-        messages.append(
-            f"{config.source}: {key}: {mesh.name} has no marker {' or '.join(map(repr, names))}: "
-            f"ignored, as in SU2{close}"
-        )
-    return messages

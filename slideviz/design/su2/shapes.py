@@ -13,6 +13,7 @@ from slideviz.case.motion_text import require_peak
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
+from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
@@ -284,9 +285,9 @@ class Shapes:
     def _factor(self, formula: Formula) -> float:
         return self.config.relaxation if formula.relaxed else 1.0
 
-    def boxed(self, mesh: Mesh) -> Mesh:
-        """Return the mesh unchanged: these variables do not move FFD boxes."""
-        return mesh
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return none: these variables do not move FFD boxes."""
+        return {}
 
 
 def _shown(point: FloatArray) -> str:

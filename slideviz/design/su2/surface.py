@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise, starmap
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -17,11 +19,13 @@ from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Prescribed
 from slideviz.case.zones import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
-from slideviz.design.su2.config import Su2Config, problems_of_markers
+from slideviz.design.su2.config import Su2Config
+from slideviz.design.su2.on_mesh import joined, markers_of, points_of, problems_of_markers
 from slideviz.design.su2.shapes import Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
 from slideviz.errors import CaseError, DeformError, Note, SlidevizError
-from slideviz.ffd.section import boxes_of
+from slideviz.ffd.box import Box
+from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
@@ -34,8 +38,15 @@ Attempt = TypeVar("Attempt")
 
 def scaled(config: Su2Config, part: float) -> Su2Config:
     """Return a configuration with ``part`` of its design."""
+    if config.zones:
+        zones = (scaled(z, part) if _is_checked(z) else z for z in config.zones)
+        return joined(config, tuple(zones))
     variables = tuple(_scaled(variable, part) for variable in config.variables)
     return replace(config, variables=variables)
+
+
+def _is_checked(config: Su2Config) -> bool:
+    return config.words["CONVEXITY_CHECK"].upper() == "YES"
 
 
 def _scaled(variable: DesignVariable, part: float) -> DesignVariable:
@@ -56,7 +67,7 @@ def convex_part(
     ``mesh``: the undeformed mesh. ``attempt`` and ``deformed``: deforms the mesh by a
     configuration; returns the mesh of what that returned.
     """
-    if config.words["CONVEXITY_CHECK"].upper() != "YES":
+    if not _is_checked(config):
         return 1.0, attempt(config), ()
     least, kind = quality(mesh).inverted, config.variables[0]
     impossible: list[CaseError | DeformError] = []
@@ -141,9 +152,9 @@ class ListedPositions:
         del place, part, undeformed
         return np.zeros((len(self.nodes), self.mesh.dim))
 
-    def boxed(self, mesh: Mesh) -> Mesh:
-        """Return the mesh: its FFD boxes stay."""
-        return mesh
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return none: FFD boxes stay."""
+        return {}
 
 
 def read_positions(
@@ -202,8 +213,78 @@ class Displacer(Protocol):
     def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
         """Return the derivative (m, d) with respect to a value; see `MovingSurface.slope`."""
 
-    def boxed(self, mesh: Mesh) -> Mesh:
-        """Return a deformed mesh with its FFD boxes moved by the design."""
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return the FFD boxes that the design moves, and whether their nodes are placed anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneDisplacers:
+    """The displacers of zones with a configuration each, as one (a `Displacer`)."""
+
+    config: Su2Config
+    mesh: Mesh
+    nodes: IntArray
+    zones: tuple[MovingSurface, ...]
+
+    @cached_property
+    def _rows(self) -> list[slice]:
+        """The rows of the nodes of each zone."""
+        ends = np.cumsum([0, *(len(zone.nodes) for zone in self.zones)]).tolist()
+        return list(starmap(slice, pairwise(ends)))
+
+    @cached_property
+    def _first(self) -> list[int]:
+        """The place of the first variable of each zone among those of all."""
+        lists = dict.fromkeys(zone.config.variables for zone in self.zones)
+        ends = accumulate(map(len, lists), initial=0)
+        first = dict(zip(lists, ends, strict=False))
+        return [first[zone.config.variables] for zone in self.zones]
+
+    def _having(self, place: int) -> list[tuple[int, int]]:
+        """Return the zones that have a variable, and its place there."""
+        lengths = [len(zone.config.variables) for zone in self.zones]
+        each = enumerate(zip(self._first, lengths, strict=True))
+        return [(k, place - at) for k, (at, count) in each if at <= place < at + count]
+
+    @property
+    def idle(self) -> tuple[bool, ...]:
+        """Return for each variable whether it has no effect in any zone."""
+        places = range(len(self.config.variables))
+        return tuple(all(self.zones[k].idle[at] for k, at in self._having(p)) for p in places)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return those of all zones, each once."""
+        return tuple(dict.fromkeys(text for zone in self.zones for text in zone.warnings))
+
+    @property
+    def inside(self) -> dict[str, int]:
+        """Return how many nodes of all zones are in each box."""
+        counts: Counter[str] = Counter()
+        for zone in self.zones:
+            counts.update(zone.displacer.inside)
+        return dict(counts)
+
+    def displacement(self) -> FloatArray:
+        """Return the displacement (m, d) of the nodes of all zones."""
+        return np.concatenate([zone.displacement for zone in self.zones])
+
+    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
+        """Return the derivative (m, d) with respect to a value, in all zones that have it."""
+        out = np.zeros((len(self.nodes), self.mesh.dim))
+        for k, at in self._having(place):
+            out[self._rows[k]] = self.zones[k].slope(at, part, undeformed)
+        return out
+
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return the boxes of all zones, each as the first zone moves it, as in SU2."""
+        out: dict[str, tuple[Box, bool]] = {}
+        for zone in self.zones:
+            for name, (box, anew) in zone.displacer.moved_boxes().items():
+                first, before = out.get(name, (box, False))
+                mine = {k: v for k, v in box.embedded.items() if k in zone.config.markers}
+                out[name] = replace(first, embedded={**first.embedded, **mine}), anew or before
+        return out
 
 
 DISPLACERS: dict[Group, Callable[[Su2Config, Mesh, IntArray], Displacer]] = {
@@ -227,6 +308,7 @@ class MovingSurface:
     nodes: IntArray  # (m,): of all moving boundaries, or of the mesh (``*_GRID``), ascending
     displacer: Displacer
     warnings: tuple[str, ...]
+    zones: tuple[MovingSurface, ...] = ()  # that of each, with CONFIG_LIST
 
     @property
     def idle(self) -> tuple[bool, ...]:
@@ -275,10 +357,40 @@ class MovingSurface:
         points[self.nodes] += self.displacement
         return self.mesh.with_points(points)
 
+    def boxed(self, mesh: Mesh) -> Mesh:
+        """Return a deformed mesh with its FFD boxes moved by the design."""
+        moved = self.displacer.moved_boxes()
+        if not moved:
+            return mesh
+        renewed = [name for name, (_, anew) in moved.items() if anew]
+        return with_boxes(mesh, [box for box, _ in moved.values()], renewed=renewed)
+
     def case(self) -> Case:
         """Return the case with this displacement as its motion."""
+        if not self.zones:
+            return self._case()
+        cases = [zone._case() for zone in self.zones]
+        settings = {zone.zone: zone.case for zone in self.config.zones}
+        settings |= {zone.config.zone: case for zone, case in zip(self.zones, cases, strict=True)}
+        moved = [one for case in cases for one in case.motions if isinstance(one, Prescribed)]
+        motion = Prescribed(
+            np.concatenate([one.nodes for one in moved]),
+            np.concatenate([one.vectors for one in moved]),
+        )
+        warnings = *self.config.case.warnings, *self.warnings
+        if self.moves_whole_mesh:
+            warnings = *warnings, *torn_interfaces(self.mesh, self.moved().points)
+        return self.config.case.change(
+            roles={name: role for each in settings.values() for name, role in each.roles.items()},
+            motions=(motion,),
+            zone_settings=tuple(settings.values()),
+            warnings=warnings,
+        )
+
+    def _case(self) -> Case:
         case = self.config.case
-        others = set(self.mesh.marker_names) - set(self.config.markers)
+        names = [marker.name for marker in markers_of(self.config, self.mesh)]
+        others = set(names) - set(self.config.markers)
         moving = (each for each in self.config.variables if not each.ignored)
         if (
             not others
@@ -289,13 +401,14 @@ class MovingSurface:
             case = case.change(kernel="thin-plate")
         nodes, vectors, warnings = self.nodes, self.displacement, self.warnings
         if self.moves_whole_mesh or not self.config.markers:
-            every = dict.fromkeys(self.mesh.marker_names, "moving")
+            every = dict.fromkeys(names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
         if self.moves_whole_mesh:  # the mesh is moved already
-            listed = [marker.nodes for marker in self.mesh.markers]
+            listed = [marker.nodes for marker in markers_of(self.config, self.mesh)]
             nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
             vectors = np.zeros((len(nodes), self.mesh.dim))
-            warnings = (*warnings, *torn_interfaces(self.mesh, self.moved().points))
+            if self.config.zone is None:
+                warnings = (*warnings, *torn_interfaces(self.mesh, self.moved().points))
         motions = (Prescribed(nodes, vectors),)
         return case.change(motions=motions, warnings=(*case.warnings, *warnings))
 
@@ -314,6 +427,8 @@ def _overflow_as_case_error(config: Su2Config) -> Iterator[None]:
 
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     """Return the moving boundaries of a configuration, and what moves them; or CaseError."""
+    if config.zones:
+        return _of_zones(config, mesh)
     group = config.variables[0].group
     problems = problems_of_markers(config, mesh, needed=group not in ("grid", "nothing"))
     if group == "ffd":
@@ -321,7 +436,8 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     raise_all(tuple(problems))
     listed = [mesh.marker(name).nodes for name in config.markers]
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
-    nodes = np.arange(len(mesh.points)) if group == "grid" else nodes
+    at = points_of(config, mesh)
+    nodes = np.arange(at.start, at.stop) if group == "grid" else nodes
     with _overflow_as_case_error(config):
         displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
@@ -329,6 +445,16 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
         sentence = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
         left.append(f"{sentence}; they do not fit where the axis or the vector of its period moves")
     return MovingSurface(config, mesh, nodes, displacer, (*displacer.warnings, *left))
+
+
+def _of_zones(config: Su2Config, mesh: Mesh) -> MovingSurface:
+    """Return the moving boundaries of the zones of a CONFIG_LIST."""
+    moving = [zone for zone in config.zones if zone.variables[0].group != "nothing"]
+    moving = moving or [*config.zones[:1]]
+    zones = tuple(make_surface(zone, mesh) for zone in moving)
+    nodes = np.concatenate([np.empty(0, np.int64), *(zone.nodes for zone in zones)])
+    displacer = ZoneDisplacers(config, mesh, nodes, zones)
+    return MovingSurface(config, mesh, nodes, displacer, displacer.warnings, zones)
 
 
 def at_rest(case: Case, mesh: Mesh) -> Step:

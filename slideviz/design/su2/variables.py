@@ -122,6 +122,9 @@ class DesignVariable:
         return dict(zip(names, self.numbers, strict=True)).get(name, default)
 
 
+NOTHING = (DesignVariable("NO_DEFORMATION", (0.0,)),)
+
+
 def supported() -> list[str]:
     """Return the names of the kinds that are supported."""
     return [name for name, kind in KINDS.items() if not kind.refused]
@@ -171,7 +174,8 @@ def read_variables(
 
 def misspelt(key: str, rows: Mapping[str, Entry]) -> str:
     """Return where a key that is missing may stand misspelt; empty if no key resembles it."""
-    close = get_close_matches(key, rows, n=1, cutoff=ALIKE)
+    here = [name for name, row in rows.items() if row.line >= 0]
+    close = get_close_matches(key, here, n=1, cutoff=ALIKE)
     return f"; did you mean it by {close[0]} in line {rows[close[0]].line}?" if close else ""
 
 

@@ -44,7 +44,8 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     """
     zones = zones_of(mesh)
     document = mesh.origin
-    if all(_only_points_differ(zone) for zone in zones):
+    of_one_file = len({zone.source for zone in zones}) == 1
+    if of_one_file and all(_only_points_differ(zone) for zone in zones):
         for zone in zones:
             check_points(zone)
         yield from _patched(zones)

@@ -1,0 +1,213 @@
+"""Configurations of SU2 on their mesh: boundaries that it lacks, and CONFIG_LIST for its zones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import chain
+
+from slideviz.case.check import raise_all, unknown_markers
+from slideviz.case.zones import renamed, with_marker_names
+from slideviz.design.su2.config import ROLE_KEYS, Su2Config
+from slideviz.design.su2.variables import NOTHING
+from slideviz.errors import CaseError, nearest
+from slideviz.formats.files import read
+from slideviz.mesh.model import Marker, Mesh
+from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
+
+PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
+"""Keys whose markers are ignored if the mesh does not have them."""
+_NO_MARKER = "{}: DV_MARKER names no boundary; nothing would move"
+UNMIXED = {"boxes", "grid"}  # groups of variables that all zones have, or none
+
+
+def read_mesh(config: Su2Config) -> Mesh:
+    """Return the mesh of a configuration: of all zones, those of several files, too.
+
+    With MULTIZONE_MESH= NO each zone is the mesh that its configuration names.
+    """
+    file, form = config.case.mesh_file, config.case.mesh_format
+    assert file is not None
+    if config.words["MULTIZONE_MESH"].upper() == "YES" or not config.zones:
+        raise_all(
+            tuple(
+                f"{each.source}: MESH_FILENAME= {each.case.mesh_file}, and with MULTIZONE_MESH= "
+                f"YES all zones are in one file, {file}; leave the key out there, or write NO"
+                for each in config.zones
+                if each.case.mesh_file != file
+            )
+        )
+        return read(file, zone=config.case.zone, file_format=form)
+    meshes = []
+    for each in config.zones:
+        assert each.case.mesh_file is not None
+        mesh = read(each.case.mesh_file, file_format=each.case.mesh_format)
+        if mesh.zones > 1:
+            raise CaseError(
+                f"{each.source}: {mesh.name} has {mesh.zones} zones, and with MULTIZONE_MESH= NO "
+                "it is one; write YES, or name a file for each zone"
+            )
+        meshes.append(replace(mesh, zone=each.zone, zones=len(config.zones)))
+    return join_zones(meshes)
+
+
+def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
+    """Return the configuration without markers that the mesh lacks, with a warning for each key.
+
+    A periodic pair of which one is missing stays, and so does all that would move where all of it
+    is missing: `problems_of_markers` tells them. Boundaries get the names that they have in the
+    mesh, where they are written as ``1:blade``; those in CONFIG_LIST, which are of one zone,
+    always. Raises CaseError if CONFIG_LIST is not one for each zone.
+    """
+    if not config.zones:
+        return _without_missing(_renamed(config, spellings(mesh)), mesh)
+    if len(config.zones) != mesh.zones:
+        raise CaseError(
+            f"{config.source}: CONFIG_LIST has {len(config.zones)} configurations, and {mesh.name} "
+            f"{mesh.zones} zones; give one for each"
+        )
+    zones = tuple(_without_missing(_in_zone(each, mesh), mesh) for each in config.zones)
+    if len(zones) == 1:
+        case = zones[0].case.change(source=config.source, mesh_out=config.case.mesh_out)
+        return replace(zones[0], case=case, zone=None)
+    still = tuple(map(_as_still, zones))
+    if {each.variables for each in still} == {NOTHING} != {each.variables for each in zones}:
+        raise CaseError(_NO_MARKER.format(config.source))
+    return joined(replace(config, case=with_marker_names(config.case, mesh)), still)
+
+
+def _renamed(
+    config: Su2Config, names: Mapping[str, str], without: frozenset[str] = frozenset()
+) -> Su2Config:
+    """Return a configuration with other names of boundaries, and without some."""
+    case = config.case.change(
+        roles={name: role for name, role in config.case.roles.items() if name not in without},
+        limits=tuple(each for each in config.case.limits if each.marker not in without),
+    )
+    return replace(
+        config,
+        case=renamed(case, names),
+        markers=tuple(names.get(name, name) for name in config.markers if name not in without),
+        named={names.get(n, n): key for n, key in config.named.items() if n not in without},
+    )
+
+
+def _in_zone(config: Su2Config, mesh: Mesh) -> Su2Config:
+    """Return the configuration of a zone without boundaries of others, named as in the mesh."""
+    assert config.zone is not None
+    if not mesh.zone_parts:
+        return config
+    part = mesh.zone_parts[config.zone - 1]
+    ours = {file: name for name, file in names_in(mesh, part).items()}
+    ours |= {numbered(config.zone, file): name for file, name in ours.items()}
+    files = {name for other in mesh.zone_parts for name in other.mesh.marker_names}
+    return _renamed(config, ours, frozenset({*files, *spellings(mesh)} - ours.keys()))
+
+
+def _as_still(config: Su2Config) -> Su2Config:
+    """Return a configuration as one that moves nothing, if it does not, as in SU2."""
+    group = config.variables[0].group
+    if group != "nothing" and (config.markers or group == "grid"):
+        return config
+    roles = {name: role for name, role in config.case.roles.items() if role != "moving"}
+    case = config.case.change(roles=roles)
+    return replace(config, case=case, markers=(), variables=NOTHING)
+
+
+def joined(config: Su2Config, zones: tuple[Su2Config, ...]) -> Su2Config:
+    """Return the configuration of all zones.
+
+    Zones that have the same design variables share them, as in SU2.
+    """
+    moving = [each for each in zones if each.variables[0].group != "nothing"] or [*zones[:1]]
+    groups = {each.variables[0].group: each for each in moving}
+    if len(groups) > 1 and groups.keys() & UNMIXED:
+        kinds = " and ".join(each.variables[0].kind for each in groups.values())
+        raise CaseError(f"{config.source}: zones have {kinds}, which need a run each; make two")
+    checked = [each for each in moving if each.words["CONVEXITY_CHECK"].upper() == "YES"]
+    boxes = {
+        box: degrees
+        for each in zones
+        for box, degrees in zip(each.case.ffd_boxes, each.case.ffd_degrees, strict=False)
+    }
+    case = moving[0].case.change(
+        source=config.source,
+        mesh_file=config.case.mesh_file,
+        mesh_out=config.case.mesh_out,
+        interfaces=config.case.interfaces,
+        roles={name: role for each in zones for name, role in each.case.roles.items()},
+        limits=tuple(dict.fromkeys(limit for each in zones for limit in each.case.limits)),
+        ffd_boxes=tuple(boxes),
+        ffd_degrees=tuple(boxes.values()),
+        warnings=tuple(
+            dict.fromkeys(
+                (*config.case.warnings, *(text for each in zones for text in each.case.warnings))
+            )
+        ),
+    )
+    return replace(
+        config,
+        case=case,
+        markers=tuple(name for each in moving for name in each.markers),
+        variables=tuple(chain(*dict.fromkeys(each.variables for each in moving))),
+        words=(checked or moving)[0].words,
+        named={name: key for each in zones for name, key in each.named.items()},
+        zones=zones,
+    )
+
+
+def _without_missing(config: Su2Config, mesh: Mesh) -> Su2Config:
+    lacking = [name for name in config.named if name not in mesh.marker_names]
+    passed = {name: key for name in lacking if (key := config.named[name]) in PASSED_OVER}
+    roles = config.case.roles
+    if sum(roles[name] == "periodic" for name in passed) % 2:
+        # Without its partner, the other one could not repeat.
+        passed = {name: key for name, key in passed.items() if roles[name] != "periodic"}
+    markers = tuple(name for name in config.markers if name not in passed)
+    if not markers:
+        passed = {name: key for name, key in passed.items() if name not in config.markers}
+        markers = config.markers
+    named = {name: key for name, key in config.named.items() if name not in passed}
+    left = {name: role for name, role in roles.items() if name not in passed}
+    case = config.case.change(
+        roles=left, warnings=(*config.case.warnings, *_warnings(config, mesh, passed))
+    )
+    if passed and "periodic" not in left.values():
+        case = case.change(periodic="none")
+        if "sliding" not in left.values():
+            case = case.change(sliding="none")
+    return replace(config, case=case, named=named, markers=markers)
+
+
+def points_of(config: Su2Config, mesh: Mesh) -> slice:
+    """Return the points of the mesh that a configuration is of: of its zone, or all."""
+    if config.zone is None or not mesh.zone_parts:
+        return slice(0, len(mesh.points))
+    return mesh.zone_parts[config.zone - 1].points
+
+
+def markers_of(config: Su2Config, mesh: Mesh) -> tuple[Marker, ...]:
+    """Return the boundaries of the zone that a configuration is of, or all."""
+    if config.zone is None or not mesh.zone_parts:
+        return mesh.markers
+    return mesh.markers[mesh.zone_parts[config.zone - 1].markers]
+
+
+def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> list[str]:
+    """Return that nothing would move, if some are ``needed``, or each that the mesh lacks."""
+    if needed and not config.markers:
+        return [_NO_MARKER.format(config.source)]
+    return [f"{config.source}: {text}" for text in unknown_markers(mesh, config.named)]
+
+
+def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:
+    """Return a warning for each key with ignored markers; ``passed`` maps these to keys."""
+    messages = []
+    for key in dict.fromkeys(passed.values()):
+        names = [name for name in passed if passed[name] == key]
+        close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
+        messages.append(
+            f"{config.source}: {key}: {mesh.name} has no marker {' or '.join(map(repr, names))}: "
+            f"ignored, as in SU2{close}"
+        )
+    return messages
