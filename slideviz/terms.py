@@ -655,7 +655,8 @@ SHOWN: dict[Shown, ShownTerm] = {
     "edges": ShownTerm("Mesh edges", "Draw the edges of the cells.", shortcut="E", at_first=True),
     "undeformed": ShownTerm(
         "Undeformed",
-        "Draw the undeformed boundaries as a ghost.",
+        "Draw the undeformed boundaries as a ghost; in a flat view, the outline of the undeformed "
+        "section.",
         standalone="Undeformed boundaries",
         shortcut="U",
     ),

@@ -125,7 +125,7 @@ PERIODIC_ROWS = (
         "span",
         "Hub and shroud, between which the span of a machine goes from 0 to 1. AUTO takes the "
         "boundaries whose names contain hub, and shroud or casing.",
-        label="Span",
+        label="Hub and shroud",
         run_label="span {}",
     ),
 )

@@ -22,6 +22,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
+    QuietBar,
     WrappingRow,
     as_widget,
     hint_label,
@@ -31,6 +32,7 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.icons import icon, logo, svg_pixmap
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
+from slideviz.session.jobs import JobProgress
 
 WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read
 RECENT = 5  # number of recent files that are listed
@@ -38,6 +40,7 @@ COLUMNS = 4  # most cards of samples in a row
 NARROWEST = 126  # least width of a card in pixels, for its name
 SIZE = (152, 96)  # width and height of a card's picture in pixels, at a device pixel ratio of 1
 TRIED = "passage"  # the sample that is deformed by one click
+HINT = "Files can also be dropped anywhere on this window."
 TRY = "Try it: deform a blade passage"
 """The text of the button for that; only its beginning where the page is narrow."""
 
@@ -63,12 +66,16 @@ class StartPage(QScrollArea):
         self._outer = in_row(None, self.page, None)
         self._outer.setStretchFactor(self.page, 100)
         self.setWidget(as_widget(self._outer))
-        self.hint = hint_label("Files can also be dropped anywhere on this window.")
+        self.hint = hint_label(HINT)
+        self.bar = QuietBar()
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(6)
+        self.bar.hide()
         self._recent = in_column(spacing=0)
         self.recent_buttons: list[QPushButton] = []
         self.sample_buttons: dict[str, QToolButton] = {}
         buttons = self._make_buttons(TRIED in samples)
-        head = (self._make_head(), 10, buttons, self.hint, self._recent)
+        head = (self._make_head(), 10, buttons, self.hint, self.bar, self._recent)
         cards = (8, _heading("Sample cases"), self._make_cards(samples)) if samples else ()
         column = in_column(None, *head, *cards, None, spacing=6, on=self.page)
         column.setStretch(0, 2)
@@ -142,6 +149,19 @@ class StartPage(QScrollArea):
         line = "#aab4c0" if letters.lightness() > 128 else "#76828f"
         for name, button in self.sample_buttons.items():
             button.setIcon(card(name, line))
+
+    def set_busy(self, what: str) -> None:
+        """Show the name of the running job, which opens a mesh; an empty text: none runs."""
+        self.hint.setText(what or HINT)
+        self.bar.setVisible(bool(what))
+        self.bar.setRange(0, 0)
+
+    def show_progress(self, progress: JobProgress) -> None:
+        if not self.bar.isHidden():
+            self.hint.setText(progress.text)
+            part = progress.fraction
+            self.bar.setRange(0, 0 if part is None else 1000)
+            self.bar.setValue(round(1000 * (part or 0.0)))
 
     # Recent files ----------------------------------------------------------------------
     def show_recent(self, paths: list[Path]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
@@ -151,10 +152,11 @@ class MainWindow(Services):
 
     def _connect(self) -> None:
         running, panel = self.running, self.run_panel
-        running.began.connect(panel.set_busy)
-        running.progressed.connect(panel.show_progress)
+        for shows in (panel, self.start):
+            running.began.connect(shows.set_busy)
+            running.progressed.connect(shows.show_progress)
+            running.ended.connect(partial(shows.set_busy, ""))
         running.cancelling.connect(panel.show_cancelling)
-        running.ended.connect(lambda: panel.set_busy(""))
         # The deformed mesh may be out of view.
         running.ended.connect(self.viewing.refit)
         for change in (running.began, running.ended):

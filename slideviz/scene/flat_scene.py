@@ -22,7 +22,7 @@ from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import Label
 from slideviz.session.colors import with_drawable_colors
 from slideviz.session.passages import Period, keeps, matrices
-from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
+from slideviz.session.section_cuts import NO_POLYGONS, Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
@@ -52,7 +52,10 @@ class FlatScene:
         self._shown = PolygonActor(self.stage, "flat")
         self._instances = Instances(self.stage, self._shown)
         self._mark = PolygonActor(self.stage, "marked", pickable=False)
-        self._style_mark()
+        self._undeformed = PolygonActor(self.stage, "undeformed", pickable=False)
+        self._outlines = Instances(self.stage, self._undeformed)
+        self._undeformed_of: tuple[object, ...] = ()
+        self._style_lines()
         self._period = Period()
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
@@ -82,6 +85,7 @@ class FlatScene:
         cells = self._shown.polygons.cells
         self._shown.color(self.stage.values_of(session, cells, frame) if by_value else None)
         self._style(section)
+        self._draw_undeformed(section)
         self._draw_neighbours(section)
         self._draw_mark()
 
@@ -137,11 +141,29 @@ class FlatScene:
                 if pair is not None and keeps(section, matrix):
                     by_passage[number] = flat_matrix(section, pair, number, matrix)
         self._instances.show(by_passage)
+        self._outlines.show(by_passage if self._undeformed_of else {})
 
-    def _style_mark(self) -> None:
-        prop, mapper = self._mark.actor.prop, self._mark.mapper
+    def _draw_undeformed(self, section: Section) -> None:
+        """Draw the outline of the section of the undeformed mesh, if it is shown."""
+        session, mesh = self.session, self.session.mesh
+        shown = "undeformed" in session.view.drawn and session.view.frame > 0
+        key = (mesh, section) if shown and not session.in_file else ()
+        if key != self._undeformed_of:
+            self._undeformed_of, lines = key, NO_POLYGONS
+            if key and mesh is not None:
+                ahead = self._ahead(section, session)
+                # Not `Cuts.of`, which caches those of the shown step.
+                cut = self.cuts.cutter(mesh).cut(mesh.points, section)
+                lines = section.shape.flatten(section, cut, ahead, ahead).outline()
+            self._undeformed.show(lines)
+        self._undeformed.actor.prop.color = self.stage.scheme.text
+
+    def _style_lines(self) -> None:
+        prop = self._mark.actor.prop
         prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOR, 4.0
-        draw_in_front(mapper)
+        self._undeformed.actor.prop.line_width = 2.0
+        for one in (self._mark, self._undeformed):
+            draw_in_front(one.mapper)
 
     def _draw_mark(self) -> None:
         assert self.polygons is not None
@@ -154,7 +176,8 @@ class FlatScene:
     def summary(self) -> str:
         """Return a sentence with the number of cells cut, their min, mean and inverted ones.
 
-        With a threshold, it is about the cells within it.
+        With a threshold, it is about the cells within it; the outline of the undeformed section is
+        explained.
         """
         if self.polygons is None or self._all is None or not len(self._all):
             awaited = (
@@ -178,7 +201,8 @@ class FlatScene:
             frame.quality.status == INVERTED,
             self.session.color_range,
         )
-        return paint.sentence(cells) if only is None else paint.sentence(cells, every, only.words)
+        more = "; line: undeformed" if self._undeformed_of else ""
+        return paint.sentence(cells, *(() if only is None else (every, only.words))) + more
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None."""

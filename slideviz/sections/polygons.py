@@ -91,6 +91,19 @@ class Polygons:
         corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ranges(sizes)]
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
+    def outline(self) -> Polygons:
+        """Return the lines, of two corners, that only one polygon has: around all of them."""
+        start, after = self.connectivity, np.roll(self.connectivity, -1)
+        after[self.offsets[1:] - 1] = start[self.offsets[:-1]]
+        low, high = np.minimum(start, after), np.maximum(start, after)
+        _, first, count = np.unique(
+            low * len(self.points) + high, return_index=True, return_counts=True
+        )
+        lines = np.sort(first[count == 1])
+        corners = np.column_stack([start[lines], after[lines]]).ravel()
+        cells = np.repeat(self.cells, self.sizes)[lines]
+        return Polygons(self.points, offsets_of(np.full(len(lines), 2)), corners, cells)
+
     def with_last(self, chosen: np.ndarray) -> Polygons:
         """Return all polygons, those of the mask ``chosen`` (q,) last: they are drawn on top."""
         return self.take(np.argsort(chosen, kind="stable")) if chosen.any() else self

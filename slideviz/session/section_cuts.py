@@ -25,7 +25,7 @@ from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
 from slideviz.session.large import block_frame
 from slideviz.session.results import StepFrame
-from slideviz.session.saving import with_walls
+from slideviz.session.saving import bound_sections
 from slideviz.session.state import Session
 from slideviz.streaming.source import CellBlock, FileSource, cut_cells
 from slideviz.system.threads import Tick, in_parts
@@ -144,8 +144,8 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     """Return a new section of the shape ``kind``, about through the middle of the mesh shown.
 
     Shapes with an axis get that of the rotational ``pair``, else in 3D that of the case, and in 2D
-    a centre in the middle of the moving boundaries. Raises CaseError or MeshError if a section of
-    constant span has no hub and shroud.
+    a centre in the middle of the moving boundaries. A section of constant span cuts nothing where
+    there are no hub and shroud.
     """
     mesh, case, shape = session.mesh, session.case, SHAPES[kind]
     assert mesh is not None
@@ -158,7 +158,7 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     at, way = triple(np.asarray(origin)), triple(np.asarray(axis))
     section = Section.of(kind, at, way, shape.terms.size.usual if shape.terms.size else 0.0)
     section = replace(section, whole_cells=mesh.dim == 2)
-    section = with_walls(section, mesh, case, () if pair is None else (pair,))
+    [section] = bound_sections([section], mesh, case, () if pair is None else (pair,))
     return shape.first(section, _shown_points(session))
 
 

@@ -513,6 +513,34 @@ def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plott
     assert flat.summary == f"none of {len(every)} cells cut is shown: inverted cells"
 
 
+def test_the_undeformed_section_is_an_outline_in_the_flat_view(scene, flat_plotter, stator):
+    section = Section("cylinder", radius=0.27)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), passages=1)
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, section)
+    before = flat.polygons
+    turned = stepped(session, transformed(stator.mesh.points, pair_matrix(0.01)))
+    flat.update(turned, section)
+    line = flat_plotter.actors["undeformed"]
+    assert not line.visibility
+    shown = changes.set_view(turned, undeformed=True)
+    flat.update(shown, section)
+    assert line.visibility
+    assert flat.summary.endswith("cells cut; line: undeformed")
+    corners = line.mapper.dataset.points
+    assert np.ptp(corners, axis=0)[:2] == pytest.approx(np.ptp(before.points, axis=0)[:2])
+    assert corners.mean(axis=0)[1] != pytest.approx(flat.polygons.points.mean(axis=0)[1], rel=1e-3)
+    assert sum(name.startswith("undeformed:") for name in flat_plotter.actors) == 2
+    flat.update(changes.show_frame(shown, 0), section)
+    assert not line.visibility
+    assert "line" not in flat.summary
+
+
+def pair_matrix(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
 def test_flat_neighbours_can_be_picked(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
     session = opened(scene, stator.mesh, stator.case, sections=(section,), passages=1)

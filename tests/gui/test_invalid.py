@@ -76,6 +76,7 @@ def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(
     assert try_all_ways(blade) == 0
     store.change(changes.add_motion, Rotate("airfoil", 3.0))
     assert (field.text(), blade.session.invalid) == ("3", ()), "another motion has its own number"
+    assert "the value is still 3" not in window.statusBar().currentMessage()
     store.undo()
     window.dock_manager.bring_to_front("method")
     steps, count = window.method.steps, blade.session.case.steps

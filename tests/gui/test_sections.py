@@ -10,6 +10,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QPushButton
 
+from slideviz.case.model import SpanMotion
 from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
 from slideviz.gui.viewport.section_views import PlaneHandle, arrangement_for
 from slideviz.gui.widgets import questions
@@ -262,14 +263,43 @@ def test_a_section_of_constant_span_goes_to_10_50_and_90_percent(window, driver,
     assert sections(window)[0].span == pytest.approx(0.3, abs=0.01)
     driver.click(panel.add["cylinder"])
     assert not panel.editor.picks["span"].isVisible()
-    window.store.change(changes.set_case, span=("INFLOW", "HUB"))
-    assert "needs hub and shroud" in panel.list.item(0).text()
+    assert not panel.walls.isVisible()
 
 
-def test_without_hub_and_shroud_there_is_no_span(window, driver, panel):
+def test_hub_and_shroud_are_chosen_beside_sections_and_motions_over_the_span(window, driver, wheel):
+    driver.open(wheel)
+    window.dock_manager.bring_to_front("sections")
+    panel = window.dock_manager.panels["sections"]
     driver.click(panel.add["span"])
-    assert not sections(window)
+    hub, shroud = panel.walls.ends
+    assert (hub.currentData(), shroud.currentData()) == ("HUB", "SHROUD"), "by their names"
+    driver.choose(hub, "INFLOW")
+    assert window.store.session.case.span == ("INFLOW", "SHROUD")
+    assert sections(window)[0].walls is None
+    assert "needs hub and shroud" in panel.list.item(0).text()
+    assert not panel.editor.isVisible()
+    assert panel.walls.isVisible()
+    driver.add_motion(SpanMotion)
+    assert "do not face each other" in window.run_panel.text.toolTip()
+    # The same two fields, in the form of the motion.
+    driver.choose(window.motions.editor.walls.ends[0], "HUB")
+    assert window.store.session.case.span is None
+    assert (hub.currentData(), sections(window)[0].walls.hub) == ("HUB", "HUB")
+    window.store.undo()
+    assert window.store.session.case.span == ("INFLOW", "SHROUD")
+
+
+def test_a_section_of_constant_span_waits_until_hub_and_shroud_are_chosen(window, driver, panel):
+    driver.click(panel.add["span"])
+    assert sections(window)[0].walls is None
     assert "do not say between which the span goes" in window.banner.text.text()
+    hub, shroud = panel.walls.ends
+    assert (hub.shown, shroud.shown) == ("Hub…", "Shroud…")
+    low, high = window.store.session.mesh.marker_names[:2]
+    driver.choose(hub, low)
+    assert window.store.session.case.span is None, "only one is chosen"
+    driver.choose(shroud, high)
+    assert window.store.session.case.span == (low, high)
 
 
 def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_path, answers):

@@ -62,6 +62,18 @@ def test_a_sample_can_be_cancelled_while_it_is_made(small):
         jobs.open_sample("passage", small, lambda _: None, lambda: True)
 
 
+def test_the_page_says_what_is_being_opened(driver, small):
+    page = driver.window.start
+    before = page.hint.text()
+    driver.window.files.open_sample("hexahedron")
+    assert page.hint.text() == "Opening the sample hexahedron"
+    assert page.bar.isVisible()
+    page.show_progress(jobs.JobProgress("Reading", 0.25))
+    assert (page.hint.text(), page.bar.value()) == ("Reading", 250)
+    driver.settle()
+    assert (page.hint.text(), page.bar.isHidden()) == (before, True)
+
+
 def test_a_sample_that_cannot_be_written_is_told(driver, small):
     (small / "samples").write_text("a file")
     driver.click(driver.window.start.sample_buttons["passage"])

@@ -11,6 +11,7 @@ from qtpy.QtGui import QGuiApplication
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
+from slideviz.formats.files import write
 from slideviz.gui.panels import worst
 from slideviz.gui.panels.worst import WorstPanel, info_text
 from slideviz.gui.panels.worst_table import (
@@ -102,6 +103,22 @@ def test_the_mark_goes_with_a_new_run(full):
     full.store.change(changes.start_run)
     assert full.store.session.view.marked_cell is None
     assert not full.info.isVisible()
+
+
+def test_a_mesh_with_inverted_cells_can_be_repaired_at_once(driver, tmp_path, monkeypatch):
+    mesh = sample("square", size=12).mesh
+    write(tmp_path / "folded.su2", shaken(mesh, 0.08, 1).mesh)
+    driver.open(tmp_path / "folded.su2")
+    window = driver.window
+    window.dock_manager.bring_to_front("worst")
+    button = window.dock_manager.panels["worst"].repair
+    asked = []
+    monkeypatch.setattr(window.running, "repair", lambda: asked.append(True))
+    driver.click(button)
+    assert asked == [True]
+    write(tmp_path / "good.su2", mesh)
+    driver.open(tmp_path / "good.su2")
+    assert not button.isVisible()
 
 
 def test_without_a_mesh_it_says_what_to_do(panel):

@@ -27,6 +27,19 @@ def widest(flat):
     return (np.maximum.reduceat(x, flat.offsets[:-1]) - low).max(axis=0)
 
 
+def test_the_outline_of_polygons_is_what_one_of_them_has_alone():
+    mesh = grid((4, 3, 2))
+    cut = Cutter.of(mesh).cut(mesh.points, Section("plane", (0.0, 0.0, 0.3)))
+    lines = cut.outline()
+    assert set(lines.sizes) == {2}
+    assert len(lines) == 2 * (4 + 3)
+    ends = lines.points[lines.connectivity].reshape(-1, 2, 3)
+    assert np.linalg.norm(np.diff(ends, axis=1), axis=2).sum() == pytest.approx(4.0)
+    at_rim = np.isin(lines.cells, cut.cells) & (np.abs(ends[..., :2] - 0.5).max(axis=(1, 2)) > 0.4)
+    assert at_rim.all()
+    assert not len(cut.take(np.arange(0)).outline())
+
+
 @pytest.mark.parametrize("start", [0, 75, 165, 170, 180, 275, 350])
 @pytest.mark.parametrize("kind", ["plain", "simplex"])
 def test_a_sector_unrolls_to_a_rectangle_wherever_it_lies(start, kind):

@@ -20,7 +20,7 @@ from slideviz.sections.span import find_walls
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import keeps
-from slideviz.session.saving import view_to_case
+from slideviz.session.saving import view_to_case, with_walls
 from slideviz.session.section_cuts import can_cut, first_section, position_range
 from slideviz.session.state import StepFrame
 from slideviz.streaming.source import MemorySource, cut_cells
@@ -142,8 +142,10 @@ def test_sessions_keep_it_with_the_walls_of_their_case():
     assert gone.view.section.walls is None
     [lost] = session_of(cube(), case).view.sections
     assert lost.walls is None
+    new = first_section("span", session_of(cube()))
+    assert (new.span, new.walls) == (0.5, None)
     with pytest.raises(CaseError, match="do not say between which the span goes"):
-        first_section("span", session_of(cube()))
+        with_walls(new, cube(), sv.Case())
 
 
 def test_command_and_library_draw_it(tmp_path, monkeypatch, capsys):

@@ -146,15 +146,19 @@ WITH_ABOUT = Rotate | Scale | Radial | SpanMotion
 
 
 class MotionEditor(QWidget):
-    """The editor of a motion, which emits each valid change."""
+    """The editor of a motion, which emits each valid change.
+
+    ``walls``: the field for hub and shroud, which motions over the span have in common.
+    """
 
     changed = Signal(object)  # Motion
     """The motion as edited, in place of the one that was shown."""
     table_wanted = Signal()
     """The user wants to edit the rows of the motion's displacement file."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, walls: QWidget) -> None:
+        super().__init__()
+        self.walls = walls
         self.form = QFormLayout(self)
         self.form.setContentsMargins(0, 2, 0, 0)
         grow_fields(self.form)
@@ -274,6 +278,7 @@ class MotionEditor(QWidget):
             self.form.addRow(QLabel(row.title), self._rows[name])
             if name == "curve":
                 self.form.addRow(self.drawn)
+        self.form.addRow("Hub, shroud", self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
         labels = [self.form.labelForField(widget) for widget in self._rows.values()]
         widest = max(label.sizeHint().width() for label in labels)
@@ -316,7 +321,8 @@ class MotionEditor(QWidget):
             self._name_height(motion)
         if isinstance(motion, WITH_ABOUT):
             shown |= {"about"} | self._show_place(motion, dim)
-        self.form.setRowVisible(self.drawn, isinstance(motion, SpanMotion))
+        for widget in (self.drawn, self.walls):
+            self.form.setRowVisible(widget, isinstance(motion, SpanMotion))
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))

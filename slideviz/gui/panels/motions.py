@@ -40,6 +40,7 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.labels import elide_items, fixed_font, wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.services import folder_of, main_window
+from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motions import (
@@ -169,7 +170,7 @@ class MotionPanel(Panel):
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
-        self.editor = MotionEditor()
+        self.editor = MotionEditor(SpanWalls(store))
         self.editor.centroid_of, self.editor.chord_of = self._centroid, self._chord
         self.editor.changed.connect(self._edited)
         self.editor.drawn.dragging.connect(self.store.set_dragging)

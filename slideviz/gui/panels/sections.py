@@ -44,11 +44,14 @@ from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services, main_window
+from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.sections.model import Section, Triple
 from slideviz.session import changes, section_cuts
 from slideviz.session.passages import Period
+from slideviz.session.run_messages import with_field_labels
+from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import can_cut, first_section
 from slideviz.session.state import IN_FILE, Session
 
@@ -327,6 +330,7 @@ class SectionsPanel(Panel):
         self.editor = SectionEditor()
         self.editor.changed.connect(self._replace)
         self.editor.dragging.connect(self.store.set_dragging)
+        self.walls = SpanWalls(self.store)
 
     def _make_tools(self) -> None:
         self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
@@ -358,7 +362,7 @@ class SectionsPanel(Panel):
         tools = (self.handle, self.flat, None, self.look, self.picture)
         self.tools, self.rest = as_widget(in_row(*tools, spacing=5)), QWidget()
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        parts = (*add, self.hint, self.list, self.editor, self.tools, self.rest)
+        parts = (*add, self.hint, self.list, self.editor, self.walls, self.tools, self.rest)
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
 
     # What is shown ---------------------------------------------------------------------
@@ -382,6 +386,7 @@ class SectionsPanel(Panel):
         self.remove.setEnabled(selected is not None)
         fits = selected is not None and can_cut(mesh, selected)
         self.editor.show_section(selected if fits else None, mesh, session.view.section_index)
+        self.walls.setVisible(selected is not None and selected.kind == "span" and dim == 3)
         self._sync_tools(session, dim)
 
     def _sync_list(self, session: Session) -> None:
@@ -429,15 +434,14 @@ class SectionsPanel(Panel):
     # What is wanted --------------------------------------------------------------------
     def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.store.session
+        assert session.mesh is not None
         pair = self._period.of(session)
-        try:
-            section = first_section(kind, session, pair)
-        except SlidevizError as error:  # no hub and shroud
-            window = main_window(self)
-            assert window is not None
-            window.banner.show_error(error)
-            return
+        section = first_section(kind, session, pair)
         self.store.change(changes.add_section, section)
+        try:
+            with_walls(section, session.mesh, session.case, () if pair is None else (pair,))
+        except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
+            main_window(self).banner.show_message(with_field_labels(str(error)))
 
     def _want_picture(self, paper: PageFormat) -> None:
         title, axes = self.titled.isChecked(), self.with_axes.isChecked()

@@ -11,12 +11,13 @@ from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import QLabel, QStackedWidget
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.gui.commands import COMMANDS
 from slideviz.gui.panels.worst_table import SINCE, WorstModel, WorstTable
 from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.build import in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
-from slideviz.gui.widgets.services import folder_of
+from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session import changes
@@ -31,6 +32,7 @@ from slideviz.session.inspect import (
     worst_cells,
     write_table,
 )
+from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOR_BY, SIZE_SKEW
@@ -75,7 +77,9 @@ class WorstPanel(Panel):
             "Write the list with every digit as comma-separated values.",
             self._export,
         )
-        parts = (self.stack, self.info, in_row(self.back, None, self.export))
+        mend = COMMANDS["repair"]
+        self.repair = push_button("Repair", mend.tip, lambda: mend.do(main_window(self)), "repair")
+        parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
         self._timer = single_shot(self, lambda: self._fill(self.store.session))
         for keys, function in (
@@ -105,6 +109,7 @@ class WorstPanel(Panel):
         self.stack.setCurrentWidget(self.table if there else self.words)
         for widget in (self.back, self.export):
             widget.setVisible(there)
+        self.repair.setVisible(to_mend(session) is not None)
         if not there:
             self.info.hide()
             self.words.setText("Open a mesh first. Then this panel lists its worst cells.")

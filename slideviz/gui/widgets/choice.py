@@ -66,6 +66,7 @@ class Choice(QComboBox):
         self.initStyleOption(option)
         part, kind = QStyle.SubControl.SC_ComboBoxEditField, QStyle.ComplexControl.CC_ComboBox
         room = self.style().subControlRect(kind, option, part, self).width() - MARGIN
+        option.currentText = option.currentText or self.placeholderText()
         if not option.currentIcon.isNull():
             room -= option.iconSize.width() + MARGIN
         elided = Qt.TextElideMode.ElideRight

@@ -173,9 +173,10 @@ class CheckedField(TextField):
         raise NotImplementedError
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and self.problem:
+        if event.key() == Qt.Key.Key_Escape and (problem := self.problem):
             self._finish()
             self.restore()
+            _report_restored(self, problem, self.text())
         else:
             super().keyPressEvent(event)
 
@@ -185,6 +186,8 @@ class CheckedField(TextField):
         set_style(self, "bad", bool(problem))
         if problem != self.fault:
             self.fault = problem
+            if not problem:
+                _clear_report(self)
             self.marked.emit()
 
 
@@ -221,8 +224,6 @@ class CheckedText(CheckedField):
     def restore(self) -> None:
         self.setText(self.value)
         self.setCursorPosition(0)
-        if self.fault:
-            _clear_report(self)
         self._mark("")
 
     def _edited(self) -> None:
@@ -508,6 +509,8 @@ class NumberBox(QSpinBox):
         fault = self.problem
         if fault != self.fault:
             self.fault = fault
+            if not fault:
+                _clear_report(self)
             self.set_tip(self._tip)
             set_style(self, "bad", bool(fault))
             self.marked.emit()

@@ -1,0 +1,56 @@
+"""Hub and shroud of a machine, chosen among the boundaries of the mesh."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from slideviz.case.spans import span_ends
+from slideviz.errors import CaseError
+from slideviz.gui.widgets.build import in_row
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.panel import Panel
+from slideviz.session import changes
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+WALLS = {"Hub": "0, the hub", "Shroud": "1, the shroud"}  # each with the span there, in words
+
+
+class SpanWalls(Panel):
+    """Two drop-down lists for hub and shroud, which are set (SPAN=) once both are chosen."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
+        self.ends = tuple(
+            Choice(
+                {}, f"The boundary where the span is {words}; at first the one with such a name."
+            )
+            for words in WALLS.values()
+        )
+        for end, name in zip(self.ends, WALLS, strict=True):
+            end.setAccessibleName(name)
+            end.setPlaceholderText(f"{name}…")
+            end.chosen.connect(self._chosen)
+        row = in_row(*self.ends, wide=self.ends, spacing=4)
+        row.setContentsMargins(0, 0, 0, 0)
+        self.setLayout(row)
+        self._by_name: tuple[str, str] | None = None
+        self.follow(lambda session: (session.mesh, session.case.span))
+
+    def sync(self, session: Session) -> None:
+        mesh, self._by_name = session.mesh, None
+        if mesh is not None:
+            with suppress(CaseError):  # names that do not say which
+                self._by_name = span_ends(session.case.change(span=None), mesh)
+        for k, end in enumerate(self.ends):
+            end.clear()
+            for name in () if mesh is None else mesh.marker_names:
+                end.addItem(name, name)
+            end.setCurrentIndex(-1)
+            end.show_value((session.case.span or self._by_name or ("", ""))[k])
+
+    def _chosen(self, _: object) -> None:
+        hub, shroud = (end.currentData() for end in self.ends)
+        if hub and shroud:
+            span = None if (hub, shroud) == self._by_name else (hub, shroud)
+            self.store.change(changes.set_case, span=span)
