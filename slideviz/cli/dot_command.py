@@ -37,7 +37,7 @@ def _run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.cli.terminal import DONE
     from slideviz.design.su2.gradients import design_gradients
-    from slideviz.design.su2.sensitivities import sensitivity_file
+    from slideviz.design.su2.sensitivities import sensitivity_files
     from slideviz.errors import CaseError
 
     begin = time.perf_counter()
@@ -45,7 +45,8 @@ def _run_dot(arguments: argparse.Namespace) -> int:
     first = config.variables[0]
     if first.group in ("boxes", "nothing"):
         raise CaseError(f"{config.source}: {first.kind} moves nothing: there is no gradient for it")
-    arguments.inputs.setdefault(sensitivity_file(config), "the file of the sensitivities")
+    for path in sensitivity_files(config, mesh):
+        arguments.inputs.setdefault(path, "the file of the sensitivities")
     sensitivities = config.files["DV_SENS_FILENAME"]
     gradient = None if first.group == "file" else config.files["GRAD_OBJFUNC_FILENAME"]
     require_output_paths(

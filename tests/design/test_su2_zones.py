@@ -10,7 +10,8 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.su2.config import read_config
-from slideviz.design.su2.on_mesh import read_mesh
+from slideviz.design.su2.on_mesh import on_mesh, read_mesh
+from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.mesh.zones import zones_of
 from tests.mesh.test_interfaces import zones as square_and_core
@@ -128,3 +129,127 @@ def test_mistakes_are_told_with_their_file(here, texts, message, capsys):
     write(**texts)
     assert run(["def", "main.cfg", "-q"]) != 0
     assert re.search(message, capsys.readouterr().err.removeprefix("slideviz: "))
+
+
+def adjoint(points, weights, name):
+    table = np.column_stack([np.arange(len(points)), points, weights])
+    head = '"PointID", "x", "y", "Sensitivity_x", "Sensitivity_y"'
+    np.savetxt(name, table, delimiter=", ", header=head, comments="", fmt="%.17g")
+
+
+def restarts(mesh, weights, stem="solution_adj_cd"):
+    """Write the sensitivities of each zone, as SU2 names them."""
+    for k, part in enumerate(mesh.zone_parts):
+        adjoint(mesh.points[part.points], weights[part.points], f"{stem}_{k}.csv")
+
+
+def gradient(args=()):
+    assert run(["dot", "main.cfg", "-q", *args]) == 0
+    return np.array([float(row) for row in Path("of_grad.dat").read_text().splitlines()[1:]])
+
+
+def deformed():
+    assert run(["def", "main.cfg", "-q", "--force"]) == 0
+    return sv.read("out.su2").points
+
+
+SHARED = MAIN.replace("0.01", "VALUE_0")
+LISTED = "OBJECTIVE_FUNCTION= DRAG\n"
+ONE = """MESH_FILENAME= stage.su2
+MESH_OUT_FILENAME= out.su2
+MARKER_SYM= ( 1:inner, 1:outer, 2:inner )
+DV_MARKER= ( 1:BLOCK, 2:BLOCK )
+DV_KIND= TRANSLATION, ROTATION
+DV_PARAM= (0, 1, 0); (0, 0, 0, 0, 0, 1)
+DV_VALUE= VALUE_0, VALUE_1
+"""
+LOOPS = {
+    "a list each": (SHARED, "STEPS= 2\n", OTHER.replace("= 2", "= VALUE_1"), (0.01, 2.0)),
+    "a shared list": (SHARED, "STEPS= 2\n", "STEPS= 1\n", (0.01,)),
+    "one configuration": (ONE, "", "", (0.01, 2.0)),
+    "one zone stays": (SHARED, "DV_KIND= NO_DEFORMATION\n", "STEPS= 1\n", (0.01,)),
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_gradients_are_those_of_all_zones(here, name):
+    *texts, values = LOOPS[name]
+    mesh = sv.read("stage.su2")
+    weights = np.random.default_rng(5).normal(size=mesh.points.shape)
+
+    def prepare(values):
+        filled = list(texts)
+        for k, value in enumerate(values):
+            filled = [text.replace(f"VALUE_{k}", repr(value)) for text in filled]
+        write(filled[0] + LISTED, *filled[1:])
+
+    expected = []
+    for k in range(len(values)):
+        ends = []
+        for sign in (1.0, -1.0):
+            prepare([v + sign * 1e-4 * (k == j) for j, v in enumerate(values)])
+            ends.append((weights * deformed()).sum())
+        expected.append((ends[0] - ends[1]) / 2e-4)
+    prepare(values)
+    points = deformed()
+    restarts(mesh.with_points(points), weights)
+    found = gradient(["--json", "dot.json"])
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    report = json.loads(Path("dot.json").read_text())
+    assert report["at"] == "design"
+    assert report["gradient"] == found.tolist()
+    table = np.loadtxt("surface_sensitivity.dat", delimiter=",")
+    config = on_mesh(read_config(Path("main.cfg")), mesh)
+    surface = make_surface(config, mesh)
+    slopes = [surface.slope(*at) for at in surface.values]
+    dots = [(table[:, 3:5] * slope).sum() for slope in slopes]
+    np.testing.assert_allclose(dots, found, rtol=1e-12)
+    deformer = sv.Deformer(mesh, surface.case(), surface.displacement)
+    pushed = [(weights * deformer.jvp(surface.displacement, slope)).sum() for slope in slopes]
+    np.testing.assert_allclose(pushed, found, rtol=1e-11)
+    # The mesh is deformed already, as in SU2's own loop.
+    restarts(mesh, weights)
+    assert json.loads(Path("dot.json").read_text())["at"] == "design"
+    assert not np.allclose(gradient(), found, rtol=1e-4)
+    order = np.random.default_rng(6).permutation(len(points))
+    rows = np.column_stack([points, weights])[order]
+    np.savetxt("unordered_sensitivity.dat", rows, delimiter=", ", fmt="%.17g")
+    format_ = "DV_SENSITIVITY_FORMAT=UNORDERED_ASCII"
+    np.testing.assert_allclose(gradient(["--set", format_]), found, rtol=1e-9)
+
+
+def test_a_zone_without_adjoint_solution_is_told(here, capsys):
+    write()
+    mesh = sv.read("stage.su2")
+    restarts(mesh, np.ones(mesh.points.shape))
+    Path("solution_adj_cd_1.csv").unlink()
+    assert run(["dot", "main.cfg", "-q"]) != 0
+    said = capsys.readouterr().err
+    assert "second.cfg: there is no adjoint solution of OBJECTIVE_FUNCTION= DRAG: none of" in said
+    assert "solution_adj_cd_1.dat, solution_adj_cd_1.csv, solution_adj_1.dat" in said
+
+
+def test_coincident_nodes_of_zones_share_the_rows_of_a_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = square_and_core(tmp_path)
+    main = MAIN.replace("stage.su2", path.name)[: MAIN.index("MARKER_SYM")]
+    moves = "DV_MARKER= (BLOCK)\nDV_KIND= TRANSLATION\nDV_PARAM= (2, 1, 0)\nDV_VALUE= 0.01\n"
+    write(main + "DV_SENSITIVITY_FORMAT= UNORDERED_ASCII\n", moves, "STEPS= 1\n")
+    mesh = sv.read(path)
+    points = mesh.with_points(deformed()).points
+    weights = np.random.default_rng(5).normal(size=points.shape)
+
+    def rows(which):
+        table = np.column_stack([points, weights])[which]
+        np.savetxt("unordered_sensitivity.dat", table, delimiter=", ", fmt="%.17g")
+
+    rows(slice(None))
+    every = gradient()
+    write(main, moves, "STEPS= 1\n")
+    restarts(mesh.with_points(points), weights)
+    np.testing.assert_allclose(gradient(), every, rtol=1e-9)
+    # A row for each place only: that of the node that moves.
+    write(main + "DV_SENSITIVITY_FORMAT= UNORDERED_ASCII\n", moves, "STEPS= 1\n")
+    nodes = mesh.marker("BLOCK").nodes
+    rows(nodes)
+    assert gradient() == pytest.approx((weights[nodes] @ [2.0, 1.0]).sum(), rel=1e-9)

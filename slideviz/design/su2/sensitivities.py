@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 from pathlib import Path
 
 import numpy as np
@@ -127,9 +128,21 @@ def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensi
     Raises CaseError if the file is missing, lacks columns or points, or has a value that is not a
     number.
     """
-    path = sensitivity_file(config)
+    paths = sensitivity_files(config, mesh)
     if _is_unordered(config):
-        return _unordered(path, mesh)
+        return _unordered(paths, mesh)
+    if not mesh.zone_parts:
+        return _read(paths[0], mesh, moving)
+    each = [_read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.zone_parts, strict=True)]
+    points = [one.points for one in each if one.points is not None]
+    return Sensitivities(
+        paths[0],
+        np.concatenate([one.values for one in each]),
+        np.concatenate(points) if len(points) == len(each) else None,
+    )
+
+
+def _read(path: Path, mesh: Mesh, moving: IntArray) -> Sensitivities:
     names, table = read_restart(path)
     if len(table) != len(mesh.points) and len(table) == len(moving):
         raise CaseError(
@@ -144,24 +157,32 @@ def _is_unordered(config: Su2Config) -> bool:
     return config.words["DV_SENSITIVITY_FORMAT"].upper() == "UNORDERED_ASCII"
 
 
-def sensitivity_file(config: Su2Config) -> Path:
-    """Return the path of the file of sensitivities.
+def sensitivity_files(config: Su2Config, mesh: Mesh) -> tuple[Path, ...]:
+    """Return the paths of the files of sensitivities, or CaseError.
 
     An adjoint restart has the suffix of its objective in its name, and ends with ``.csv`` or
-    ``.dat``. Raises CaseError if there is none.
+    ``.dat``. Each of several zones has one, with the number of the zone, from 0, before its ending.
     """
+    zones = [(config.of_zone(k), f"_{k}") for k in range(mesh.zones)]
     if _is_unordered(config):
-        return config.files["DV_UNORDERED_SENS_FILENAME"]
+        names = (each.files["DV_UNORDERED_SENS_FILENAME"] for each, _ in zones)
+        return tuple(dict.fromkeys(names))
+    return tuple(starmap(_restart, zones)) if mesh.zone_parts else (_restart(config),)
+
+
+def _restart(config: Su2Config, zone: str = "") -> Path:
     adjoint_file = config.files["SOLUTION_ADJ_FILENAME"]
     objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").upper()
     stem = adjoint_file.with_suffix("") if adjoint_file.suffix in (".csv", ".dat") else adjoint_file
+    plain = stem.name
     suffix = "combo" if "," in objective else SUFFIXES.get(objective, "")
-    stems = [stem.with_name(f"{stem.name}_{suffix}")] if suffix else []
+    stem = stem.with_name(stem.name + zone)
+    stems = [stem.with_name(f"{plain}_{suffix}{zone}")] if suffix else []
     endings = [".csv", ".dat"]
     if config.words["READ_BINARY_RESTART"].upper() == "YES":
         endings.reverse()
     tried = [one.with_name(one.name + end) for one in (*stems, stem) for end in endings]
-    for path in (*tried, adjoint_file):
+    for path in (*tried, *[adjoint_file] * (not zone)):
         if path.is_file():
             return path
     raise CaseError(
@@ -196,6 +217,13 @@ def match(
             f"{found.path}: its points are neither those of {mesh.name} nor those of this design: "
             f"off by {gap:.3g}; run the adjoint solver on the mesh that `slideviz def` writes"
         )
+    for each in mesh.interfaces if mesh.zone_parts else ():
+        # A place with one row of two nodes: the row is that of the node that moves.
+        alone = np.isin(each.nodes, rows) & ~np.isin(each.partners, rows)
+        alone &= np.isin(each.partners, moving) & ~np.isin(each.nodes, moving)
+        place = np.arange(len(mesh.points))
+        place[each.nodes[alone]] = each.partners[alone]
+        rows = place[rows]
     notes = []
     if gap > CLOSE * unit:
         where = "this design" if at_design else mesh.name
@@ -223,8 +251,15 @@ def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarra
     if found.ordered:
         gap = np.abs(found.points - points)
         return float(gap.max(initial=0.0)), np.arange(len(points))
-    far, rows = cKDTree(points).query(found.points)
-    return float(np.max(far, initial=0.0)), np.asarray(rows)
+    far, rows = map(np.asarray, cKDTree(points).query(found.points))
+    # Nodes of several zones may be in one place: each has a row, or the first of them.
+    again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
+    left = np.setdiff1d(np.arange(len(points)), rows)
+    if len(again) and len(left):
+        gaps, others = map(np.asarray, cKDTree(points[left]).query(found.points[again]))
+        near = gaps <= SAME * largest_coordinate(points)
+        rows[again[near]], far[again[near]] = left[others[near]], gaps[near]
+    return float(np.max(far, initial=0.0)), rows
 
 
 def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sensitivities:
@@ -255,8 +290,8 @@ def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sen
     return Sensitivities(path, values, points)
 
 
-def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
-    rows = [row for row in _rows(path) if row]
+def _unordered(paths: Sequence[Path], mesh: Mesh) -> Sensitivities:
+    path, rows = paths[0], [row for path in paths for row in _rows(path) if row]
     dim = mesh.dim
     width = len(rows[0]) if rows else 0
     if width not in {6, 2 * dim} or any(len(row) != width for row in rows):
