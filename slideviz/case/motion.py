@@ -196,7 +196,7 @@ def reference_displacements(
         moved = [nodes for name, nodes in on.items() if applies_to(motion, name)]
         if isinstance(motion, Onto) and moved:
             try:
-                files[key_of(motion)] = laid_displacements(motion, mesh, tuple(on))
+                files[key_of(motion)] = laid_displacements(motion, case, mesh, on)
             except CaseError as problem:
                 problems.append(str(problem))
         elif isinstance(motion, FromFile) and (moved or not motion.marker):

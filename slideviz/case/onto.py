@@ -18,12 +18,18 @@ from slideviz.formats.files import read_surface
 from slideviz.machine.onto import AGREE, Laid, Nearest, Target, Wall, find_edges, lay_onto
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
+from slideviz.rbf.projection import as_simplices, surface_extension
 
 FARTHEST = 0.01
 """Largest distance from the target that may remain, over the boundary's size, by default."""
+BEYOND = 2.0
+"""How far walls go on, over the largest distance from the target before: nodes slide along it."""
 MOST_AWAY = 0.05  # largest part of the nodes whose normals may not face the target
 
 Key = tuple[object, ...]
@@ -37,18 +43,20 @@ class Remaining(Note):
     report: Mapping[str, object]  # what the report of a run has: boundaries, file, distances
 
 
-def laid_displacements(motion: Onto, mesh: Mesh, markers: Iterable[str]) -> Displacements:
+def laid_displacements(
+    motion: Onto, case: Case, mesh: Mesh, markers: Iterable[str]
+) -> Displacements:
     """Return the displacements that lay those of some markers onto a target; computed once.
 
     Raises CaseError if the target cannot be read, does not face the boundary, or remains too far
     from it.
     """
-    names, key = _key(motion, markers)
+    names, key = _key(motion, case, markers)
     with _one_at_a_time:
         known = _LAID.setdefault(mesh, {})
         if key not in known:
             try:
-                known[key] = _lay(motion, mesh, names)
+                known[key] = _lay(motion, case, mesh, names)
             except CaseError as problem:
                 known[key] = problem
         result = known[key]
@@ -60,49 +68,81 @@ def laid_displacements(motion: Onto, mesh: Mesh, markers: Iterable[str]) -> Disp
 def is_laid(case: Case, mesh: Mesh) -> bool:
     """Return whether the displacements of all motions onto surfaces are computed: it takes time."""
     moving = case.markers_with("moving")
-    keys = (_key(motion, moving) for motion in case.motions if isinstance(motion, Onto))
+    keys = (_key(motion, case, moving) for motion in case.motions if isinstance(motion, Onto))
     return all(key in _LAID.get(mesh, {}) for names, key in keys if names)
 
 
-def _key(motion: Onto, markers: Iterable[str]) -> tuple[tuple[str, ...], Key]:
+def _key(motion: Onto, case: Case, markers: Iterable[str]) -> tuple[tuple[str, ...], Key]:
     """Return the markers that a motion moves, and the key of their displacements."""
     names = tuple(name for name in markers if applies_to(motion, name))
+    key = motion, names, case.markers_with("periodic"), case.periodic, case.periodic_type
     try:
         state = motion.path.stat()
     except OSError:
-        return names, (motion, names)
-    return names, (motion, names, state.st_mtime_ns, state.st_size)
+        return names, key
+    return names, (*key, case.axis, case.origin, state.st_mtime_ns, state.st_size)
 
 
-def _lay(motion: Onto, mesh: Mesh, names: tuple[str, ...]) -> Displacements:
+def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displacements:
     boundary = boundary_of(mesh)
     index = [boundary.names.index(name) for name in names]
     facets = boundary.facets[np.isin(boundary.marker, index)]
     nodes = np.unique(facets)
     points, local = mesh.points[nodes], np.searchsorted(nodes, facets)
     rim = nodes[np.unique(find_edges(points, local)[1])]
-    walls = []
-    for place in set(range(len(boundary.names))) - {*index}:
-        wall = boundary.facets[boundary.marker == place]
-        on = np.intersect1d(rim, wall)
-        if len(on):
-            corners = _simplices(mesh.points, wall)
-            walls.append(Wall(np.searchsorted(nodes, on), _nearest(corners)))
-    laid = lay_onto(points, local, _read_target(motion.path, mesh, names), walls)
+    target = _read_target(motion.path, mesh, names)
+    reach = BEYOND * float(np.linalg.norm(target.surface(points)[0] - points, axis=1).max())
+    walls = _walls(case, mesh, nodes, index, rim, reach)
+    laid = lay_onto(points, local, target, list(walls.values()))
     size = float(np.ptp(points, axis=0).max())
-    note = _checked(motion, names, laid, np.isin(nodes, rim), size)
+    note = _checked(motion, names, laid, walls, size)
     return Displacements(nodes, laid.vectors, (note,))
 
 
+def _walls(
+    case: Case, mesh: Mesh, nodes: IntArray, index: list[int], rim: IntArray, reach: float
+) -> dict[str, Wall]:
+    """Return the boundaries on which the rim stays, as nodes that slide there see them.
+
+    They are surfaces of the frame, as an annulus is round, and go on flat where the moving
+    boundary ends them.
+    """
+    inside, sides = without_halo(mesh)[0], case.markers_with("periodic")
+    pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin) if sides else ()
+    frame, _ = make_frame(
+        inside.points, pairs, periodic_distance=case.periodic in ("fixed", "moving")
+    )
+    coords, boundary, walls = frame.coords(mesh.points), boundary_of(mesh), dict[str, Wall]()
+    place = partial(corners, coords, axis=on_axis(frame, coords))
+    moving = np.zeros(len(coords), bool)
+    moving[nodes] = True
+    for which, name in enumerate(boundary.names):
+        member = boundary.marker == which
+        on = np.intersect1d(rim, boundary.facets[member])
+        if which not in index and len(on):
+            beyond = surface_extension(boundary, member, moving, place, reach)
+            simplices = np.concatenate([as_simplices(place(boundary.facets[member])), beyond])
+            shift = frame.shift()
+            tree = ClosestPoints(simplices, shift if shift.any() else None)
+            walls[name] = Wall(np.searchsorted(nodes, on), partial(_on_wall, tree, frame))
+    return walls
+
+
+def _on_wall(tree: ClosestPoints, frame: Frame, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    at, which = tree.nearest(frame.coords(x))
+    points, normals = frame.points(at), _normals(tree.simplices(which))
+    return points, unit(np.einsum("mij,mi->mj", coords_slopes(frame, points), normals))
+
+
 def _checked(
-    motion: Onto, names: tuple[str, ...], laid: Laid, rim: np.ndarray, size: float
+    motion: Onto, names: tuple[str, ...], laid: Laid, walls: dict[str, Wall], size: float
 ) -> Remaining:
     """Return the note on a boundary laid onto a target; CaseError where they do not fit."""
     of, file = " and ".join(names), printable(motion.path)
-    away = int(np.count_nonzero(laid.facing < AGREE))
-    if away > MOST_AWAY * len(rim):
+    away, count = int(np.count_nonzero(laid.facing < AGREE)), len(laid.facing)
+    if away > MOST_AWAY * count:
         raise CaseError(
-            f"{file}: {away:,} of {len(rim):,} nodes of {of} do not face this surface: their "
+            f"{file}: {away:,} of {count:,} nodes of {of} do not face this surface: their "
             "normals are more than 70° apart; give a surface near the boundary and about parallel "
             "to it, whose facets are oriented alike"
         )
@@ -114,12 +154,18 @@ def _checked(
             f"{limit:.4g}{default}; give a surface that is as large, or a larger limit: "
             f"({names[0]}, onto, {motion.path.name}, {1.1 * farthest:.2g})"
         )
-    note = Remaining(f"{of} lies on {motion.path.name}, at most {farthest:.3g} away from it")
+    rim = np.zeros(count, bool)
+    rim[[row for wall in walls.values() for row in wall.rows]] = True
+    inner, at_rim = (float(laid.distances[some].max(initial=0.0)) for some in (~rim, rim))
+    words = f"{of} lies on {motion.path.name}, at most {inner:.3g} away from it"
+    if walls:
+        words += f"; its rim stays on {' and '.join(walls)}, at most {at_rim:.3g} away from it"
+    note = Remaining(words)
     note.report = {
         "boundaries": list(names),
         "file": str(motion.path),
         "distance": farthest,
-        "rim_distance": float(laid.distances[rim].max(initial=0.0)),
+        "rim_distance": at_rim,
         "farthest_move": float(np.linalg.norm(laid.vectors, axis=1).max()),
     }
     return note
@@ -146,8 +192,8 @@ def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> Target:
     # Files such as STL have the corners of each facet.
     points, place = np.unique(read.points[:, : mesh.dim], axis=0, return_inverse=True)
     table = place.ravel()[facets]
-    edges, rim = find_edges(points, table)
-    return Target(_nearest(_simplices(points, table)), _along(points[edges]), _along(points[rim]))
+    edges, _ = find_edges(points, table)
+    return Target(_nearest(as_simplices(points[table])), _along(points[edges]))
 
 
 def _dims(mesh: Mesh) -> set[int]:
@@ -173,20 +219,16 @@ def _padded(table: IntArray) -> IntArray:
     return table[:, [0, 1, 2, 2]] if table.shape[1] == 3 else table
 
 
-def _simplices(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the corners (m, d, d) of facets, a quadrilateral as two triangles."""
-    if facets.shape[1] == 2:
-        return points[facets]
-    second = facets[facets[:, 2] != facets[:, 3]][:, [0, 2, 3]]
-    return points[np.concatenate([facets[:, :3], second])]
-
-
-def _nearest(corners: FloatArray) -> Nearest:
+def _nearest(simplices: FloatArray) -> Nearest:
     """Return a function of closest points on triangles or segments, and their normals there."""
-    padded = corners if corners.shape[2] == 2 else corners[:, [0, 1, 2, 2]]
-    return partial(
-        _closest, ClosestPoints(np.ascontiguousarray(corners)), unit(corner_vectors(padded))
-    )
+    tree = ClosestPoints(np.ascontiguousarray(simplices))
+    return partial(_closest, tree, _normals(simplices))
+
+
+def _normals(simplices: FloatArray) -> FloatArray:
+    """Return the unit normals (m, d) of triangles (m, 3, 3) or segments (m, 2, 2)."""
+    flat = simplices.shape[1] == 2
+    return unit(corner_vectors(simplices if flat else simplices[:, [0, 1, 2, 2]]))
 
 
 def _along(edges: FloatArray) -> Nearest | None:

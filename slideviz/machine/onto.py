@@ -35,14 +35,11 @@ NEAR_EDGE = 0.1
 """Largest distance of a sharp edge from one of the target, once the polynomial has been fitted,
 over the boundary's size; beyond it, the edge has no counterpart."""
 STIFF = 100.0  # weight of the distance of a rim from its wall, relative to that from the target
-WALL_ROUNDS = 5  # projections onto wall and target in turn
 STILL = 1e-6  # weight of the change in a round, without which a matrix might be singular
-OFF_WALL = 1e-3
-"""How far a rim may leave its wall to meet the target, over the boundary's size: walls are faceted
-and targets may be rough."""
-BENT = 0.05
-"""How much farther it may, over its distance beyond the end of the wall, which is continued flat:
-walls end where the boundary was."""
+LAST = 8  # Newton steps of each node to where target, edges and walls meet
+TANGENT = 1e-3  # weight of the change in these, where two of them are nearly tangent
+ENOUGH, MOST = 1e-2, 100
+"""Residual of the equations of a round, relative to their right side, and most iterations."""
 
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Returns for points (m, d) their closest points on a surface and its unit normals there; or on
@@ -60,12 +57,11 @@ class Wall(NamedTuple):
 class Target:
     """A surface to lay a boundary onto, its normals oriented alike: all inwards, or all outwards.
 
-    ``edges`` are its sharp edges, ``rim`` is where it ends; None where there are none.
+    ``edges`` are its sharp edges; None where there are none.
     """
 
     surface: Nearest
     edges: Nearest | None = None
-    rim: Nearest | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +102,10 @@ def lay_onto(
     facets : (f, 2) or (f, 4)
         Its facets, as rows of ``points``, oriented alike; a triangle repeats its last node.
     target : Target
-        The surface, of which the rim counts where it is at the walls.
+        The surface; it goes on flat beyond its end.
     walls : sequence of Wall
         What nodes at the boundary's rim stay on.
     """
-    from scipy.sparse import diags_array
-    from scipy.sparse.linalg import splu
-
     size = float(np.ptp(points, axis=0).max())
     bending = _bending(points, facets)
     guide = _Guide(facets, target, walls)
@@ -123,20 +116,13 @@ def lay_onto(
         near = np.linalg.norm(target.edges(moved[edge])[0] - moved[edge], axis=1)
         guide.edge = edge[near <= NEAR_EDGE * size]
     for weight in SMOOTHNESS:
-        matrix, right = guide.equations(moved)
-        change = weight * (bending @ (fitted - moved).ravel())
-        system = matrix + weight * bending + diags_array(np.full(points.size, STILL))
-        moved = moved + splu(system.tocsc()).solve(right + change).reshape(points.shape)
-    rows = np.flatnonzero(guide.facing(moved) > AGREE)
-    moved[rows] = target.surface(moved[rows])[0]
-    moved = guide.on_edges(moved)
-    for _ in range(WALL_ROUNDS):
+        moved = moved + guide.change(moved, weight * bending, fitted - moved)
+    for _ in range(LAST):
+        blocks, right = guide.equations(moved)
+        blocks += TANGENT * np.eye(points.shape[1])
+        moved = moved + np.linalg.solve(blocks, right[..., None])[..., 0]
         for wall in walls:
-            off, _, normals = _beyond(moved[wall.rows], wall)
-            moved[wall.rows] = target.surface(moved[wall.rows] - off * normals)[0]
-        moved = guide.on_edges(moved)
-    for wall in walls:
-        moved[wall.rows] = guide.near_wall(moved[wall.rows], wall, OFF_WALL * size)
+            moved[wall.rows] = wall.nearest(moved[wall.rows])[0]
     distances = np.linalg.norm(target.surface(moved)[0] - moved, axis=1)
     return Laid(moved - points, distances, guide.facing(moved))
 
@@ -160,14 +146,6 @@ class _Guide:
             np.add.at(normals, column, vectors)
         return self.sign * _dots(unit(normals), self.target.surface(points)[1])
 
-    def on_edges(self, points: FloatArray) -> FloatArray:
-        """Return the points with those of sharp edges on the edges of the target."""
-        if self.target.edges is None or not len(self.edge):
-            return points
-        moved = points.copy()
-        moved[self.edge] = self.target.edges(points[self.edge])[0]
-        return moved
-
     def conditions(self, moved: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
         """Return conditions that draw nodes at ``moved`` to where they belong.
 
@@ -187,40 +165,48 @@ class _Guide:
         rows, directions, ways, weights = map(np.concatenate, zip(*found, strict=True))
         return rows, directions, _dots(ways, directions), weights
 
-    def equations(self, moved: FloatArray) -> tuple[csr_array, FloatArray]:
-        """Return matrix and right side of the least squares of the conditions."""
-        from scipy.sparse import coo_array, diags_array
-
+    def equations(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return matrices (k, d, d) and right sides (k, d) of the least squares of each node."""
         rows, directions, ways, weights = self.conditions(moved)
-        dim = moved.shape[1]
-        columns = dim * rows[:, None] + np.arange(dim)
-        lines = np.repeat(np.arange(len(rows)), dim)
-        entries = directions.ravel(), (lines, columns.ravel())
-        matrix = coo_array(entries, (len(rows), moved.size)).tocsr()
-        weighted = diags_array(weights) @ matrix
-        return matrix.T @ weighted, weighted.T @ ways
+        blocks, right = np.zeros((*moved.shape, moved.shape[1])), np.zeros_like(moved)
+        weighted = weights[:, None] * directions
+        np.add.at(blocks, rows, weighted[:, :, None] * directions[:, None])
+        np.add.at(right, rows, weighted * ways[:, None])
+        return blocks, right
 
-    def near_wall(self, x: FloatArray, wall: Wall, near: float) -> FloatArray:
-        """Return points (r, d) that are on the target, and ``near`` the wall.
+    def change(self, moved: FloatArray, bending: csr_array, ahead: FloatArray) -> FloatArray:
+        """Return the change (k, d) of a round, whose difference from ``ahead`` (k, d) is smooth.
 
-        They are on the target's rim where that is as near.
+        Conjugate gradients solve for it. Their preconditioner has one factor for all components,
+        with the mean of the conditions of a node over all directions.
         """
-        off, beyond, normals = _beyond(x, wall)
-        reach = near + BENT * beyond
-        if self.target.rim is not None:
-            at = self.target.rim(x)[0]
-            meets = np.linalg.norm(at - x, axis=1, keepdims=True) <= reach
-            meets &= ~np.isin(wall.rows, self.edge)[:, None]
-            x = np.where(meets, at, x)
-            off, _, normals = _beyond(x, wall)
-        return x - np.sign(off) * np.maximum(np.abs(off) - reach, 0.0) * normals
+        from scipy.sparse import diags_array
+        from scipy.sparse.linalg import LinearOperator, cg, splu
 
+        blocks, right = self.equations(moved)
+        mean = np.einsum("kdd->k", blocks) / moved.shape[1] + STILL
+        # Symmetric, positive definite: no pivots, and the order of least degree.
+        symmetric = {"SymmetricMode": True}
+        factor = splu(
+            (bending + diags_array(mean)).tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options=symmetric,
+        )
 
-def _beyond(x: FloatArray, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return how far points (r, d) are off a wall, and beyond its end, (r, 1), and its normals."""
-    at, normals = wall.nearest(x)
-    off = _dots(x - at, normals)[:, None]
-    return off, np.linalg.norm(x - at - off * normals, axis=1, keepdims=True), normals
+        def apply(u: FloatArray) -> FloatArray:
+            u = u.reshape(moved.shape)
+            return (np.einsum("kde,ke->kd", blocks, u) + bending @ u + STILL * u).ravel()
+
+        shape = moved.size, moved.size
+        change, _ = cg(
+            LinearOperator(shape, apply),
+            (right + bending @ ahead).ravel(),
+            rtol=ENOUGH,
+            maxiter=MOST,
+            M=LinearOperator(shape, lambda r: factor.solve(r.reshape(moved.shape)).ravel()),
+        )
+        return np.asarray(change).reshape(moved.shape)
 
 
 def _fit(points: FloatArray, guide: _Guide) -> FloatArray:
@@ -231,22 +217,21 @@ def _fit(points: FloatArray, guide: _Guide) -> FloatArray:
     terms = np.stack([np.ones(k), *x.T, *(x[:, i] * x[:, j] for i, j in pairs)], axis=1)
     moved, before = points, np.zeros(terms.shape[1] * dim)
     for _ in range(FITS):
-        rows, directions, ways, weights = guide.conditions(moved)
-        use = weights > 0.0
-        matrix = (terms[rows, :, None] * directions[:, None, :]).reshape(len(rows), -1)[use]
-        damping = DAMPING * max(len(matrix), 1) / matrix.shape[1]
-        equations = matrix.T @ matrix + damping * np.eye(matrix.shape[1])
-        before = np.linalg.solve(equations, matrix.T @ (ways[use] + matrix @ before))
+        blocks, right = guide.equations(moved)
+        matrix = np.einsum("kt,kde,ks->tdse", terms, blocks, terms, optimize=True)
+        right += np.einsum("kde,ke->kd", blocks, moved - points)
+        damping = DAMPING * k / before.size * np.eye(before.size)
+        before = np.linalg.solve(matrix.reshape(damping.shape) + damping, (terms.T @ right).ravel())
         moved = points + terms @ before.reshape(-1, dim)
     return moved
 
 
 def _bending(points: FloatArray, facets: IntArray) -> csr_array:
-    """Return the square of the graph's Laplacian, for each component: (k d, k d).
+    """Return the square of the graph's Laplacian, (k, k).
 
     Edges weigh as the inverse of their lengths, and the weights of a node are 1 together.
     """
-    from scipy.sparse import coo_array, diags_array, kron
+    from scipy.sparse import coo_array, diags_array
 
     one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     edges = np.sort(np.stack([one, two], axis=1)[one != two], axis=1)
@@ -255,7 +240,7 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
     links = coo_array((weights, (one, two)), (k, k)).tocsr()
     links = links + links.T
     laplacian = diags_array(np.ones(k)) - diags_array(1.0 / links.sum(axis=1)) @ links
-    return kron(laplacian.T @ laplacian, np.eye(points.shape[1]), format="csr")
+    return (laplacian.T @ laplacian).tocsr()
 
 
 def _dots(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -363,7 +363,7 @@ class Ghosts:
             if isinstance(motion, Onto):
                 if wait or is_laid(case, self.mesh):
                     with suppress(SlidevizError):
-                        files[key_of(motion)] = laid_displacements(motion, self.mesh, on)
+                        files[key_of(motion)] = laid_displacements(motion, case, self.mesh, on)
             elif isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
                 files[key_of(motion)] = read
         with suppress(SlidevizError):
