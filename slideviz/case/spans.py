@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -169,6 +170,17 @@ def _blade(
         for motion in motions
     ]
     return Blade(nodes, cache[key], tuple(places), tuple(motions), tuple(reached))
+
+
+def prepare_span(case: Case, mesh: Mesh) -> None:
+    """Compute and cache what motions over the span need of a mesh, if it has hub and shroud."""
+    names = mesh.marker_names
+    on = {name: mesh.marker(name).nodes for name in case.markers_with("moving") if name in names}
+    motions = tuple(motion for motion in case.motions if isinstance(motion, SpanMotion))
+    at_rest = SpanMotion("", "twist", (0.0,), (0.0,))
+    with suppress(SlidevizError):
+        span_field(case, mesh)
+        blades_of(case.change(motions=motions or (at_rest,)), mesh, on)
 
 
 def span_displacements(

@@ -19,6 +19,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile, Onto
 from slideviz.case.motion import displacements
+from slideviz.case.spans import prepare_span
 from slideviz.case.zones import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
@@ -30,6 +31,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.mesh.walls import Walls, walls
+from slideviz.sections.span import find_walls
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -140,7 +142,8 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     """Return the values on which the check depends: its result holds while they are the same."""
     case = session.case
     roles = tuple(sorted(case.roles.items()))
-    return (session.mesh, case.motions, roles, case.periodic, case.sliding)
+    around = case.span, case.periodic_type, case.axis, case.origin
+    return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around)
 
 
 def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
@@ -151,6 +154,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
     has other problems, which are reported elsewhere.
     """
     files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
+    prepare_spans(case, mesh)
     try:
         if not case.motions or check_case(case, mesh) or stopped():
             return "", ""
@@ -167,6 +171,15 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         return _first_line(error, files), ""
     message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
     return message, (f"{folded}." if folded else "")
+
+
+def prepare_spans(case: Case, mesh: Mesh) -> None:
+    """Compute what the first motion and the first section over the span need: it takes a second."""
+    with suppress(SlidevizError):
+        for one, zone in each_zone(case, mesh):
+            prepare_span(one, zone)
+        if mesh.dim == 3 and case.markers_with("periodic"):
+            find_walls(mesh, case, find_period(mesh, case))
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:

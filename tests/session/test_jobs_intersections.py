@@ -3,13 +3,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, FromFile, Translate
+from slideviz.case import spans
+from slideviz.case.model import Case, FromFile, SpanMotion, Translate
+from slideviz.case.motion import displacements
 from slideviz.mesh.quality import quality
+from slideviz.sections import span as sections
 from slideviz.session import changes
 from slideviz.session.jobs import find_intersection, intersection_key, set_intersection
 from slideviz.session.opening import open_mesh
+from slideviz.session.passages import find_period
 from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import StepFrame
+from tests.builders import cube
+from tests.builders import passage as wheel_passage
 
 
 def look(case, mesh, stopped=False):
@@ -83,6 +89,21 @@ def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(
     assert set_intersection(later, ("It clashes.", ""), key) is later
     assert intersection_key(changes.set_case(session, steps=7)) == key
     assert intersection_key(changes.set_role(session, ["top"], "internal")) != key
+
+
+def test_what_the_first_motion_and_section_over_the_span_need_is_computed_before(monkeypatch):
+    mesh = wheel_passage()
+    roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
+    case = Case(roles=roles, periodic="moving", sliding="ps")
+    twist = case.change(motions=(SpanMotion("blade", "twist", (0.0, 1.0), (0.0, 3.0)),))
+    find_intersection(case, mesh, lambda _: None, lambda: False)
+    for module in (spans, sections):
+        monkeypatch.setattr(module, "find_span", None)
+    monkeypatch.setattr(spans, "BladeSections", None)
+    assert np.abs(displacements(twist, mesh).vectors).max() > 1e-3
+    assert sections.find_walls(mesh, twist, find_period(mesh, twist)).hub == "hub"
+    # Where names do not say which, nothing is said here, either.
+    assert look(Case(), cube()) == ""
 
 
 def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
