@@ -8,14 +8,13 @@ as a whole, and every mistake of the text is found, as by its reader.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.formats.su2.lines import Piece, number_of
 from slideviz.formats.su2.numbers import (
@@ -26,13 +25,13 @@ from slideviz.formats.su2.numbers import (
 )
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2b.layout import NAME_BYTES
-from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
+from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of, write_at
 from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick, ordered_map
+from slideviz.system.threads import Tick, equal_shares, ordered_map
 
 HEAD = 8  # bytes before the first zone
 PIECES = 16  # pieces of a text, each about a megabyte, in one task
@@ -45,11 +44,11 @@ class BinaryLayout:
     """The layout of the binary form (`su2b.layout`) of a text mesh: where each part begins."""
 
     text: Text  # the text mesh
-    width: int  # bytes of a count or an index, 4 or 8
-    named: bool  # whether the file gets the names of the markers; else numbers, which always fit
     before: IntArray
     """(p + 1, t): number of elements of each type before each of the p pieces, and in the last row
     of all. Types are in the order of ``SORTED``."""
+    named: bool  # whether the file gets the names of the markers; else numbers, which always fit
+    width: int = 8  # bytes of a count or an index, 4 or 8
     begin: int = HEAD  # first byte of its zone
     number: int = 1  # number of its zone
 
@@ -89,7 +88,7 @@ class BinaryLayout:
         return self.points + self.text.n_points * self.point.itemsize
 
     @property
-    def size(self) -> int:
+    def end(self) -> int:
         """Return the end of the zone, which is the size of the file if it is the last."""
         sizes = (
             NAME_BYTES + self.width * (2 + 2 * piece_rows + nodes)
@@ -110,23 +109,24 @@ _WIDTHS = SIZES[list(SORTED)] + 2
 """How many numbers an element has in the list, by type in the order of ``SORTED``."""
 
 
-def binary_layout(
-    text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1
-) -> BinaryLayout:
-    """Return the layout of the binary form of a text mesh.
+def binary_layouts(texts: Sequence[Text], *, is_result: bool) -> list[BinaryLayout]:
+    """Return the layouts of the binary form of a text mesh, one for each of its zones.
 
-    ``text``: the text mesh.
     ``is_result``: whether the binary is made for users, as by `slideviz.convert`: with the markers'
     names and 8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they
     fit.
-    ``begin`` and ``number``: first byte and number of its zone.
     """
-    pieces = text.zone.elements
-    before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
-    np.cumsum(_counted(text), axis=0, out=before[1:])
-    length = int(before[-1] @ _WIDTHS)
-    short = not is_result and max(length, text.n_points) <= LARGEST_4
-    return BinaryLayout(text, 4 if short else 8, is_result, before, begin, number)
+    layouts: list[BinaryLayout] = []
+    for text in texts:
+        before = np.zeros((len(text.zone.elements) + 1, len(SORTED)), np.int64)
+        np.cumsum(_counted(text), axis=0, out=before[1:])
+        layouts.append(BinaryLayout(text, before, is_result))
+    largest = max(max(one.length, one.text.n_points) for one in layouts)
+    width, begin = 4 if not is_result and largest <= LARGEST_4 else 8, HEAD
+    for k, one in enumerate(layouts):
+        layouts[k] = replace(one, width=width, begin=begin, number=k + 1)
+        begin = layouts[k].end
+    return layouts
 
 
 def _counted(text: Text) -> IntArray:
@@ -150,14 +150,20 @@ def _counted(text: Text) -> IntArray:
     return out
 
 
-def write_layout(
-    layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool = SERIAL
+def write_layouts(
+    layouts: Sequence[BinaryLayout], path: Path, progress: Tick, ranks: SerialPool = SERIAL
 ) -> bytes:
     """Write the binary form of a text into an existing file of its size, but for the file's head.
 
-    Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it. Raises
-    MeshError if the text has a mistake; the message has its line.
+    Returns the head (``HEAD`` bytes), which the caller writes. Raises MeshError if the text has a
+    mistake; the message has its line.
     """
+    for layout, share in zip(layouts, equal_shares(progress, len(layouts)), strict=True):
+        _write_layout(layout, path, share, ranks)
+    return np.array([layouts[0].width, len(layouts)], "<i4").tobytes()
+
+
+def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool) -> None:
     text, conn = layout.text, layout.conn
     zone, lines = text.zone, text.lines
     tasks: list[_Task] = [
@@ -187,7 +193,6 @@ def write_layout(
         ):
             file.seek(at)
             file.write(content)
-    return np.array([layout.width, 1], "<i4").tobytes()
 
 
 def _silent(_: float) -> None:
@@ -237,8 +242,8 @@ def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
         some = cells if len(mine) == len(types) else cells.take(mine)
         table = rows_of(some.types, some.connectivity, piece.row + mine)
         offsets = start + width * np.arange(len(mine))
-        _write_at(out, layout.offsets + row * layout.width, offsets.astype(layout.conn))
-        _write_at(out, layout.entries + start * layout.width, table.astype(layout.conn))
+        write_at(out, layout.offsets + row * layout.width, offsets.astype(layout.conn))
+        write_at(out, layout.entries + start * layout.width, table.astype(layout.conn))
     return 0
 
 
@@ -256,12 +261,5 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
         raise too_large(text.lines.name, piece.row + at, points[at])
     block = np.empty(piece.rows, layout.point)
     block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
-    _write_at(out, layout.points + piece.row * layout.point.itemsize, block)
+    write_at(out, layout.points + piece.row * layout.point.itemsize, block)
     return filled
-
-
-def _write_at(out: int, at: int, content: NDArray) -> None:
-    left = content.view(np.uint8).data
-    while left:
-        written = os.pwrite(out, left, at)
-        at, left = at + written, left[written:]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.formats.su2.text import SEND_RECEIVE
+from slideviz.formats.su2.text import SEND_RECEIVE, Text
 from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.zones import zones_of
@@ -75,6 +75,12 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
         OTHER_ZONES: zones > 1,
     }
     return tuple(words for words, is_lost in lost.items() if is_lost)
+
+
+def lost_of_texts(texts: Sequence[Text]) -> tuple[str, ...]:
+    """Describe which parts of zones of an SU2 text a binary file of these cannot hold."""
+    keys = (part.key for text in texts for part in text.zone.unknown)
+    return lost_of_text(keys, texts[0].zone.bounds.zones if len(texts) == 1 else 1)
 
 
 def join_words(lost: Sequence[str]) -> str:

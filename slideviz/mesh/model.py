@@ -202,6 +202,11 @@ class Part:
     n_cells: int
     """`n_points`, `n_cells`: numbers of points and cells of the whole mesh."""
 
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Return the numbers of points and cells of the whole mesh."""
+        return self.n_points, self.n_cells
+
 
 @dataclass(frozen=True, eq=False)
 class ZoneInterface:
@@ -250,6 +255,10 @@ class ZonePart:
     cells: slice
     markers: slice
     """`points`, `cells`, `markers`: its points, cells and boundaries in the mesh of all zones."""
+    first_point: int
+    first_cell: int
+    """`first_point`, `first_cell`: numbers of its first point and cell in the file of all zones;
+    other than in the mesh where that is only a part (`Mesh.part`)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,7 +16,7 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import find_interfaces
-from slideviz.mesh.model import Cells, IntArray, Marker, Mesh, ZoneInterface, ZonePart, sealed
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh, Part, ZoneInterface, ZonePart, sealed
 
 
 def numbered(zone: int, name: str) -> str:
@@ -53,6 +53,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
             [zone.markers for zone in zones],
         )
     )
+    part, first_point, first_cell = _part(zones)
     coords = sealed(np.concatenate([zone.points for zone in zones]))
     alone = [
         replace(zone, points=coords[part], interfaces=())
@@ -70,7 +71,8 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
         name=first.name,
         zone=None,
         zones=len(zones),
-        zone_parts=tuple(map(ZonePart, alone, points, cells, markers)),
+        zone_parts=tuple(map(ZonePart, alone, points, cells, markers, first_point, first_cell)),
+        part=part,
         source=first.source,
         remarks=tuple(f"zone {zone.zone}: {text}" for zone in zones for text in zone.remarks),
     )
@@ -147,6 +149,25 @@ def spellings(mesh: Mesh) -> Mapping[str, str]:
     if mesh.zones > 1 and mesh.zone is not None:
         out = {numbered(mesh.zone, name): name for name in mesh.marker_names}
     return out
+
+
+def _part(zones: Sequence[Mesh]) -> tuple[Part | None, list[int], list[int]]:
+    """Return the part of all zones of which parts are in memory; the first numbers of each zone."""
+    sizes = [
+        (len(zone.points), len(zone.cells)) if (one := zone.part) is None else one.sizes
+        for zone in zones
+    ]
+    (*points, n_points), (*cells, n_cells) = (
+        accumulate(counts, initial=0) for counts in zip(*sizes, strict=True)
+    )
+    parts = [zone.part for zone in zones if zone.part is not None]
+    if len(parts) < len(zones):
+        return None, points, cells
+    numbers = [
+        sealed(np.concatenate([mine + first for mine, first in zip(each, firsts, strict=True)]))
+        for each, firsts in (([p.points for p in parts], points), ([p.cells for p in parts], cells))
+    ]
+    return Part(numbers[0], numbers[1], n_points, n_cells), points, cells
 
 
 def _shifted(cells: Cells, by: int) -> Cells:

@@ -271,9 +271,7 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
 
     kind = case.mesh_format if case is not None else None
     if kind != "su2" and is_large(mesh_path, zone):
-        return prepare(
-            read_boundary(mesh_path, zone or 1, reading), mesh_path, case, report, stopped
-        )
+        return prepare(read_boundary(mesh_path, zone, reading), mesh_path, case, report, stopped)
     mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
     return prepare(mesh, mesh_path, case, report, stopped)
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.formats.su2b.layout import BinaryFile, find_zone, find_zones
+from slideviz.formats.su2b.layout import open_zones
 from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import QualityTotals, quality
@@ -33,10 +33,8 @@ def is_large(path: Path, zone: int | None) -> bool:
     """
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        places = find_zones(source) if zone is None else (find_zone(source, zone),)
-    cells = sum(place.cells.count for place in places)
+    with open_zones(path, zone) as (_, places):
+        cells = sum(place.cells.count for place in places)
     if places[0].dim == 2:  # all of its cells are what is drawn
         return False
     return cells > LARGE_CELLS or NEEDED["su2b"] * path.stat().st_size > free_memory()
@@ -83,7 +81,7 @@ def frame_of(
     assert skin.source is not None
     with ExitStack() as stack:
         source = FileSource.open(stack, (skin.source, skin.zone), moved=file)
-        worst = source.with_points(source.elements(totals.worst))
+        worst = source.cells(totals.worst)
     measured = replace(quality(now, skin, metric), of_mesh=totals)
     return StepFrame(now, measured, extra=block_frame(worst, skin, metric), file=file)
 

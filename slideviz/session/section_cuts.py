@@ -110,9 +110,14 @@ def read_slab(
             groups = _GROUPS[skin] = Groups.of(source, tick)
 
         def blocks() -> Iterator[CellBlock]:
-            for first, count in _runs(groups.met_by(section), source.n_cells):
-                going_on()
-                yield source.between(first, count)
+            met, begin = groups.met_by(section), 0
+            for zone in source.zones:  # whose last group may have fewer cells
+                end = begin - (-zone.n_cells // GROUP)
+                here = met[(met >= begin) & (met < end)] - begin
+                for first, count in _runs(here, zone.n_cells):
+                    going_on()
+                    yield zone.between(first, count)
+                begin = end
 
         slab = cut_cells(blocks(), section, near=ON_SECTION * groups.scale)
     if len(slab.ids):

@@ -38,7 +38,7 @@ from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.solver.zones import joined_repairs
-from slideviz.system.threads import Tick, progress_share
+from slideviz.system.threads import Tick, equal_shares
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, RepairTarget, Role, SkewMetric
 
 _NO_IMAGES = "they are no images of each other; name two that are"
@@ -251,11 +251,9 @@ def _mended_zones(
 ) -> MeshRepair:
     """Return a mesh of all zones with the bad cells of each mended."""
     shapes = (None,) * mesh.zones if reference is None else zones_of(reference)
-    each = zip(zone_cases(case, mesh), zones_of(mesh), zones_of(now), shapes, strict=True)
-    done = {}
-    for k, (one, zone, moved, shape) in enumerate(each):
-        share = progress_share(tick, k / mesh.zones, (k + 1) / mesh.zones)
-        done[k] = mend(one, zone, moved, shape, share)
+    shares = equal_shares(tick, mesh.zones)
+    each = zip(zone_cases(case, mesh), zones_of(mesh), zones_of(now), shapes, shares, strict=True)
+    done = {k: mend(*of_zone) for k, of_zone in enumerate(each)}
     mended = joined_repairs(mesh, with_zones(now, [one.mesh for one in done.values()]), done)
     assert mended is not None
     return mended

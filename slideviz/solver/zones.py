@@ -110,19 +110,26 @@ class InterfaceMotion:
         motions = *alone.motions, Prescribed(here, vectors, names)
         self.cases[index] = alone.change(roles=roles, motions=motions)
 
-    def together(self, points: FloatArray) -> FloatArray:
-        """Return points (n, d) in which followers are where their leaders are, to the bit.
+    def after(self, steps: Mapping[int, Step]) -> Mesh:
+        """Return the mesh of all zones after steps of some, in which interfaces fit to the bit.
 
-        That is where both were so at first, and are apart by rounding only.
+        Followers are where their leaders are, where both were so at first, and are apart by
+        rounding only.
         """
-        nodes = np.flatnonzero(self.led)
+        parts = enumerate(self.mesh.zone_parts)
+        now = with_zones(self.mesh, [steps[k].mesh if k in steps else z.mesh for k, z in parts])
+        points, nodes = now.points, np.flatnonzero(self.led)
         leaders, start = self.leader[nodes], self.mesh.points
         alike = (start[nodes] == start[leaders]).all(axis=1)
         gap = np.abs(points[nodes] - points[leaders]).max(axis=1, initial=0.0)
         alike &= gap <= ROUNDING * self.mesh.extent
         out = points.copy()
         out[nodes[alike]] = points[leaders[alike]]
-        return out
+        return now.with_points(sealed(out))
+
+
+Runs = dict[int, list[Step]]
+"""The steps of zones, by their place in the mesh, in the order in which they were deformed."""
 
 
 def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[Step]:
@@ -133,9 +140,14 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
     does not fit the mesh.
     """
     case = with_marker_names(case, mesh)
+    yield from joined_steps(case, *zone_runs(case, mesh, run, report))
+
+
+def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
+    """Return the motion of interfaces, and the steps of those zones that move."""
     require_valid(case, mesh)
-    motion, apart = InterfaceMotion(case, mesh), apart_interfaces(mesh, case.interfaces)
-    ahead, runs = set(range(len(motion.cases))), dict[int, list[Step]]()
+    motion = InterfaceMotion(case, mesh)
+    ahead, runs = set(range(len(motion.cases))), Runs()
     while moving := motion.moving(sorted(ahead)):
         index = motion.first(moving)
         ahead.remove(index)
@@ -151,16 +163,18 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
             problem.args = (f"zone {index + 1}: {problem}",)
             raise
         motion.slid(index, runs[index][-1].mesh.points, ahead)
-    longest = max(runs.values(), key=len)
+    return motion, runs
+
+
+def joined_steps(case: Case, motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
+    """Yield the steps of zones as those of the mesh of all."""
+    mesh, longest = motion.mesh, max(runs.values(), key=len)
+    apart = apart_interfaces(mesh, case.interfaces)
     before: dict[int, Step] = {}
     for leader in longest:
         steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
         fresh = {k: step for k, step in steps.items() if before.get(k) is not step}
-        zones = [
-            steps[k].mesh if k in steps else part.mesh for k, part in enumerate(mesh.zone_parts)
-        ]
-        now = with_zones(mesh, zones)
-        now = now.with_points(sealed(motion.together(now.points)))
+        now = motion.after(steps)
         torn = torn_interfaces(mesh, now.points)
         yield replace(
             joined_step(mesh, now, steps, fresh),
@@ -194,12 +208,11 @@ def joined_step(
     for step in new:
         spent.update(step.seconds)
     relaxed = [step.relaxed for step in new if step.relaxed is not None]
-    first = {index: part.points.start for index, part in enumerate(mesh.zone_parts)}
     safe = [
         step.safe if step.safe.cell is None else replace(step.safe, cell=cell)
         for index, step in fresh.items()
         if step.safe is not None
-        for cell in [mesh.zone_parts[index].cells.start + (step.safe.cell or 0)]
+        for cell in [mesh.zone_parts[index].first_cell + (step.safe.cell or 0)]
     ]
     return Step(
         index=1,
@@ -213,7 +226,9 @@ def joined_step(
         warnings=(),
         history=tuple(cycle for step in new for cycle in step.history),
         tried=tuple(trial for step in new for trial in step.tried),
-        control=np.concatenate([step.control + first[k] for k, step in steps.items()]),
+        control=np.concatenate(
+            [step.control + mesh.zone_parts[k].points.start for k, step in steps.items()]
+        ),
         candidates=sum(step.candidates for step in each),
         tolerance=_largest(step.tolerance for step in each),
         layers=max(step.layers for step in each),
@@ -252,21 +267,21 @@ def joined_repairs(
     if not done:
         return None
 
-    def numbers(name: str, start: str) -> IntArray:
-        each = [getattr(one, name) + getattr(part, start).start for part, one in done]
+    def numbers(name: str, start: str = "first_cell") -> IntArray:
+        each = [getattr(one, name) + getattr(part, start) for part, one in done]
         return sealed(np.concatenate(each))
 
     return MeshRepair(
         mesh=now,
-        cells=numbers("cells", "cells"),
-        left=numbers("left", "cells"),
-        folded=numbers("folded", "cells"),
-        folded_left=numbers("folded_left", "cells"),
-        nodes=numbers("nodes", "points"),
+        cells=numbers("cells"),
+        left=numbers("left"),
+        folded=numbers("folded"),
+        folded_left=numbers("folded_left"),
+        nodes=numbers("nodes", "first_point"),
         points=sealed(np.concatenate([one.points for _, one in done])),
         largest_move=max(one.largest_move for _, one in done),
         unmendable=tuple(
-            (cell + part.cells.start, why) for part, one in done for cell, why in one.unmendable
+            (cell + part.first_cell, why) for part, one in done for cell, why in one.unmendable
         ),
         warnings=tuple(text for _, one in done for text in one.warnings),
     )

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import printable
-from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layout
-from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
-from slideviz.formats.su2.text import Text, find_text
+from slideviz.formats.binary_copy import binary_layouts, write_layouts
+from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
+from slideviz.formats.source import open_source
+from slideviz.formats.su2.text import Text, find_texts
 from slideviz.formats.su2.write import content_blocks, require_text_names
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
-from slideviz.formats.su2b.read import element_blocks, read_markers
-from slideviz.formats.su2b.write import file_head, halo_error, require_binary_names
+from slideviz.formats.su2b.read import BLOCK, read_markers
+from slideviz.formats.su2b.write import halo_error, require_binary_names
 from slideviz.formats.table import ZoneContent, format_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
-from slideviz.streaming.source import FileSource, Scratch
+from slideviz.streaming.source import FileSource, Scratch, ZoneSource
 from slideviz.system.atomic import atomic_write
 from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat
@@ -30,11 +30,19 @@ from slideviz.terms import FileFormat
 NEAR = 256  # elements with at most so many others between them are read in one piece
 
 
-def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:
-    """Yield an SU2 binary mesh as an SU2 text.
+def text_of_binary(zones: Sequence[ZoneSource], folder: Path) -> Iterator[bytes]:
+    """Yield zones of an SU2 binary mesh as an SU2 text.
 
     A scratch file is made in ``folder`` if the cells are not in order in the binary file.
     """
+    if len(zones) > 1:
+        yield f"NZONE= {len(zones)}\n".encode()
+    for number, zone in enumerate(zones, 1):
+        yield f"IZONE= {number}\n".encode() if len(zones) > 1 else b""
+        yield from _text_of_zone(zone, folder)
+
+
+def _text_of_zone(source: ZoneSource, folder: Path) -> Iterator[bytes]:
 
     def points(i: int, j: int) -> FloatArray:
         return np.ascontiguousarray(source.points.rows(i, j - i)["x"], np.float64)
@@ -61,13 +69,13 @@ def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:
         yield from content_blocks([content], source.file.name)
 
 
-def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | None:
+def _places(stack: ExitStack, source: ZoneSource, folder: Path) -> IntArray | None:
     """Return the place of each cell among the elements of a file (m,); None where all are in order.
 
     They are in a scratch file in ``folder``, removed when ``stack`` closes.
     """
-    place, scratch = source.place, None
-    for block in element_blocks(source.file, place, place.cells, place.dim):
+    scratch = None
+    for block in source.elements(BLOCK):
         here = slice(block.first, block.first + len(block.ids))
         ids = index_of(block.ids)
         if scratch is None and not (isinstance(ids, slice) and ids == here):
@@ -79,7 +87,7 @@ def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | No
     return None if scratch is None else scratch.array
 
 
-def _gathered(source: FileSource, where: IntArray) -> Cells:
+def _gathered(source: ZoneSource, where: IntArray) -> Cells:
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
     types, flats = [], []
@@ -125,30 +133,16 @@ def convert_streamed(
 
 
 def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
-    texts = [find_text(source, zone or 1, progress_share(tick, 0.0, 0.1))]
-    zones = texts[0].zone.bounds.zones
-    if zone is None:
-        texts += [find_text(source, number) for number in range(2, zones + 1)]
-    layouts: list[BinaryLayout] = []
+    texts = find_texts(open_source(source), zone, progress_share(tick, 0.0, 0.1))
     for number, text in enumerate(texts, 1):
         name = printable(source.name) + (f", zone {number}" if number > 1 else "")
         _require_binary(text, name)
-        begin = layouts[-1].size if layouts else 8
-        layouts.append(binary_layout(text, is_result=True, begin=begin, number=number))
-    keys = (part.key for text in texts for part in text.zone.unknown)
-    alone = zone is not None and zones > 1
-    lost = lost_of_text(keys, zones if alone else 1)
-    warn(sentence_of_lost(target, printable(source.name), lost, alone=alone))
-    require_disk_space(target, target, layouts[-1].size)
+    layouts, alone = binary_layouts(texts, is_result=True), texts[0].zone.bounds.zones > len(texts)
+    warn(sentence_of_lost(target, printable(source.name), lost_of_texts(texts), alone=alone))
+    require_disk_space(target, target, layouts[-1].end)
     with atomic_write(target) as file:
-        os.truncate(file.fileno(), layouts[-1].size)
-        for k, layout in enumerate(layouts):
-            share = progress_share(
-                tick, 0.1 + 0.9 * k / len(layouts), 0.1 + 0.9 * (k + 1) / len(layouts)
-            )
-            write_layout(layout, Path(file.name), share)
-        for block in file_head(len(layouts)):
-            file.write(block)
+        os.truncate(file.fileno(), layouts[-1].end)
+        file.write(write_layouts(layouts, Path(file.name), progress_share(tick, 0.1)))
     tick(1.0)
 
 
@@ -163,33 +157,23 @@ def _require_binary(text: Text, name: str) -> None:
 
 
 def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
-    with source.open("rb") as file:
-        binary = BinaryFile(source, file)
-        places = find_zones(binary) if zone is None else (find_zone(binary, zone),)
+    with ExitStack() as stack:
+        zones = FileSource.open(stack, (source, zone)).zones
+        binary, places = zones[0].file, [one.place for one in zones]
         for place in places:
             require_text_names(binary.name, (marker.name for marker in place.markers))
         if len(places) < binary.zones:
             name = printable(source.name)
             warn(sentence_of_lost(target, name, [OTHER_ZONES], alone=True))
-        sizes = [text_size(place) for place in places]
+        size = text_size(places)
         more = PLACE_BYTES * max(place.cells.count for place in places)
-        require_disk_space(target, target, sum(sizes) + more)
+        require_disk_space(target, target, size + more)
         for place in places:  # finds every mistake in the file, as reading it whole would
             read_skin(source, place.number, progress_share(tick, 0.0, 0.3))
         written = 0
         with atomic_write(target) as out:
-            for block in _text_blocks(binary, places, Path(os.path.realpath(target)).parent):
+            for block in text_of_binary(zones, Path(os.path.realpath(target)).parent):
                 out.write(block)
                 written += len(block)
-                tick(min(1.0, 0.3 + 0.7 * written / sum(sizes)))
+                tick(min(1.0, 0.3 + 0.7 * written / size))
     tick(1.0)
-
-
-def _text_blocks(binary: BinaryFile, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
-    if len(places) == 1:
-        yield from text_of_binary(FileSource.of(binary, places[0]), folder)
-        return
-    yield f"NZONE= {len(places)}\n".encode()
-    for number, place in enumerate(places, 1):
-        yield f"IZONE= {number}\n".encode()
-        yield from text_of_binary(FileSource.of(binary, place), folder)

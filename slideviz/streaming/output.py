@@ -10,26 +10,29 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import TypeVar
 
 import numpy as np
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
+from slideviz.formats.su2b.write import write_at
+from slideviz.mesh.quality import Quality
 from slideviz.rbf.problem import PhaseTimer
-from slideviz.solver.steps import MeshRepair
 from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.quality import (
     MeasuredBlock,
+    QualityCollector,
     RunCollector,
-    facet_sums,
+    orientations_of,
     require_consistent_orientation,
 )
-from slideviz.streaming.source import FileSource, PointTable
+from slideviz.streaming.source import FileSource, PointTable, ZoneSource
 from slideviz.streaming.stream_input import StreamInput, text_blocks
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
@@ -43,10 +46,14 @@ PARTS = 1024
 """Parts of a file, within the two limits above: enough for many ranks. It does not depend on the
 number of ranks, for a stopped run may go on with another number of them."""
 Part = tuple[int, int]  # a range of nodes or cells: the first, and the one after the last
+T = TypeVar("T")
 
 
 class Output:
-    """Writes the deformed mesh of a streamed run, and measures the quality of its cells."""
+    """Writes the deformed mesh of a streamed run, and measures the quality of its cells.
+
+    Zones are named by their places: 0, 1, ...
+    """
 
     def __init__(
         self,
@@ -63,28 +70,33 @@ class Output:
         replaces: Path | None,
     ) -> None:
         self._stack, self._input, self._path, self._timer = stack, mesh_input, output, timer
-        self._metric, self._ranks, self._is_text, self._replaces = metric, ranks, is_text, replaces
-        self._mesh_file, self._zone = mesh_input.path, mesh_input.zone
-        self.source = FileSource.open(stack, (mesh_input.path, mesh_input.zone))
-        """The undeformed mesh."""
-        points, n_points = self.source.points, self.source.n_points
-        about = f"{about} {is_text} {parts(n_points)[0]}"
+        self._ranks, self._is_text, self._replaces = ranks, is_text, replaces
+        every = FileSource.open(stack, (mesh_input.path, mesh_input.zone)).zones
+        self.zones = tuple(replace(one, first_cell=0, first_point=0) for one in every)
+        """The zones of the undeformed mesh, each with numbers of its own."""
+        self._cells = [slice(one.first_cell, one.first_cell + one.n_cells) for one in every]
+        sizes = [zone.n_points for zone in self.zones]
+        self._parts = [(k, part) for k, size in enumerate(sizes) for part in parts(size)]
+        about = f"{about} {is_text} {[parts(size)[:1] for size in sizes]}"
         if is_text:
             require_no_input(output, MeshError, replaces)
             partial = partial_file(output, mesh_input.path.stat().st_size, about, resume=resume)
         else:
+            tables = [zone.points for zone in self.zones]
             partial = partial_copy(
                 output,
                 mesh_input.path,
                 about,
-                (points.byte(0), points.byte(n_points)),
+                [(one.byte(0), one.byte(one.place.n_points)) for one in tables],
                 resume=resume,
                 replaces=replaces,
                 ranks=ranks,
             )
         self._partial = stack.enter_context(partial)
-        self._is_ready = self._is_oriented = False
-        self._collector: RunCollector | None = None
+        self._is_ready = False
+        self._is_oriented: set[int] = set()
+        self._metric = metric
+        self._collectors: list[QualityCollector] = []
 
     def _opened(self) -> Partial:
         """Return the file for the deformed points when it can be written; of a text only points."""
@@ -96,19 +108,25 @@ class Output:
         return self._partial
 
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
-        """Take the parts as not done from the first one on whose bytes do not have its checksum."""
-        done = parts(self.source.n_points)[: partial.done]
-        arguments = self._mesh_file, self._zone, partial.path
-        with self._ranks.sharing(checksum_reader, *arguments) as do:
-            for k, found in enumerate(do(done)):
-                if found != partial.sums[k]:
-                    partial.note(partial.sums[:k])
-                    break
-                tick((k + 1) / len(done))
+        """Take those parts as not done whose bytes do not have their checksum."""
+        sums = partial.sums = partial.sums or [None] * len(self._parts)
+        for k, zone in enumerate(self.zones):
+            done = [at for at in self._parts_of(k) if sums[at] is not None]
+            todo = [self._parts[at][1] for at in done]
+            with self._ranks.sharing(checksum_reader, *zone.undeformed, partial.path) as do:
+                for at, found in zip(done, do(todo), strict=True):
+                    if found != sums[at]:
+                        partial.note([*sums[:at], None, *sums[at + 1 :]])
+                        sums = partial.sums
+                    tick((at + 1) / len(sums))
+
+    def _parts_of(self, zone: int) -> list[int]:
+        """Return the places in the list of all parts of those of a zone, by its place."""
+        return [at for at, (k, _) in enumerate(self._parts) if k == zone]
 
     def resume_message(self) -> str:
         """Return a sentence on how much of a stopped run can be used."""
-        done, total = self._opened().done, len(parts(self.source.n_points))
+        done, total = self._opened().done, len(self._parts)
         if done:
             return f"{self._path.name}: continues after {done} of {total} parts"
         if self._input.is_reused:
@@ -120,92 +138,106 @@ class Output:
             f"run starts from the beginning"
         )
 
-    def displace(self, displacer: InteriorDisplacer, *, final: bool) -> None:
-        """Write all points after the last step, but for parts that a stopped run has written.
+    def displace(self, zone: int, displacer: InteriorDisplacer | None, *, final: bool) -> None:
+        """Write all points of a zone after the last step, but for parts that a stopped run wrote.
 
         Points that are not ``final`` are those of a trial number of steps: all are written, and a
-        stopped run does not go on with them.
+        stopped run does not go on with them. Without ``displacer`` they are the undeformed ones.
         """
-        partial, total = self._opened(), self.source.n_points
-        if not final and partial.done:
-            partial.note([])
+        partial, mine = self._opened(), self._parts_of(zone)
+        if not final and any(partial.sums[at] is not None for at in mine):
+            partial.note([None if at in mine else one for at, one in enumerate(partial.sums)])
         # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
-        arguments = self._mesh_file, self._zone, partial.path, displacer.without_cells(), synced
+        steps = displacer and displacer.without_cells()
+        arguments = *self.zones[zone].undeformed, partial.path, steps, synced
         with (
             self._timer.phase("evaluate") as tick,
             self._ranks.sharing(point_writer, *arguments) as do,
         ):
-            todo = parts(total, partial.done)
-            for (_, end), checksum in zip(todo, do(todo), strict=True):
+            todo = [at for at in mine if partial.sums[at] is None]
+            written = do([self._parts[at][1] for at in todo])
+            for at, checksum in zip(todo, written, strict=True):
                 if final:
-                    partial.note([*partial.sums, checksum])
-                tick(end / total)
+                    partial.note([*partial.sums[:at], checksum, *partial.sums[at + 1 :]])
+                tick(self._parts[at][1][1] / self.zones[zone].n_points)
 
-    def measure(self, listed: int, displacer: InteriorDisplacer | None = None) -> RunCollector:
-        """Return the quality of all cells, before and after, with ``listed`` inverted ones.
+    def measure(
+        self, zone: int, listed: int, displacer: InteriorDisplacer | None = None
+    ) -> RunCollector:
+        """Return the quality of a zone's cells, before and after, with ``listed`` inverted ones.
 
         With ``displacer`` it says how far each of its steps may go.
         Raises MeshError if cells are numbered in both directions, and some are folded.
         """
-        partial, count = self._opened(), self.source.n_cells
-        metric, folder = self._metric, self._path.parent
-        if self._collector is None:
-            self._collector = RunCollector(self._stack, folder, count, metric)
-        self._collector.reset()
-        steps = displacer and displacer.without_cells()
-        arguments = self._mesh_file, self._zone, partial.path, metric, listed, steps
+        partial, source, count = self._opened(), self.zones[zone], self._cells[-1].stop
+        if not self._collectors:
+            arguments = self._stack, self._path.parent, count, self._metric
+            self._collectors = [QualityCollector(*arguments) for _ in range(2)]
+        collector = RunCollector(*(one.of_cells(self._cells[zone]) for one in self._collectors))
+        todo, steps = parts(source.n_cells), displacer and displacer.without_cells()
+        workers = *source.undeformed, partial.path, self._metric, listed, steps
         with (
             self._timer.phase("quality") as tick,
-            self._ranks.sharing(cell_measurer, *arguments) as do,
+            self._ranks.sharing(cell_measurer, *workers) as do,
         ):
-            for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
-                self._collector.add(found, listed)
-                tick(end / count)
-        if len(self._collector.after.signs) > 1 and not self._is_oriented:
-            with self._ranks.sharing(facet_sums, self._mesh_file, self._zone) as do:
-                require_consistent_orientation(do(parts(count)), self.source.file.name)
-            self._is_oriented = True
-        return self._collector
+            for (_, end), found in zip(todo, do(todo), strict=True):
+                collector.add(found, listed)
+                tick((self._cells[zone].start + end) / count)
+        if len(collector.after.signs) > 1 and zone not in self._is_oriented:
+            require_consistent_orientation(source, todo, self._ranks)
+            self._is_oriented.add(zone)
+        return collector
 
-    def mend(self, repair: Callable[[FileSource, BinaryIO, Tick], MeshRepair]) -> MeshRepair:
-        """Return what ``repair`` did to the deformed mesh, in the file of its points."""
+    def qualities(self, measured: Sequence[RunCollector], worst: int) -> tuple[Quality, Quality]:
+        """Return the quality of all zones, after and before; ``worst`` as `quality_totals`."""
+        signs = orientations_of(np.concatenate([one.after.signs for one in measured]))
+        for collector in self._collectors:
+            collector.signs = signs
+        after, before = self._collectors
+        return after.quality(worst), before.quality()
+
+    def change(self, zone: int, phase: str, work: Callable[[ZoneSource, int, Tick], T]) -> T:
+        """Return the result of ``work`` on a zone of the deformed mesh, in the file of its points.
+
+        Its arguments are the zone, the descriptor of that file, and a tick.
+        """
         partial = self._opened()
-        zone = self._mesh_file, self._zone
-        with self._timer.phase("repair") as tick, ExitStack() as stack:
-            return repair(FileSource.open(stack, zone, moved=partial.path), partial.file, tick)
+        with self._timer.phase(phase) as tick, ExitStack() as stack:
+            source = FileSource.open(stack, self.zones[zone].undeformed, moved=partial.path)
+            return work(source.zones[0], partial.file.fileno(), tick)
 
-    def finish(self, ffd: bytes | None) -> None:
-        """Write the output where it is a text, with the boxes ``ffd``, None: those of the mesh."""
+    def finish(self, boxes: Sequence[bytes | None]) -> None:
+        """Write the output where it is a text, with ``boxes`` of each zone, None: as they were."""
         if not self._is_text:
             return
         partial, written = self._opened(), 0
-        source, place = self.source.file, self.source.place
-        if self._input.text is None:
-            folder = Path(os.path.realpath(self._path)).parent
-            moved = FileSource.of(source, place, source.of(partial.file))
-            blocks = text_of_binary(moved, folder)
+        if not self._input.texts:
+            tables = [PointTable(one.file.of(partial.file), one.place) for one in self.zones]
+            moved = [replace(z, points=t) for z, t in zip(self.zones, tables, strict=True)]
+            blocks = text_of_binary(moved, Path(os.path.realpath(self._path)).parent)
         else:
-            blocks = text_blocks(self._input, source, place, partial.path, ffd)
+            blocks = text_blocks(self._input, self.zones, partial.path, boxes)
+        size = self._input.text_size([zone.place for zone in self.zones])
         with self._timer.phase("write") as tick:
             with atomic_write(self._path, replaces=self._replaces) as file:
                 for block in blocks:
                     file.write(block)
                     written += len(block)
-                    tick(min(1.0, written / self._input.text_size(place)))
+                    tick(min(1.0, written / size))
             tick(1.0)
         partial.remove()
 
 
-def parts(count: int, done: int = 0) -> list[Part]:
-    """Return the parts of ``count`` nodes or cells, without the first ``done`` parts."""
+def parts(count: int) -> list[Part]:
+    """Return the parts of ``count`` nodes or cells."""
     size = min(CHUNK, max(FEWEST, -(-count // PARTS)))
-    return [(first, min(first + size, count)) for first in range(done * size, count, size)]
+    return [(first, min(first + size, count)) for first in range(0, count, size)]
 
 
 @contextmanager
 def point_writer(
-    path: Path, zone: int | None, partial: Path, displacer: InteriorDisplacer, synced: bool
+    path: Path, zone: int, partial: Path, displacer: InteriorDisplacer | None, synced: bool
 ) -> Iterator[Callable[[Part], int]]:
     """Context with a function that writes the deformed points of a part, as `write_points` does.
 
@@ -213,41 +245,40 @@ def point_writer(
     ``synced`` they are on the disk when the function returns.
     """
     with ExitStack() as stack:
-        points = FileSource.open(stack, (path, zone)).points
+        (source,) = FileSource.open(stack, (path, zone)).zones
         out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
-            yield lambda part: write_points(points, displacer, out, part)
+            yield lambda part: write_points(source.points, displacer, out, part)
         finally:
             os.close(out)
 
 
-def write_points(table: PointTable, displacer: InteriorDisplacer, out: int, part: Part) -> int:
+def write_points(
+    table: PointTable, displacer: InteriorDisplacer | None, out: int, part: Part
+) -> int:
     """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
-    at, rows = table.byte(part[0]), table.rows(part[0], part[1] - part[0])
+    rows = table.rows(part[0], part[1] - part[0])
     points = rows["x"].astype(np.float64)
-    for now in displacer.after_steps(np.arange(*part), points):
+    for now in displacer.after_steps(np.arange(*part), points) if displacer else ():
         points = now
     rows["x"] = points
-    left = rows.view(np.uint8).data
-    found = zlib.crc32(left)
-    while left:
-        written = os.pwrite(out, left, at)
-        at, left = at + written, left[written:]
-    return found
+    write_at(out, table.byte(part[0]), rows)
+    return zlib.crc32(rows.view(np.uint8).data)
 
 
 @contextmanager
-def checksum_reader(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
+def checksum_reader(path: Path, zone: int, partial: Path) -> Iterator[Callable[[Part], int]]:
     """Context with a function that returns the CRC-32 of a part as it is in the file."""
     with ExitStack() as stack:
-        points = FileSource.open(stack, (path, zone), moved=partial).points
-        yield lambda part: zlib.crc32(points.rows(part[0], part[1] - part[0]).view(np.uint8).data)
+        (source,) = FileSource.open(stack, (path, zone), moved=partial).zones
+        rows = source.points.rows
+        yield lambda part: zlib.crc32(rows(part[0], part[1] - part[0]).view(np.uint8).data)
 
 
 @contextmanager
 def cell_measurer(
     path: Path,
-    zone: int | None,
+    zone: int,
     partial: Path,
     metric: SkewMetric,
     listed: int,
@@ -255,7 +286,7 @@ def cell_measurer(
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Context with a function that measures the cells of a part, as `MeasuredBlock.of` does."""
     with ExitStack() as stack:
-        source = FileSource.open(stack, (path, zone), moved=partial)
+        (source,) = FileSource.open(stack, (path, zone), moved=partial).zones
         yield lambda part: MeasuredBlock.of(
             source.between(part[0], part[1] - part[0]), metric, listed, displacer
         )

@@ -11,8 +11,9 @@ is then 0 (modulo 2**64) where no cell is folded; where one is, it is 0 with a p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,8 +31,8 @@ from slideviz.solver.deform import folded_at
 from slideviz.solver.growth import Farthest, farthest_node
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.skin import Index, index_of
-from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch
-from slideviz.system.ranks import SERIAL
+from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch, ZoneSource
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
 from slideviz.terms import Metric, SkewMetric
 
@@ -55,6 +56,12 @@ class QualityCollector:
         self._values, self._status = (file.array for file in self._files)
         self.signs = np.zeros(0, np.int8)
         """Orientations that occur: 1, -1 (numbered the other way round), or both."""
+
+    def of_cells(self, cells: slice) -> QualityCollector:
+        """Return the collector of some of the cells, in the same scratch files."""
+        some = copy(self)
+        some._values, some._status = self._values[cells], self._status[cells]
+        return some
 
     def add(
         self,
@@ -95,15 +102,10 @@ def quality_blocks(
         measured = quality(block.mesh, block.base, metric)
         if isinstance(source, FileSource) and not may_fold:
             before, signs = len(signs), orientations_of(np.concatenate([signs, measured.signs]))
-            if before < 2 == len(signs):
-                remedy = "compare a deformed mesh with --reference UNDEFORMED, " * (
-                    source.base is None
-                )
-                parts = [
-                    (k, min(k + CELLS, source.n_cells)) for k in range(0, source.n_cells, CELLS)
-                ]
-                with SERIAL.sharing(facet_sums, *source.zone) as do:
-                    require_consistent_orientation(do(parts), source.file.name, remedy)
+            for zone in source.zones if before < 2 == len(signs) else ():
+                remedy = "compare a deformed mesh with --reference UNDEFORMED, "
+                parts = [(k, min(k + CELLS, zone.n_cells)) for k in range(0, zone.n_cells, CELLS)]
+                require_consistent_orientation(zone, parts, remedy=remedy * (zone.base is None))
         yield replace(block, quality=measured)
 
 
@@ -261,14 +263,10 @@ def _safe_fractions(block: CellBlock, displacer: InteriorDisplacer) -> list[Safe
 
 
 class RunCollector:
-    """The quality of all cells before and after a run, collected block by block."""
+    """The quality of all cells of a zone before and after a run, collected block by block."""
 
-    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: SkewMetric) -> None:
-        self.after, self.before = (QualityCollector(stack, folder, count, metric) for _ in range(2))
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the blocks that were added, before others are."""
+    def __init__(self, after: QualityCollector, before: QualityCollector) -> None:
+        self.after, self.before = after, before
         self.inverted: dict[int, tuple[int, IntArray]] = {}
         """VTK type and nodes of inverted cells, by their number: those with the lowest numbers."""
         self.farthest = Farthest(-1.0, 0, np.empty(0))
@@ -287,13 +285,13 @@ class RunCollector:
 
 
 @contextmanager
-def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
+def facet_sums(path: Path, zone: int) -> Iterator[Callable[[tuple[int, int]], int]]:
     """Context with a function that sums the signed hashes of the inner facets of some cells.
 
     Its argument is the first of these cells and the one after the last, by place in the file.
     """
     with ExitStack() as stack:
-        source = FileSource.open(stack, (path, zone))
+        (source,) = FileSource.open(stack, (path, zone)).zones
         markers = read_markers(source.file, source.place)
         hashes = [_marker_hashes(marker.cells) for marker in markers]
         marked = np.unique(np.concatenate(hashes or [_NONE]))
@@ -314,25 +312,31 @@ def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, in
         yield add
 
 
-def require_consistent_orientation(sums: Iterable[int], name: str, remedy: str = "") -> None:
-    """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
+def require_consistent_orientation(
+    zone: ZoneSource,
+    parts: Sequence[tuple[int, int]],
+    ranks: SerialPool = SERIAL,
+    remedy: str = "",
+) -> None:
+    """Raise where the sums of the hashes of all facets of a zone do not add up to 0.
 
     Raises MeshError if the sum is not 0: some cell is folded, or a part of the boundary is in no
     marker.
-    ``sums``: the sum of each part, of `facet_sums`.
-    ``name``: the mesh, for the message.
+    ``parts``: of the cells, as `facet_sums` takes them.
     ``remedy``: one more remedy for the message.
     """
-    if sum(sums) % 2**64:
+    with ranks.sharing(facet_sums, *zone.undeformed) as do:
+        total = sum(do(parts))
+    if total % 2**64:
         raise MeshError(
-            f"{name}: some cells are numbered the other way round than others, and others are "
-            "folded, or a part of the boundary is in no marker, which only the whole mesh can "
-            f"tell; {remedy}run it without --stream, or mesh again"
+            f"{zone.file.name}: some cells are numbered the other way round than others, and "
+            "others are folded, or a part of the boundary is in no marker, which only the whole "
+            f"mesh can tell; {remedy}run it without --stream, or mesh again"
         )
 
 
 def folded_steps(
-    displacer: InteriorDisplacer, source: FileSource, cells: Mapping[int, tuple[int, IntArray]]
+    displacer: InteriorDisplacer, source: ZoneSource, cells: Mapping[int, tuple[int, IntArray]]
 ) -> dict[int, tuple[int, int]]:
     """Return VTK type and first inverted step by number of ``cells``: VTK type and nodes each."""
     if not cells:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.case.model import Case
-from slideviz.formats.su2b.read import ElementBlock, element_blocks
+from slideviz.formats.su2b.read import ElementBlock
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, sealed
 from slideviz.mesh.quality import VALID, Quality
@@ -21,11 +19,10 @@ from slideviz.solver.deform import free_memory
 from slideviz.solver.repair import find_freedom, unmarked_sides, unmendable_words
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import MeshRepair
-from slideviz.streaming.source import CELLS, FileSource
+from slideviz.streaming.source import CELLS, ZoneSource
 from slideviz.system.threads import Tick
 
 BYTES = 3000  # of memory that repair takes for each cell of a region: measured on hexahedra
-RUN = 64  # nodes whose numbers are at most so far apart are written in one piece
 
 Chosen = Callable[[ElementBlock, IntArray], NDArray[np.bool_]]
 """Takes cells (k,) of a file, and where the nodes of each begin; returns which of them count."""
@@ -36,10 +33,10 @@ class FileRegions:
 
     Parameters
     ----------
-    source : FileSource
+    source : ZoneSource
         The mesh, and the undeformed points.
-    file : BinaryIO
-        The file of its points, to which moved ones are written.
+    file : int
+        Descriptor of the file of its points, to which moved ones are written.
     skin : Mesh
         The boundary and the cells at it.
     freedom : Freedom
@@ -52,8 +49,8 @@ class FileRegions:
 
     def __init__(
         self,
-        source: FileSource,
-        file: BinaryIO,
+        source: ZoneSource,
+        file: int,
         skin: Mesh,
         freedom: Freedom,
         facets: IntArray,
@@ -110,27 +107,11 @@ class FileRegions:
         order = np.argsort(every)
         before = np.concatenate([self.before, region.mesh.points[moved[new]]])
         self.nodes, self.before = every[order], before[order]
-        self._write(nodes, points[moved])
-
-    def _write(self, nodes: IntArray, points: FloatArray) -> None:
-        """Write the points (k, d) of ascending nodes (k,), and wait until they are on the disk."""
-        table = self._source.points
-        for part in np.split(np.arange(len(nodes)), np.flatnonzero(np.diff(nodes) > RUN) + 1):
-            if not len(part):
-                continue
-            first = int(nodes[part[0]])
-            rows = np.array(table.rows(first, int(nodes[part[-1]]) + 1 - first))
-            rows["x"][nodes[part] - first] = points[part]
-            left, at = rows.view(np.uint8).data, table.byte(first)
-            while left:
-                written = os.pwrite(self._file.fileno(), left, at)
-                at, left = at + written, left[written:]
-        os.fsync(self._file.fileno())
+        self._source.points.write(self._file, nodes, points[moved])
 
     def _blocks(self, chosen: Chosen) -> Iterator[ElementBlock]:
         """Yield the chosen cells of the file, block by block."""
-        file, place = self._source.file, self._source.place
-        for block in element_blocks(file, place, place.cells, place.dim, CELLS):
+        for block in self._source.elements(CELLS):
             self._going_on()
             sizes = SIZES[block.types]
             which = chosen(block, np.cumsum(sizes) - sizes)
@@ -168,8 +149,8 @@ def _touching(near: NDArray[np.bool_]) -> Chosen:
 
 def mend_file(
     case: Case,
-    source: FileSource,
-    file: BinaryIO,
+    source: ZoneSource,
+    file: int,
     tick: Tick,
     skin: Mesh,
     setup: Setup,

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
 from slideviz.formats.binary_copy import BinaryLayout
-from slideviz.formats.su2.text import find_text
-from slideviz.formats.su2b.layout import ZonePlace, open_zone
+from slideviz.formats.source import open_source
+from slideviz.formats.su2.text import find_texts
+from slideviz.formats.su2b.layout import ZonePlace, open_zones
 from slideviz.formats.su2b.partial import names_of
 from slideviz.formats.table import format_of
 from slideviz.solver.deform import free_memory
@@ -35,7 +37,10 @@ def missing_memory(case: Case) -> str:
     if kind is None:
         return ""
     message = missing_memory_of(path, kind)
-    return "" if message and kind == "su2" and find_text(path, case.zone).zone.sends else message
+    if message and kind == "su2":
+        texts = find_texts(open_source(path), case.zone)
+        return "" if any(text.zone.sends for text in texts) else message
+    return message
 
 
 def missing_memory_of(path: Path, kind: FileFormat) -> str:
@@ -68,29 +73,30 @@ def require_disk_space(place: Path, path: Path, size: int) -> None:
         )
 
 
-def text_size(place: ZonePlace) -> int:
-    """Return about how many bytes a zone of a binary mesh has as a text."""
-    return 8 * (place.cells.length + (2 * place.dim + 1) * place.n_points)
+def text_size(places: Sequence[ZonePlace]) -> int:
+    """Return about how many bytes zones of a binary mesh have as a text."""
+    return sum(8 * (one.cells.length + (2 * one.dim + 1) * one.n_points) for one in places)
 
 
-def bytes_of_text(layout: BinaryLayout, is_text: bool, later: int) -> int:
+def bytes_of_text(layouts: Sequence[BinaryLayout], is_text: bool, later: int) -> int:
     """Return the most bytes on the disk at a time in the run of a text mesh.
 
     ``is_text``: whether the output is a text. ``later``: bytes for each cell that the caller writes
     afterwards.
     """
-    result = layout.text.lines.raw.size if is_text else layout.size
-    points = layout.markers - layout.points if is_text else 0
-    cells = layout.text.n_cells
-    return result + CELL_BYTES * cells + max(layout.size + points, later * cells)
+    size = layouts[-1].end
+    result = layouts[0].text.lines.raw.size if is_text else size
+    points = sum(one.markers - one.points for one in layouts) if is_text else 0
+    cells = sum(one.text.n_cells for one in layouts)
+    return result + CELL_BYTES * cells + max(size + points, later * cells)
 
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
     """Return the peak disk space in bytes of a run of a binary mesh; see `bytes_of_text`."""
-    with open_zone(path, zone) as (source, place):
-        result = text_size(place) if is_text else source.size
-        points = place.n_points * source.point(place.dim).itemsize if is_text else 0
-    cells = place.cells.count
+    with open_zones(path, zone) as (source, places):
+        result = text_size(places) if is_text else source.size
+        points = sum(is_text * one.n_points * source.point(one.dim).itemsize for one in places)
+    cells = sum(one.cells.count for one in places)
     return result + CELL_BYTES * cells + max(points, later * cells)
 
 

@@ -9,6 +9,7 @@ is measured block by block.
 from __future__ import annotations
 
 import hashlib
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -20,10 +21,12 @@ import numpy as np
 from slideviz import __version__
 from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
+from slideviz.case.zones import with_marker_names
 from slideviz.errors import CaseError, NodeError
 from slideviz.formats.su2b.partial import keep_earlier
-from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
+from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.mesh.zones import zones_of
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
@@ -31,10 +34,12 @@ from slideviz.solver.growth import stray_warning
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step
+from slideviz.solver.zones import InterfaceMotion, joined_steps, zone_runs
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
 from slideviz.streaming.quality import RunCollector, folded_steps
 from slideviz.streaming.repair import mend_file
+from slideviz.streaming.skin import without_cells
 from slideviz.streaming.stream_input import open_for_run, require_su2
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
@@ -60,26 +65,31 @@ class RemainingTime:
     """
 
     def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:
-        self._report, self._left_stages = report, list(stages)
+        self._report, self._left_stages = report, [(stage, 1.0) for stage in stages]
         self._spent = self._usual = 0.0
         self._begin, self._part = monotonic(), 0.0
 
+    def divide(self, zones: int) -> None:
+        """Let the two stages after this one be done for each zone by itself."""
+        now, *later = self._left_stages
+        self._left_stages = [now, *[(name, 1 / zones) for name, _ in later[:2]] * zones, *later[2:]]
+
     def next(self) -> None:
         """Begin the next stage."""
-        done = self._left_stages.pop(0)
+        done, share = self._left_stages.pop(0)
         if done != "solve":
             self._spent += monotonic() - self._begin
-            self._usual += SECONDS[done]
+            self._usual += SECONDS[done] * share
         self._begin, self._part = monotonic(), 0.0
 
     def more(self, stage: str) -> None:
         """Begin a stage that was not foreseen."""
-        self._left_stages.insert(1, stage)
+        self._left_stages.insert(1, (stage, self._left_stages[0][1]))
         self.next()
 
     def __call__(self, progress: Progress) -> None:
         """Pass a progress on, with the seconds that are left."""
-        stage = self._left_stages[0]
+        stage, _ = self._left_stages[0]
         if stage == "solve":
             self._part = (progress.step - 1) / progress.total
             if progress.phase == "classify":  # which is done once, and not for each step
@@ -90,17 +100,18 @@ class RemainingTime:
 
     def _left(self) -> float | None:
         """Return an estimate of the seconds that are left; None before there is enough evidence."""
-        stage, now = self._left_stages[0], monotonic() - self._begin
+        (stage, share), now = self._left_stages[0], monotonic() - self._begin
         spent, usual = self._spent, self._usual
         if stage != "solve":
-            spent, usual = spent + now, usual + SECONDS[stage] * self._part
+            spent, usual = spent + now, usual + SECONDS[stage] * share * self._part
         if usual < LEAST_PART:
             return None
         pace = spent / usual
-        this_stage = max(pace * SECONDS[stage] - now, 0.0)
+        this_stage = max(pace * SECONDS[stage] * share - now, 0.0)
         if self._part >= LEAST_PART:
             this_stage = now * (1.0 - self._part) / self._part
-        return this_stage + pace * sum(SECONDS[later] for later in self._left_stages[1:])
+        later = sum(SECONDS[name] * part for name, part in self._left_stages[1:])
+        return this_stage + pace * later
 
 
 ReportProgress = Callable[[Progress], None]
@@ -183,78 +194,163 @@ def stream(
         def read() -> Mesh:
             with timer.phase("read") as tick:
                 skin = mesh_input.skin(tick, ranks)
+            remaining.divide(len(out.zones))
             remaining.next()
             return skin
 
-        displacer, skin, setup = _deform_skin(case, read, out, remaining)
-        give_back()
-        remaining.next()
-        out.displace(displacer, final=True)
-        remaining.next()
-        measured = out.measure(listed, displacer)
-        if setup is not None:
-            points = displacer.steps[-1].mesh.points
-            before, after = measured.before.quality(), measured.after.quality()
-            done = out.mend(
-                lambda source, file, tick: mend_file(
-                    case, source, file, tick, skin, setup, points, before, after
-                )
-            )
-            displacer = displacer.repaired(done)
-            if len(done.nodes):
-                remaining.more("quality")
-                measured = out.measure(listed, displacer)
-        folded = folded_steps(displacer, out.source, measured.inverted)
-        moved = displacer.steps[-1].mesh.origin.ffd
+        zones = _ZoneRuns(out, remaining, listed)
+        zones.deform_all(case, read)
+        result = zones.result(worst)
         if is_text:
             remaining.next()
-        out.finish(None if moved is displacer.skin.origin.ffd else moved)
-    return RunResult(
-        displacer.skin,
-        _steps_of_whole_mesh(displacer, measured),
-        measured.after.quality(worst),
-        measured.before.quality(),
-        folded,
-        timer.seconds,
-    )
+        out.finish(zones.moved_boxes())
+    return replace(result, seconds=timer.seconds)
 
 
-def _deform_skin(
-    case: Case, read: Callable[[], Mesh], out: Output, report: ReportProgress
-) -> tuple[InteriorDisplacer, Mesh, Setup | None]:
-    """Read and deform the skin; return what displaces the rest of the mesh, the skin and its setup.
+class _ZoneRuns:
+    """The zones of a streamed mesh, each deformed by its skin: as those of a mesh in memory.
 
-    The setup is None where the mesh is not repaired, and the skin then lacks its cells.
-
-    With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
+    They are named by their places: 0, 1, ... ``listed``: as of `stream`.
     """
-    timer = PhaseTimer(lambda phase, part: report(Progress(1, max(1, case.steps), phase, part)))
-    skin = read()
-    assert skin.part is not None
-    give_back()
-    with _naming_file_nodes(skin.part.points):
-        with timer.phase("classify"):
-            setup = make_setup(case, skin)
-        require_memory(setup, case)
-        # Let go of what is not needed any more: cells and joints, and after the steps the tracks.
-        none = Cells.from_blocks([])
-        markers = tuple(Marker(marker.name, none) for marker in skin.markers)
-        whole, skin = skin, replace(skin, cells=none, markers=markers)
-        full: Setup | None = setup
-        if case.repair == "no":
-            whole, full = skin, None
-        pairs = np.empty((0, 2), np.int64)
-        boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
-        setup = replace(setup, boundary=boundary)
-        lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+
+    def __init__(self, out: Output, remaining: RemainingTime, listed: int) -> None:
+        self._out, self._remaining, self._listed = out, remaining, listed
+        self._displacers: dict[int, InteriorDisplacer] = {}
+        self._measured: dict[int, RunCollector] = {}
+        self._joined: tuple[Case, InterfaceMotion] | None = None
+
+    def deform_all(self, case: Case, read: Callable[[], Mesh]) -> None:
+        """Deform all zones of the skin that ``read`` returns, and write all their points."""
+        if len(self._out.zones) == 1:
+            deque(self._deform(case, read(), self._remaining), 0)
+            return
+        skin = read()
+        case = with_marker_names(case, skin)
+        motion, _ = zone_runs(case, skin, self._deform, self._remaining)
+        self._joined = case, motion
+        last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
+        for zone, after in enumerate(zones_of(motion.after(last))):
+            if zone not in last:
+                self._remaining.next()
+                self._out.displace(zone, None, final=True)
+                self._remaining.next()
+            else:
+                self._close_gaps(zone, last[zone].mesh, after)
+
+    def _close_gaps(self, zone: int, before: Mesh, after: Mesh) -> None:
+        """Write those points of a skin into the file that interfaces have changed by rounding."""
+        assert after.part is not None
+        apart = np.flatnonzero(
+            (before.points.view(np.int64) != after.points.view(np.int64)).any(axis=1)
+        )
+        if len(apart):
+            numbers, points = after.part.points[apart], after.points[apart]
+            self._out.change(
+                zone, "evaluate", lambda at, file, _: at.points.write(file, numbers, points)
+            )
+            self._measured.pop(zone, None)
+
+    def _deform(self, case: Case, skin: Mesh, report: ReportProgress) -> Iterator[Step]:
+        """Yield the steps of a zone, whose points are in the file then, mended if asked for.
+
+        With STEPS= auto, trials write all points of the zone to rate them.
+        """
+        assert skin.part is not None
+        zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
+        case = with_marker_names(case, skin)
+        timer = PhaseTimer(lambda phase, part: report(Progress(1, max(1, case.steps), phase, part)))
         give_back()
+        with _naming_file_nodes(skin.part.points):
+            with timer.phase("classify"):
+                setup = make_setup(case, skin)
+            require_memory(setup, case)
+            # Let go of what is not needed any more: cells and joints, after the steps the tracks.
+            whole = skin if case.repair != "no" else None
+            full, skin = setup if whole else None, without_cells(skin)
+            pairs = np.empty((0, 2), np.int64)
+            boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
+            setup = replace(setup, boundary=boundary)
+            lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+            give_back()
 
-        def rate(steps: Sequence[Step]) -> Quality:
-            out.displace(InteriorDisplacer(skin, lean, steps), final=False)
-            return out.measure(0).after.quality()
+            def rate(steps: Sequence[Step]) -> Quality:
+                self._out.displace(zone, InteriorDisplacer(skin, lean, steps), final=False)
+                return self._out.measure(zone, 0).after.quality()
 
-        steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
-    return InteriorDisplacer(skin, lean, steps), whole, full
+            steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
+        del setup
+        give_back()
+        self._remaining.next()
+        displacer = self._displacers[zone] = InteriorDisplacer(skin, lean, steps)
+        self._out.displace(zone, displacer, final=True)
+        if whole is not None and full is not None:
+            self._remaining.more("quality")
+            self._mend(zone, case, whole, full)
+        self._remaining.next()
+        yield from self._displacers[zone].steps
+
+    def _mend(self, zone: int, case: Case, skin: Mesh, setup: Setup) -> None:
+        displacer = self._displacers[zone]
+        found = self._measured[zone] = self._out.measure(zone, self._listed, displacer)
+        points, quality = displacer.steps[-1].mesh.points, (found.before, found.after)
+        before, after = (one.quality() for one in quality)
+        done = self._out.change(
+            zone,
+            "repair",
+            lambda at, file, tick: mend_file(
+                case, at, file, tick, skin, setup, points, before, after
+            ),
+        )
+        self._displacers[zone] = displacer.repaired(done)
+        if len(done.nodes):
+            del self._measured[zone]
+
+    def result(self, worst: int) -> RunResult:
+        """Return the result, without seconds, after measuring the cells; ``worst`` as `stream`."""
+        for zone in range(len(self._out.zones)):
+            if zone not in self._measured:
+                found = self._out.measure(zone, self._listed, self._displacers.get(zone))
+                self._measured[zone] = found
+        runs = {
+            zone: _steps_of_whole_mesh(displacer, self._measured[zone])
+            for zone, displacer in self._displacers.items()
+        }
+        if self._joined is None:
+            skin, steps, first = self._displacers[0].skin, runs[0], [0]
+        else:
+            case, motion = self._joined
+            skin, steps = without_cells(motion.mesh), list(joined_steps(case, motion, runs))
+            first = [part.first_cell for part in motion.mesh.zone_parts]
+        folded = {
+            start + cell: when
+            for zone, start in enumerate(first)
+            for cell, when in self._folded(zone, steps).items()
+        }
+        measured = [self._measured[zone] for zone in range(len(first))]
+        after, before = self._out.qualities(measured, worst)
+        listed = dict(list(folded.items())[: self._listed])
+        return RunResult(skin, tuple(steps), after, before, listed, {})
+
+    def _folded(self, zone: int, steps: Sequence[Step]) -> dict[int, tuple[int, int]]:
+        """Return VTK type and first inverted step, of ``steps``, of inverted cells of a zone."""
+        cells, displacer = self._measured[zone].inverted, self._displacers.get(zone)
+        if displacer is None:
+            return {cell: (vtk, 1) for cell, (vtk, _) in cells.items()}
+        found = folded_steps(displacer, self._out.zones[zone], cells)
+        parts = [0.0, *(step.part for step in displacer.steps)]
+        ends = np.array([0.0, *(step.part for step in steps)])
+        return {
+            cell: (vtk, int(np.searchsorted(ends, parts[when])))
+            for cell, (vtk, when) in found.items()
+        }
+
+    def moved_boxes(self) -> list[bytes | None]:
+        """Return the boxes for free-form deformation that each zone gets; None: as they were."""
+        boxes: list[bytes | None] = [None] * len(self._out.zones)
+        for zone, displacer in self._displacers.items():
+            moved = displacer.steps[-1].mesh.origin.ffd
+            boxes[zone] = None if moved is displacer.skin.origin.ffd else moved
+        return boxes
 
 
 @contextmanager
@@ -303,7 +399,7 @@ def about_run(case: Case) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -> tuple[Step, ...]:
+def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -> list[Step]:
     """Return the steps of the skin, with ``node_counts`` and ``safe`` of the whole mesh.
 
     The last one warns of the node of the whole mesh that went farthest, if it strays.
@@ -313,11 +409,11 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
     more = skin.part.n_points - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
     steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
-    return tuple(
+    return [
         replace(
             step,
             node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more},
             safe=safe,
         )
         for step, safe in zip(steps, measured.safe, strict=True)
-    )
+    ]

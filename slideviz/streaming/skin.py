@@ -8,7 +8,7 @@ extent is that of the whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from slideviz.errors import MeshError, printable
 from slideviz.formats.su2.lines import boxes_elsewhere
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2.text import boundaries_elsewhere as text_boundaries_elsewhere
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import (
     BLOCK,
     ElementBlock,
@@ -41,42 +41,11 @@ from slideviz.mesh.model import (
     Mesh,
     Origin,
     Part,
-    frozen_array,
+    sealed,
 )
+from slideviz.mesh.zones import join_zones
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick
-
-
-def skin_of_text(text: Text, path: Path, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
-    """Return the skin of a zone of a text mesh, whose conversion to a binary mesh is at ``path``.
-
-    Names, zone and source are those of the text. Raises MeshError as `read_skin`, naming the text.
-    """
-    zone = text.zone
-    with naming_text(text, path):
-        skin = read_skin(path, None, tick, ranks)
-    skin = replace(
-        skin,
-        markers=tuple(
-            replace(marker, name=original.name)
-            for marker, original in zip(skin.markers, zone.markers, strict=True)
-        ),
-    )
-    others = text_boundaries_elsewhere(text.lines, text.sections, zone, tick)
-    return replace(
-        skin,
-        name=printable(text.path.name),
-        zone=zone.bounds.number,
-        zones=zone.bounds.zones,
-        source=text.path.resolve(),
-        remarks=zone.remarks,
-        interfaces=find_interfaces(skin, others),
-        origin=Origin(
-            ffd=text.boxes(),
-            ffd_at=zone.ffd_at,
-            ffd_elsewhere=boxes_elsewhere(text.sections, zone.bounds),
-        ),
-    )
+from slideviz.system.threads import Tick, equal_shares
 
 
 @contextmanager
@@ -95,40 +64,77 @@ Index = slice | IntArray  # numbers of cells, as an index of an array
 
 
 def read_skin(
-    path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: SerialPool = SERIAL
+    path: Path,
+    zone: int | None,
+    progress: Tick = lambda _: None,
+    ranks: SerialPool = SERIAL,
+    texts: Sequence[Text] = (),
 ) -> Mesh:
-    """Return the skin of a zone of an SU2 binary mesh; the whole zone is read and checked.
+    """Return the skin of one zone of an SU2 binary mesh, or of all as one mesh.
 
-    ``zone`` is counted from 1; None: the first. Raises MeshError if the file has a mistake; the
-    message has its byte; and OSError if it cannot be read.
+    The whole file is read and checked. Raises MeshError if it has a mistake; the message has its
+    byte; and OSError if it cannot be read.
+    ``zone``: the zone, from 1; None for all.
+    ``texts``: of the zones of a text mesh, where ``path`` is its binary copy: names, zones and
+    source are then those of the text.
     """
-    with open_zone(path, zone) as (source, place):
-        markers = read_markers(source, place)
-        used = np.zeros(place.n_points, bool)
-        for marker in markers:
-            used[marker.nodes] = True
-        with ranks.sharing(_boundary_cell_reader, path, zone, np.flatnonzero(used)) as do:
-            tasks = range(0, place.cells.count, BLOCK)
-            cells, ids = _join_boundary_cells(
-                source, place, map(_counting_progress(progress, 0.0, 0.6, len(tasks)), do(tasks))
-            )
-        used[cells.connectivity] = True
-        numbers = np.flatnonzero(used)
-        with ranks.sharing(_point_reader, path, zone) as do:
-            starts = range(0, place.n_points, BLOCK)
-            ends = np.searchsorted(numbers, [*starts, place.n_points])
-            parts = [
-                (first, numbers[a:b])
-                for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
-            ]
-            numbers, points = _join_points(
-                source,
-                place,
-                numbers,
-                map(_counting_progress(progress, 0.6, 1.0, len(parts)), do(parts)),
-            )
-        others = list(boundaries_elsewhere(source, place))
-    skin = Mesh(
+    with open_zones(path, zone) as (source, places):
+        shares = equal_shares(progress, len(places))
+        skins = [
+            _skin_of_zone(source, place, path, share, ranks)
+            for place, share in zip(places, shares, strict=True)
+        ]
+        others = [] if len(places) > 1 or texts else list(boundaries_elsewhere(source, places[0]))
+    if texts:
+        skins = [_of_text(skin, text) for skin, text in zip(skins, texts, strict=True)]
+        others = list(text_boundaries_elsewhere(texts[0], progress)) if len(texts) == 1 else []
+    return join_zones([replace(one, interfaces=find_interfaces(one, others)) for one in skins])
+
+
+def _of_text(skin: Mesh, text: Text) -> Mesh:
+    """Return the skin of a zone with names, zone and source of the text that it is a copy of."""
+    zone = text.zone
+    markers = zip(skin.markers, zone.markers, strict=True)
+    return replace(
+        skin,
+        markers=tuple(replace(marker, name=original.name) for marker, original in markers),
+        name=printable(text.path.name),
+        zone=zone.bounds.number,
+        zones=zone.bounds.zones,
+        source=text.path.resolve(),
+        remarks=zone.remarks,
+        origin=Origin(
+            ffd=text.boxes(),
+            ffd_at=zone.ffd_at,
+            ffd_elsewhere=boxes_elsewhere(text.sections, zone.bounds),
+        ),
+    )
+
+
+def _skin_of_zone(
+    source: BinaryFile, place: ZonePlace, path: Path, progress: Tick, ranks: SerialPool
+) -> Mesh:
+    markers = read_markers(source, place)
+    used = np.zeros(place.n_points, bool)
+    for marker in markers:
+        used[marker.nodes] = True
+    nodes = np.flatnonzero(used)
+    with ranks.sharing(_boundary_cell_reader, path, place.number, nodes) as do:
+        tasks = range(0, place.cells.count, BLOCK)
+        cells, ids = _join_boundary_cells(
+            source, place, map(_counting_progress(progress, 0.0, 0.6, len(tasks)), do(tasks))
+        )
+    used[cells.connectivity] = True
+    numbers = np.flatnonzero(used)
+    with ranks.sharing(_point_reader, path, place.number) as do:
+        starts = range(0, place.n_points, BLOCK)
+        ends = np.searchsorted(numbers, [*starts, place.n_points])
+        parts = [
+            (first, numbers[a:b]) for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
+        ]
+        blocks = map(_counting_progress(progress, 0.6, 1.0, len(parts)), do(parts))
+        numbers, points = _join_points(source, place, numbers, blocks)
+    return Mesh(
         points,
         _renumbered(cells, numbers),
         tuple(Marker(m.name, _renumbered(m.cells, numbers)) for m in markers),
@@ -136,14 +142,19 @@ def read_skin(
         zone=place.number,
         zones=source.zones,
         source=path.resolve(),
-        part=Part(
-            frozen_array(numbers, np.int64),
-            frozen_array(ids, np.int64),
-            place.n_points,
-            place.cells.count,
-        ),
+        part=Part(sealed(numbers), sealed(ids), place.n_points, place.cells.count),
     )
-    return replace(skin, interfaces=find_interfaces(skin, others))
+
+
+def without_cells(skin: Mesh) -> Mesh:
+    """Return a skin without its cells and the elements of its boundaries, to save memory."""
+    none = Cells.from_blocks([])
+    return replace(
+        skin,
+        cells=none,
+        markers=tuple(replace(marker, cells=none) for marker in skin.markers),
+        zone_parts=tuple(replace(one, mesh=without_cells(one.mesh)) for one in skin.zone_parts),
+    )
 
 
 def _counting_progress(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
@@ -177,14 +188,14 @@ class _BoundaryCells:
 
 @contextmanager
 def _boundary_cell_reader(
-    path: Path, zone: int | None, boundary: IntArray
+    path: Path, zone: int, boundary: IntArray
 ) -> Iterator[Callable[[int], _BoundaryCells]]:
     """Context with a function that reads one block of cells and returns those near the boundary.
 
     ``boundary`` (k,) are the boundary's nodes; the function's argument is the place of the block's
     first cell.
     """
-    with open_zone(path, zone) as (source, place):
+    with open_zones(path, zone) as (source, (place,)):
         on_boundary = np.zeros(place.n_points, bool)
         on_boundary[boundary] = True
 
@@ -276,14 +287,14 @@ Outer = dict[tuple[int, str], tuple[int, FloatArray]]
 
 @contextmanager
 def _point_reader(
-    path: Path, zone: int | None
+    path: Path, zone: int
 ) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
     """Context with a function that reads one block of points.
 
     Its argument is the number of the block's first point, and ascending nodes (k,) in the block. It
     returns their points (k, d) and the outermost points of the block.
     """
-    with open_zone(path, zone) as (source, place):
+    with open_zones(path, zone) as (source, (place,)):
 
         def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
             first, nodes = task

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import mmap
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Protocol
 
@@ -18,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
+from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import Quality
@@ -31,10 +33,11 @@ from slideviz.system.threads import Tick
 
 CELLS = 1 << 17  # cells of a block of a file: one block is in memory at a time
 READ = 1 << 20  # points that are read from a file at a time, at most
+RUN = 64  # nodes whose numbers are at most so far apart are written in one piece
 SPARSE = 8
 """All points between the lowest and highest node of a block of cells are read, used or not, where
 they are at most so many times as many as its cells."""
-Zone = tuple[Path, int | None]  # a file and the number of a zone in it, the first where it is None
+Zone = tuple[Path, int | None]  # a file and the number of a zone in it, all where it is None
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,17 +207,97 @@ class PointTable:
             a = b
         return out
 
+    def write(self, file: int, nodes: IntArray, points: FloatArray) -> None:
+        """Write the points (k, d) of ascending nodes (k,) to a descriptor of the table's file.
+
+        They are on the disk when it returns.
+        """
+        for part in np.split(np.arange(len(nodes)), np.flatnonzero(np.diff(nodes) > RUN) + 1):
+            if not len(part):
+                continue
+            first = int(nodes[part[0]])
+            rows = np.array(self.rows(first, int(nodes[part[-1]]) + 1 - first))
+            rows["x"][nodes[part] - first] = points[part]
+            write_at(file, self.byte(first), rows)
+        os.fsync(file)
+
 
 @dataclass(frozen=True, eq=False)
-class FileSource:
-    """A mesh in an SU2 binary file, of which one block is in memory at a time."""
+class ZoneSource:
+    """A zone of a mesh in an SU2 binary file, of which one block is in memory at a time."""
 
     file: BinaryFile
     place: ZonePlace  # `file`, `place`: its cells
     points: PointTable
     base: PointTable | None
     """`points`, `base`: its points, and the undeformed ones if there is a reference."""
-    zone: Zone  # the file of the undeformed mesh, or else of its points
+    undeformed: tuple[Path, int]
+    """The file with its undeformed points, or else its points, and the number of the zone there."""
+    first_cell: int = 0
+    first_point: int = 0
+    """`first_cell`, `first_point`: the numbers that its first cell and point have in blocks."""
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of its cells."""
+        return self.place.cells.count
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of its points."""
+        return self.place.n_points
+
+    def elements(self, size: int | None = None) -> Iterator[ElementBlock]:
+        """Yield all cells in the order of the file, without points, ``size`` or `CELLS` a block."""
+        place = self.place
+        return element_blocks(self.file, place, place.cells, place.dim, size or CELLS)
+
+    def elements_at(self, first: int, count: int) -> ElementBlock:
+        """Return ``count`` cells from the place ``first`` in the zone on, without points."""
+        place = self.place
+        return element_block(self.file, place, place.cells, place.dim, first, count)
+
+    def between(self, first: int, count: int) -> CellBlock:
+        """Return ``count`` cells from the place ``first`` in the zone on."""
+        return self.with_points(self.elements_at(first, count))
+
+    def with_points(self, block: ElementBlock) -> CellBlock:
+        """Return cells of the zone with their points.
+
+        Where their nodes lie close to each other, the points between are among them (`SPARSE`).
+        """
+        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
+        if high - low <= SPARSE * len(block.types):
+            nodes, flat = np.arange(low, high), block.nodes - low
+        else:
+            nodes, flat = np.unique(block.nodes, return_inverse=True)
+        cells = Cells.from_types(block.types, flat)
+        mesh = Mesh(self.points.at(nodes), cells, name=self.file.name)
+        base = None if self.base is None else mesh.with_points(self.base.at(nodes))
+        return CellBlock(block.ids + self.first_cell, nodes + self.first_point, mesh, base)
+
+    def cells(self, ids: IntArray) -> CellBlock:
+        """Return the cells ``ids`` (k,) of the zone, in that order."""
+        found = [self.elements_at(int(cell), 1) for cell in ids]
+        if any(int(one.ids[0]) != cell for one, cell in zip(found, ids, strict=True)):
+            # Cells are not in order in the file: read all of it.
+            by_id: dict[int, ElementBlock] = {}
+            for block in self.elements():
+                ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
+                for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
+                    nodes = block.nodes[ends[k] : ends[k + 1]].copy()
+                    by_id[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
+            found = [by_id[int(cell)] for cell in ids]
+        types = np.concatenate([one.types for one in found])
+        flat = np.concatenate([one.nodes for one in found])
+        return self.with_points(ElementBlock(0, types, flat, ids))
+
+
+@dataclass(frozen=True, eq=False)
+class FileSource:
+    """A mesh in an SU2 binary file: one zone, or all of them as one mesh."""
+
+    zones: tuple[ZoneSource, ...]
     skin: Mesh | None = None
 
     @classmethod
@@ -232,20 +315,23 @@ class FileSource:
         ``moved``: a file with the points, as ``zone`` has the undeformed ones; in place of
         ``reference``.
         """
-        source, place = stack.enter_context(open_zone(*zone))
-        points = PointTable(source, place)
+        source, places = stack.enter_context(open_zones(*zone))
+        tables = [PointTable(source, place) for place in places]
+        bases: Sequence[PointTable | None] = [None] * len(places)
+        undeformed = [(zone[0], place.number) for place in places]
         if moved is not None:
             other = source.of(stack.enter_context(moved.open("rb")))
-            return cls(source, place, PointTable(other, place), points, zone, skin)
-        base = (
-            None if reference is None else PointTable(*stack.enter_context(open_zone(*reference)))
+            tables, bases = [PointTable(other, place) for place in places], tables
+        elif reference is not None:
+            there, others = stack.enter_context(open_zones(*reference))
+            bases = [PointTable(there, place) for place in others]
+            undeformed = [(reference[0], place.number) for place in others]
+        cells, points = (
+            accumulate(counts, initial=0)
+            for counts in ([one.cells.count for one in places], [one.n_points for one in places])
         )
-        return cls(source, place, points, base, reference or zone, skin)
-
-    @classmethod
-    def of(cls, file: BinaryFile, place: ZonePlace, points: BinaryFile | None = None) -> FileSource:
-        """Return a mesh in an open file; ``points`` has the points where ``file`` has others."""
-        return cls(file, place, PointTable(points or file, place), None, (Path(), None))
+        each = zip(places, tables, bases, undeformed, cells, points, strict=False)
+        return cls(tuple(ZoneSource(source, *of_zone) for of_zone in each), skin)
 
     @property
     def mesh(self) -> Mesh:
@@ -256,65 +342,32 @@ class FileSource:
     @property
     def n_cells(self) -> int:
         """Return the number of its cells."""
-        return self.place.cells.count
+        return sum(zone.n_cells for zone in self.zones)
 
     @property
     def n_points(self) -> int:
         """Return the number of its points."""
-        return self.place.n_points
+        return sum(zone.n_points for zone in self.zones)
 
     def blocks(self, tick: Tick = lambda _: None, size: int | None = None) -> Iterator[CellBlock]:
         """Yield all cells in the order of the file, at most ``size`` at a time (`CELLS`)."""
-        if not self.n_cells:
-            raise MeshError(f"{self.file.name} has no cells; a quality needs at least one")
-        place = self.place
-        for block in element_blocks(self.file, place, place.cells, place.dim, size or CELLS):
-            yield self.with_points(block)
-            tick((block.first + len(block.types)) / self.n_cells)
-
-    def between(self, first: int, count: int) -> CellBlock:
-        """Return ``count`` cells from the place ``first`` in the file on."""
-        return self.with_points(self.elements_at(first, count))
-
-    def elements_at(self, first: int, count: int) -> ElementBlock:
-        """Return ``count`` cells from the place ``first`` in the file on, without points."""
-        place = self.place
-        return element_block(self.file, place, place.cells, place.dim, first, count)
-
-    def with_points(self, block: ElementBlock) -> CellBlock:
-        """Return cells of the file with their points.
-
-        Where their nodes lie close to each other, the points between are among them (`SPARSE`).
-        """
-        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
-        if high - low <= SPARSE * len(block.types):
-            nodes, flat = np.arange(low, high), block.nodes - low
-        else:
-            nodes, flat = np.unique(block.nodes, return_inverse=True)
-        cells = Cells.from_types(block.types, flat)
-        mesh = Mesh(self.points.at(nodes), cells, name=self.file.name)
-        base = None if self.base is None else mesh.with_points(self.base.at(nodes))
-        return CellBlock(block.ids, nodes, mesh, base)
+        for zone in self.zones:
+            if not zone.n_cells:
+                raise MeshError(f"{zone.file.name} has no cells; a quality needs at least one")
+            for block in zone.elements(size):
+                yield zone.with_points(block)
+                tick((zone.first_cell + block.first + len(block.types)) / self.n_cells)
 
     def types(self, ids: IntArray) -> NDArray[np.uint8]:
         """Return the VTK types (k,) of the cells ``ids`` (k,)."""
-        return self.elements(ids).types
+        return self.cells(ids).mesh.cells.types
 
-    def elements(self, ids: IntArray) -> ElementBlock:
+    def cells(self, ids: IntArray) -> CellBlock:
         """Return the cells ``ids`` (k,), in that order."""
-        place = self.place
-        found = [self.elements_at(int(cell), 1) for cell in ids]
-        if any(int(one.ids[0]) != cell for one, cell in zip(found, ids, strict=True)):
-            # Cells are not in order in the file: read all of it.
-            by_id: dict[int, ElementBlock] = {}
-            for block in element_blocks(self.file, place, place.cells, place.dim):
-                ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
-                for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
-                    nodes = block.nodes[ends[k] : ends[k + 1]].copy()
-                    by_id[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
-            found = [by_id[int(cell)] for cell in ids]
-        types = np.concatenate([one.types for one in found])
-        return ElementBlock(0, types, np.concatenate([one.nodes for one in found]), ids)
+        shifted = [(zone, ids - zone.first_cell) for zone in self.zones]
+        mine = [(zone, some[(some >= 0) & (some < zone.n_cells)]) for zone, some in shifted]
+        block = join_blocks(zone.cells(some) for zone, some in mine if len(some))
+        return block.take(np.searchsorted(block.ids, ids))
 
 
 def has_cells_of(mesh: Zone, other: Zone) -> bool:
@@ -323,25 +376,25 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
     Raises MeshError if their cells are in different orders in the files, so they cannot be
     compared.
     """
-    with open_zone(*mesh) as (one, place), open_zone(*other) as (two, there):
-        same = place.dim == there.dim and place.n_points == there.n_points
-        if not same or place.cells.count != there.cells.count:
+    with ExitStack() as stack:
+        one, two = (FileSource.open(stack, each).zones for each in (mesh, other))
+        return len(one) == len(two) and all(map(_has_cells_of, one, two))
+
+
+def _has_cells_of(zone: ZoneSource, other: ZoneSource) -> bool:
+    sizes = ((each.place.dim, each.n_points, each.n_cells) for each in (zone, other))
+    if len(set(sizes)) > 1:
+        return False
+    for first, second in zip(zone.elements(), other.elements(), strict=True):
+        if not np.array_equal(first.ids, second.ids):
+            raise MeshError(
+                f"{other.file.name} has its cells in another order than {zone.file.name}, so they "
+                "cannot be compared block by block; run it without --stream"
+            )
+        if not (
+            np.array_equal(first.types, second.types) and np.array_equal(first.nodes, second.nodes)
+        ):
             return False
-        both = (
-            element_blocks(file, at, at.cells, at.dim, CELLS)
-            for file, at in ((one, place), (two, there))
-        )
-        for first, second in zip(*both, strict=True):
-            if not np.array_equal(first.ids, second.ids):
-                raise MeshError(
-                    f"{two.name} has its cells in another order than {one.name}, so they cannot "
-                    "be compared block by block; run it without --stream"
-                )
-            if not (
-                np.array_equal(first.types, second.types)
-                and np.array_equal(first.nodes, second.nodes)
-            ):
-                return False
     return True
 
 

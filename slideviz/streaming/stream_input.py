@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.binary_copy import binary_layout, write_layout
-from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
+from slideviz.formats.binary_copy import binary_layouts, write_layouts
+from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
+from slideviz.formats.source import open_source
 from slideviz.formats.su2.lines import Piece
-from slideviz.formats.su2.text import Text, find_text
+from slideviz.formats.su2.text import Text, find_texts
 from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.formats.su2b.layout import ZonePlace, open_zones
 from slideviz.formats.su2b.partial import BINARY, checksums, finish_head, partial_file
 from slideviz.formats.su2b.write import require_binary_names
 from slideviz.formats.table import format_of
@@ -31,7 +32,8 @@ from slideviz.streaming.resources import (
     reusable_bytes,
     text_size,
 )
-from slideviz.streaming.skin import naming_text, read_skin, skin_of_text
+from slideviz.streaming.skin import naming_text, read_skin
+from slideviz.streaming.source import PointTable, ZoneSource
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
@@ -48,21 +50,18 @@ class StreamInput:
     """A mesh to be streamed, in an SU2 binary file."""
 
     path: Path  # the binary file: the user's, or a copy of a text
-    zone: int | None  # the zone in it, from 1; the first where it is None
-    text: Text | None = None  # the text that ``path`` is a copy of
+    zone: int | None  # the zone in it, from 1; all where it is None
+    texts: tuple[Text, ...] = ()  # the zones of the text that ``path`` is a copy of
     is_reused: bool = False  # whether the copy was made by an earlier run that was stopped
 
-    def text_size(self, place: ZonePlace) -> int:
-        """Return about how many bytes the zone at ``place`` has as a text."""
-        if self.text is not None:
-            return self.text.lines.raw.size
-        return text_size(place)
+    def text_size(self, places: Sequence[ZonePlace]) -> int:
+        """Return about how many bytes the zones at ``places`` have as a text."""
+        return self.texts[0].lines.raw.size if self.texts else text_size(places)
 
     def skin(self, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
         """Return the boundary and the cells at it, reading and checking the mesh; or MeshError."""
-        if self.text is None:
-            return read_skin(self.path, self.zone, tick, ranks)
-        return skin_of_text(self.text, self.path, progress_share(tick, COPIED), ranks)
+        share = progress_share(tick, COPIED) if self.texts else tick
+        return read_skin(self.path, self.zone, share, ranks, self.texts)
 
 
 def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
@@ -76,20 +75,21 @@ def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat
     return kind
 
 
-def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
-    """Return the places of points, cells and markers in an SU2 text.
+def _streamable(path: Path, zone: int | None, tick: Tick) -> tuple[Text, ...]:
+    """Return the places of points, cells and markers of the zones of an SU2 text.
 
     Raises MeshError if it has a mistake, or a halo: nodes that follow others are not all on the
     boundary.
     """
-    text = find_text(path, zone, progress_share(tick, 0.0, SCANNED))
-    if text.zone.sends:
-        raise text.lines.error(
-            text.zone.sends[0].begin,
-            "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
-            "halo, or run it without --stream",
-        )
-    return text
+    texts = find_texts(open_source(path), zone, progress_share(tick, 0.0, SCANNED))
+    for text in texts:
+        if text.zone.sends:
+            raise text.lines.error(
+                text.zone.sends[0].begin,
+                "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
+                "halo, or run it without --stream",
+            )
+    return texts
 
 
 @contextmanager
@@ -104,13 +104,14 @@ def open_read_only(
     if require_su2(path, file_format) == "su2b":
         yield StreamInput(path, zone)
         return
-    layout = binary_layout(_streamable(path, zone, tick), is_result=False)
+    texts = _streamable(path, zone, tick)
+    layouts = binary_layouts(texts, is_result=False)
     with draft(folder) as copy:
         try:
             open_temporary(copy, new=True).close()
-            require_disk_space(copy, path, layout.size)
-            os.truncate(copy, layout.size)
-            head = write_layout(layout, copy, progress_share(tick, SCANNED, COPIED))
+            require_disk_space(copy, path, layouts[-1].end)
+            os.truncate(copy, layouts[-1].end)
+            head = write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED))
             with open_temporary(copy) as file:
                 file.write(head)
         except OSError as problem:
@@ -118,8 +119,8 @@ def open_read_only(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
                 "(TMPDIR names another folder)"
             ) from problem
-        with naming_text(layout.text, copy):
-            yield StreamInput(copy, None, layout.text)
+        with naming_text(texts[0], copy):
+            yield StreamInput(copy, None, texts)
 
 
 @contextmanager
@@ -154,26 +155,27 @@ def open_for_run(
         require_disk_space(output, output, size - reusable_bytes(output))
         yield StreamInput(path, zone)
         return
-    text = _streamable(path, zone, tick)
+    texts = _streamable(path, zone, tick)
     if not is_text:
-        require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
-        lost = lost_of_text((part.key for part in text.zone.unknown), text.zone.bounds.zones)
-        warn(sentence_of_lost(output, printable(path.name), lost))
-    layout, left = binary_layout(text, is_result=not is_text), reusable_bytes(output)
-    state = path.stat()
-    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {layout.size}"
-    with partial_file(output, layout.size, about, resume=resume, more=BINARY) as copy:
+        name = printable(path.name)
+        for text in texts:
+            require_binary_names(name, (m.name for m in text.zone.markers))
+        warn(sentence_of_lost(output, name, lost_of_texts(texts)))
+    layouts, left = binary_layouts(texts, is_result=not is_text), reusable_bytes(output)
+    state, size = path.stat(), layouts[-1].end
+    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {size}"
+    with partial_file(output, size, about, resume=resume, more=BINARY) as copy:
         is_reused = (
             copy.done > 0
             and checksums(copy.path, progress_share(tick, SCANNED, COPIED), ranks) == copy.sums
         )
-        require_disk_space(output, output, bytes_of_text(layout, is_text, later) - left)
+        require_disk_space(output, output, bytes_of_text(layouts, is_text, later) - left)
         if not is_reused:
-            head = write_layout(layout, copy.path, progress_share(tick, SCANNED, FILLED), ranks)
+            head = write_layouts(layouts, copy.path, progress_share(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
             copy.note(checksums(copy.path, progress_share(tick, FILLED, COPIED), ranks))
-        with naming_text(text, copy.path):
-            yield StreamInput(copy.path, None, text, is_reused)
+        with naming_text(texts[0], copy.path):
+            yield StreamInput(copy.path, None, texts, is_reused)
         copy.remove()
 
 
@@ -182,36 +184,41 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
 
     Raises MeshError if the name of a boundary cannot be written in a text.
     """
-    with open_zone(path, zone) as (source, place):
+    with open_zones(path, zone) as (source, places):
         name = printable(path.name)
-    require_text_names(name, (marker.name for marker in place.markers))
-    return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > 1), ".su2b")
+    for place in places:
+        require_text_names(name, (marker.name for marker in place.markers))
+    return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > len(places)), ".su2b")
 
 
 def text_blocks(
-    mesh_input: StreamInput, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
+    mesh_input: StreamInput, zones: Sequence[ZoneSource], after: Path, boxes: Sequence[bytes | None]
 ) -> Iterator[bytes]:
     """Yield the text of ``mesh_input`` block by block, with the coordinates in the file ``after``.
 
-    ``source`` and ``place``: the binary copy of the text, and its zone.
+    ``zones``: of the binary copy of the text.
     ``after``: a file with the new points where the binary copy has the old ones.
-    ``ffd``: boxes for free-form deformation that replace those in the text; None keeps the latter.
+    ``boxes``: of each zone, boxes for free-form deformation that replace those in the text; None
+    keeps the latter.
     """
-    text = mesh_input.text
-    assert text is not None
-    raw, kind = text.lines.raw, source.point(place.dim)
-    edits: Sequence[tuple[int, int, bytes]] = ()
-    if ffd is not None:
-        bounds = text.zone.bounds
-        edits = box_edits(raw, text.unknown, text.lines.byte(bounds.end), ffd)
+    raw, edits = mesh_input.texts[0].lines.raw, []
+    pieces: dict[Piece, PointTable] = {}
+    for text, zone, ffd in zip(mesh_input.texts, zones, boxes, strict=True):
+        pieces |= dict.fromkeys(text.zone.points, zone.points)
+        if ffd is not None:
+            end = text.lines.byte(text.zone.bounds.end)
+            edits += box_edits(raw, text.unknown, end, ffd)
     with mesh_input.path.open("rb") as old, after.open("rb") as new:
 
         def rows(piece: Piece) -> bytes:
-            at, size = place.points + piece.row * kind.itemsize, piece.rows * kind.itemsize
+            table = pieces[piece]
+            at, end = table.byte(piece.row), table.byte(piece.row + piece.rows)
+            kind = table.file.point(table.place.dim)
             before, now = (
-                np.frombuffer(os.pread(file.fileno(), size, at), kind)["x"].astype(np.float64)
+                np.frombuffer(os.pread(file.fileno(), end - at, at), kind)["x"].astype(np.float64)
                 for file in (old, new)
             )
             return moved_rows(raw, piece, before, now)
 
-        yield from patched_blocks(raw, text.zone.points, rows, edits)
+        ordered = tuple(sorted(pieces, key=lambda piece: piece.begin))
+        yield from patched_blocks(raw, ordered, rows, sorted(edits))

@@ -110,3 +110,8 @@ def give_back() -> None:
 def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:
     """Return a tick for a part of the work: its 0 to 1 becomes ``begin`` to ``end`` of ``tick``."""
     return lambda done: tick(begin + (end - begin) * done)
+
+
+def equal_shares(tick: Tick, count: int) -> list[Tick]:
+    """Return a tick for each of ``count`` equal parts of the work, in order."""
+    return [progress_share(tick, k / count, (k + 1) / count) for k in range(count)]

@@ -233,15 +233,6 @@ def test_the_command_writes_all_zones_together(tmp_path, name, capsys):
     assert "match: rotational, 20° about z" in out
 
 
-def test_a_stream_takes_one_zone(tmp_path, capsys):
-    both().change(mesh_file=stage(tmp_path)).write(tmp_path / "c.cfg")
-    words = ["run", str(tmp_path / "c.cfg"), "--stream", "-o", str(tmp_path / "out.su2")]
-    assert command(words) != 0
-    assert "has 2 zones, of which only one at a time can be streamed; choose" in (
-        capsys.readouterr().err
-    )
-
-
 def test_a_binary_of_several_zones_is_opened_in_memory(tmp_path):
     path = zones(tmp_path, "zones.su2b")
     assert not is_large(path, None)

@@ -64,7 +64,9 @@ def meshes(folder, kind):
     for name, points in (("base", mesh.points), ("moved", moved)):
         sv.write(folder / "a.su2", mesh.with_points(points))
         text = (folder / "a.su2").read_text()
-        (folder / "two.su2").write_text(f"NZONE= 2\nIZONE= 1\n{text}IZONE= 2\n{text}")
+        sv.write(folder / "b.su2", mesh.with_points(0.5 * points + [0.8, 0.1, 0.2]))
+        other = (folder / "b.su2").read_text()
+        (folder / "two.su2").write_text(f"NZONE= 2\nIZONE= 1\n{text}IZONE= 2\n{other}")
         sv.convert(folder / "two.su2", folder / f"{name}.su2b")
         (folder / "two.su2").replace(folder / f"{name}.su2")
 
@@ -92,7 +94,6 @@ def test_what_is_told_is_the_same(small, capsys, words, kind):
     ending, cells = kind
     meshes(small, cells)
     words = [word.replace(".su2b", f".{ending}") for word in words]
-    words += [] if "--zone" in words else ["--zone", "1"]
     one, other = both(capsys, *words)
     assert one == other
     assert one[0] in ((0, 3) if "z=99" not in words else (1,))
@@ -128,7 +129,7 @@ def test_what_cannot_be_streamed_is_told(small, capsys):
         ),
         (["section", "flat.su2b", "--plane", "x=0.5", "-o", "a.png"], "flat.su2b is 2D, where all"),
     ):
-        assert run([*words, "--stream", "--zone", "1"]) == 1
+        assert run([*words, "--stream"]) == 1
         assert said in capsys.readouterr().err
 
 

@@ -74,7 +74,7 @@ def test_a_mesh_without_cells_has_no_blocks(tmp_path):
     with ExitStack() as stack:
         (tmp_path / "mesh.su2b").write_bytes(WHOLE)
         source = FileSource.open(stack, (tmp_path / "mesh.su2b", None))
-        empty = type(source.place.cells)(0, 0, 0, 0, numbered=True)
-        object.__setattr__(source.place, "cells", empty)
+        empty = type(source.zones[0].place.cells)(0, 0, 0, 0, numbered=True)
+        object.__setattr__(source.zones[0].place, "cells", empty)
         with pytest.raises(MeshError, match="has no cells; a quality needs at least one"):
             next(source.blocks())

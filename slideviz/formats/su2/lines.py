@@ -72,11 +72,13 @@ def find_blocks(lines: Lines) -> list[KeywordBlock]:
     ]
 
 
-def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) -> Bounds:
-    """Return the lines of a zone.
+def find_bounds(
+    lines: Lines, sections: list[KeywordBlock], number: int | None = None
+) -> tuple[Bounds, ...]:
+    """Return the lines of the zones of a file: of all, or of the one of a number, from 1.
 
     Raises MeshError if this is no SU2 mesh, there is no such zone, or the zones are not numbered 1,
-    2, and so on. ``number``: the zone, from 1; None for the only one.
+    2, and so on.
     """
     if not any(section.key in KNOWN for section in sections):
         raise MeshError(
@@ -85,37 +87,27 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
         )
     heads = _zone_heads(lines, sections)
     zones = max(len(heads), 1)
-    chosen = chosen_zone(lines.name, number, zones)
+    chosen = chosen_zones(lines.name, number, zones)
     if zones == 1:
-        return Bounds(chosen, zones, 0, len(lines))
-    begin = heads[chosen].line
-    later = [head.line for head in heads.values() if head.line > begin]
-    return Bounds(chosen, zones, begin + 1, min(later, default=len(lines)))
+        return (Bounds(1, 1, 0, len(lines)),)
+    ends = [*sorted(head.line for head in heads.values()), len(lines)]
+    begins = [(k, heads[k].line) for k in chosen]
+    return tuple(Bounds(k, zones, at + 1, ends[ends.index(at) + 1]) for k, at in begins)
 
 
-def chosen_zone(name: str, number: int | None, zones: int) -> int:
-    """Return the number of the zone of a file, called ``name``, with so many ``zones``.
+def chosen_zones(name: str, number: int | None, zones: int) -> range:
+    """Return the numbers of a file's zones, or ``number`` alone; MeshError if it is none of them.
 
-    Raises MeshError if there is no such zone, or ``number`` is None and there are several.
+    ``name`` is that of the file, for the message.
     """
-    if number is None and zones > 1:
-        raise MeshError(
-            f"{name}: has {zones} zones, of which only one at a time can be streamed; choose it "
-            "with ZONE= in a case, or --zone"
-        )
-    chosen = 1 if number is None else number
-    if not 1 <= chosen <= zones:
+    if number is None:
+        return range(1, zones + 1)
+    if not 1 <= number <= zones:
         has = "one zone" if zones == 1 else f"the zones 1 to {zones}"
         raise MeshError(
-            f"{name}: there is no zone {chosen}, for the file has {has}; choose one of these"
+            f"{name}: there is no zone {number}, for the file has {has}; choose one of these"
         )
-    return chosen
-
-
-def count_zones(sections: list[KeywordBlock]) -> int:
-    """Return how many zones a file has by its lines ``IZONE=``."""
-    several = any(section.key == "NZONE" for section in sections)
-    return max(1, sum(section.key == "IZONE" for section in sections) if several else 1)
+    return range(number, number + 1)
 
 
 def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:

@@ -12,23 +12,14 @@ import numpy as np
 
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
-from slideviz.formats.su2.lines import (
-    KeywordBlock,
-    Lines,
-    Rows,
-    boxes_elsewhere,
-    count_zones,
-    find_blocks,
-    find_bounds,
-    number_of,
-)
+from slideviz.formats.su2.lines import Lines, Rows, boxes_elsewhere
 from slideviz.formats.su2.numbers import parse_cells, parse_points
-from slideviz.formats.su2.text import SendRows, TextZone, boundaries_elsewhere, find_zone, scan
+from slideviz.formats.su2.text import SendRows, Text, TextZone, boundaries_elsewhere, find_texts
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin
 from slideviz.mesh.zones import join_zones
-from slideviz.system.threads import Tick, progress_share
+from slideviz.system.threads import Tick, equal_shares, progress_share
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
 """The halo, None if there is none or it cannot be used; and remarks, a sentence each."""
@@ -218,28 +209,16 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
     ``zone``: the zone, from 1; None for all. ``progress``: called with the fraction done; may raise
     to stop.
     """
-    lines = scan(raw, lambda done: progress(_SCANNED * done))
-    sections = find_blocks(lines)
-    count = count_zones(sections) if zone is None else 1
-    if count == 1:
-        return _read_zone(lines, sections, zone, progress)
-    shares = (progress_share(progress, k / count, (k + 1) / count) for k in range(count))
-    read = (_read_zone(lines, sections, k, share, alone=False) for k, share in enumerate(shares, 1))
-    return join_zones(list(read))
+    texts = find_texts(raw, zone, lambda done: progress(_SCANNED * done))
+    shares = equal_shares(progress, len(texts))
+    each = zip(texts, shares, strict=True)
+    return join_zones([_read_zone(text, tick, alone=len(texts) == 1) for text, tick in each])
 
 
-def _read_zone(
-    lines: Lines,
-    sections: list[KeywordBlock],
-    number: int | None,
-    progress: Tick,
-    *,
-    alone: bool = True,
-) -> Mesh:
+def _read_zone(text: Text, progress: Tick, *, alone: bool) -> Mesh:
     """Return a zone, with its interfaces to the others if it is read ``alone``."""
+    lines, text_zone, n_points = text.lines, text.zone, text.n_points
     raw = lines.raw
-    text_zone = find_zone(lines, sections, find_bounds(lines, sections, number))
-    n_points = number_of(text_zone.points)
     sizes = [
         rows[-1].end - rows[0].begin if rows else 0
         for rows in (text_zone.elements, text_zone.points, *(m.rows for m in text_zone.markers))
@@ -261,9 +240,9 @@ def _read_zone(
         markers=markers,
         zone=lines.bytes_of((text_zone.bounds.begin, text_zone.bounds.end))[0],
         sends=lines.bytes_of(*((part.begin, part.end) for part in text_zone.sends)),
-        unknown=lines.bytes_of(*((part.line, part.stop) for part in text_zone.unknown)),
+        unknown=text.unknown,
         ffd_at=text_zone.ffd_at,
-        ffd_elsewhere=boxes_elsewhere(sections, text_zone.bounds),
+        ffd_elsewhere=boxes_elsewhere(text.sections, text_zone.bounds),
     )
     mesh = Mesh(
         points=points,
@@ -276,7 +255,7 @@ def _read_zone(
         source=raw.path.resolve(),
     )
     halo, remarks = find_halo(lines, text_zone, mesh)
-    others = boundaries_elsewhere(lines, sections, text_zone, progress) if alone else ()
+    others = boundaries_elsewhere(text, progress) if alone else ()
     return replace(
         mesh,
         halo=halo,

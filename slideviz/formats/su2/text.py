@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.source import Source, open_source
+from slideviz.formats.source import Source
 from slideviz.formats.su2 import ROWS
 from slideviz.formats.su2.lines import (
     ALIASES,
@@ -333,29 +333,28 @@ class Text:
         return b"".join(part for part in parts if is_ffd(part)) or None
 
 
-def find_text(path: Path, zone: int | None, progress: Tick = lambda _: None) -> Text:
-    """Return a zone of an SU2 text file; its parts are located and counted, but not read.
+def find_texts(raw: Source, zone: int | None, progress: Tick = lambda _: None) -> tuple[Text, ...]:
+    """Return the zones of an SU2 text file; their parts are located and counted, but not read.
 
-    ``zone`` is counted from 1; None: the first. Raises MeshError if the file has a mistake.
+    ``zone``: the only one to return, from 1; None: all. Raises MeshError if the file has a mistake.
     """
-    lines = scan(open_source(path), progress)
+    lines = scan(raw, progress)
     sections = find_blocks(lines)
-    bounds = find_bounds(lines, sections, zone)
-    return Text(lines, find_zone(lines, sections, bounds), sections)
+    zones = find_bounds(lines, sections, zone)
+    return tuple(Text(lines, find_zone(lines, sections, bounds), sections) for bounds in zones)
 
 
-def boundaries_elsewhere(
-    lines: Lines, sections: list[KeywordBlock], zone: TextZone, progress: Tick
-) -> Iterator[tuple[int, str, FloatArray]]:
+def boundaries_elsewhere(text: Text, progress: Tick) -> Iterator[tuple[int, str, FloatArray]]:
     """Yield zone, name and nodes (k, d) of each boundary of the other zones, as far as readable.
 
     ``progress`` is called with 1 while they are read; it may raise to stop.
     """
-    for number in range(1, zone.bounds.zones + 1):
-        if number == zone.bounds.number:
+    lines, sections, zone = text.lines, text.sections, text.zone
+    for bounds in find_bounds(lines, sections):
+        if bounds.number == zone.bounds.number:
             continue
         try:
-            other = find_zone(lines, sections, find_bounds(lines, sections, number))
+            other = find_zone(lines, sections, bounds)
             if other.dim == zone.dim:
                 yield from _boundaries_of(lines, other, lambda _: progress(1.0))
         except MeshError:  # the zone that is asked for can be right all the same

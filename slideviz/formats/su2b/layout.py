@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.su2.lines import chosen_zone
+from slideviz.formats.su2.lines import chosen_zones
 
 NAME_BYTES = 33  # bytes of the name of a marker, padded with zeros
 SEND_RECEIVE = "SEND_RECEIVE"
@@ -159,11 +159,11 @@ class BinaryFile:
         return int(self.array(at, 1, self.conn, what)[0])
 
 
-def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
-    """Return where the zones of a file are.
+def find_zones(source: BinaryFile, number: int | None = None) -> tuple[ZonePlace, ...]:
+    """Return where the zones of a file are: all of them, or the one of a number, from 1.
 
-    Raises MeshError if a part goes beyond the end of the file, a number is wrong, or bytes follow
-    the last zone.
+    Raises MeshError if a part goes beyond the end of the file, a number is wrong, bytes follow the
+    last zone, or there is no zone of that number.
     """
     zones: list[ZonePlace] = []
     at = 2 * _INT
@@ -176,24 +176,17 @@ def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
             f"{source.size - at} bytes follow the last of the {source.zones} zones, where the file "
             "should end; correct the number of zones (byte 4) or write the mesh again",
         )
-    return tuple(zones)
-
-
-def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
-    """Return where a zone is (from 1; None: the only one).
-
-    Raises MeshError as `find_zones` and `chosen_zone`.
-    """
-    zones = find_zones(source)
-    return zones[chosen_zone(source.name, number, len(zones)) - 1]
+    return tuple(zones[k - 1] for k in chosen_zones(source.name, number, len(zones)))
 
 
 @contextmanager
-def open_zone(path: Path, number: int | None) -> Iterator[tuple[BinaryFile, ZonePlace]]:
-    """Context with an open file, and where the zone of that number is (see `find_zone`)."""
+def open_zones(
+    path: Path, number: int | None
+) -> Iterator[tuple[BinaryFile, tuple[ZonePlace, ...]]]:
+    """Context with an open file, and where its zones are (see `find_zones`)."""
     with path.open("rb") as file:
         source = BinaryFile(path, file)
-        yield source, find_zone(source, number)
+        yield source, find_zones(source, number)
 
 
 def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:

@@ -182,7 +182,8 @@ class Partial:
 
     file: BinaryIO  # open for reading and writing
     path: Path  # its hidden name
-    sums: list[int]  # checksum of each part that is done; what a part is, the caller decides
+    sums: list[int | None]
+    """Checksum of each part, None where it is not done; what a part is, the caller decides."""
     mode: int | None  # permissions of the target, None if it does not exist
     _note: Path
     _about: str
@@ -192,13 +193,13 @@ class Partial:
     @property
     def done(self) -> int:
         """Return how many parts are done."""
-        return len(self.sums)
+        return len(self.sums) - self.sums.count(None)
 
     def remove(self) -> None:
         """Remove the file and its note."""
         _removed(self.path, self._note)
 
-    def note(self, sums: Iterable[int]) -> None:
+    def note(self, sums: Iterable[int | None]) -> None:
         """Sync the file to the disk, then note that parts with these checksums are done."""
         os.fsync(self.file.fileno())
         self.sums = list(sums)
@@ -207,7 +208,7 @@ class Partial:
         with fresh.open("x") as file:
             json.dump({"about": self._about, "sums": self.sums}, file)
         fresh.replace(self._note)
-        if self.sums:
+        if self.done:
             keep_partial(self.path, _kept_words(self.path))
 
 
@@ -272,7 +273,7 @@ def partial_copy(
     path: Path,
     source: Path,
     about: str,
-    changed: Piece,
+    changed: Sequence[Piece],
     *,
     resume: bool,
     replaces: Path | None,
@@ -285,7 +286,7 @@ def partial_copy(
     ``path``: the target.
     ``source``: the mesh to copy.
     ``about`` and ``resume``: as of `partial_file`.
-    ``changed``: the first of the bytes that the caller changes, and the one after the last.
+    ``changed``: the ranges of bytes that the caller changes, in order.
     ``ranks``: the processes that copy.
     """
     require_no_input(path, MeshError, replaces)
@@ -294,7 +295,8 @@ def partial_copy(
         with source.open("rb") as given:
             head = given.read(HEAD)
         is_left = partial.done > 0
-        copied = [(HEAD, changed[0]), (changed[1], size)] if is_left else [(HEAD, size)]
+        ends = HEAD, *(byte for piece in changed for byte in piece if is_left), size
+        copied = list(zip(ends[::2], ends[1::2], strict=True))
         with copying(source, partial.path, copied, ranks, is_left=is_left) as partial.ready:
             yield partial
         finish_head(partial.file, head)
@@ -316,11 +318,12 @@ def _kept_words(ours: Path) -> str:
     return f"the partial result is in {ours}; continue with --resume"
 
 
-def _noted(note: Path, about: str) -> list[int]:
+def _noted(note: Path, about: str) -> list[int | None]:
     """Return the checksums in a note on the same work ``about``; empty if there is no such note."""
     try:
         record = read_json(note)
-        return [int(one) for one in record["sums"]] if record["about"] == about else []
+        sums = record["sums"] if record["about"] == about else []
+        return [None if one is None else int(one) for one in sums]
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return []
 

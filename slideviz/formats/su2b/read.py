@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -22,7 +21,6 @@ from slideviz.formats.su2b.layout import (
     BinaryFile,
     ElementTable,
     ZonePlace,
-    find_zone,
     find_zones,
 )
 from slideviz.mesh.check import first_fault
@@ -30,7 +28,7 @@ from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.zones import join_zones
-from slideviz.system.threads import Tick, progress_share
+from slideviz.system.threads import Tick, equal_shares
 
 BLOCK = 1 << 18  # most elements or points that are read at a time
 
@@ -208,12 +206,11 @@ def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
     """
     with path.open("rb") as file:
         source = BinaryFile(path, file)
-        places = find_zones(source) if zone is None else (find_zone(source, zone),)
-        share = [k / len(places) for k in range(len(places) + 1)]
+        places = find_zones(source, zone)
         alone = len(places) == 1
         meshes = [
-            _read_zone(source, place, path, progress_share(progress, *ends), alone=alone)
-            for place, ends in zip(places, pairwise(share), strict=True)
+            _read_zone(source, place, path, share, alone=alone)
+            for place, share in zip(places, equal_shares(progress, len(places)), strict=True)
         ]
     return join_zones(meshes)
 
@@ -274,11 +271,10 @@ def boundaries_elsewhere(
     source: BinaryFile, place: ZonePlace
 ) -> Iterator[tuple[int, str, FloatArray]]:
     """Yield zone, name and nodes (k, d) of each boundary of other zones, as far as readable."""
-    for number in range(1, source.zones + 1):
-        if number == place.number:
+    for zone in find_zones(source):
+        if zone.number == place.number:
             continue
         try:
-            zone = find_zone(source, number)
             nodes = [
                 (marker.name, marker.nodes)
                 for marker in (read_markers(source, zone) if zone.dim == place.dim else ())
@@ -292,7 +288,7 @@ def boundaries_elsewhere(
         except MeshError:  # the zone that is asked for can be right all the same
             continue
         for (name, _), points in zip(nodes, places, strict=True):
-            yield number, name, points
+            yield zone.number, name, points
 
 
 def point_blocks(

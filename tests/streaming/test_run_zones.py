@@ -1,0 +1,169 @@
+"""Streamed runs of meshes with several zones: the bits and numbers of a run in memory."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.formats.su2.write import su2_blocks
+from slideviz.mesh.zones import join_zones
+from slideviz.solver.deform import folded_at
+from slideviz.streaming import output, repair
+from slideviz.streaming.run import stream
+from tests.builders import grid, passage
+from tests.mesh.test_interfaces import zones as core_in_a_square
+from tests.solver.test_zones import both, roles_of, turn
+from tests.solver.test_zones import stage as rows
+from tests.streaming.test_run import KilledError, bits
+
+
+def sliding_pair(folder):
+    """Write two squares that share the side x = 1, along which the first one's nodes slide."""
+    cuts = [(4, 4), (4, 4)]
+    meshes = [
+        grid(cut, place=lambda p, k=k: p / 4.0 + np.array([k, 0.0])) for k, cut in enumerate(cuts)
+    ]
+    texts = [b"".join(su2_blocks(mesh)).decode() for mesh in meshes]
+    path = folder / "pair.su2"
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{texts[0]}IZONE= 2\n{texts[1]}")
+    return path
+
+
+def passages(folder):
+    """Write two rows of 3D passages."""
+    front, behind = passage((4, 6, 8), 40.0), passage((3, 4, 6), 30.0)
+    apart = behind.with_points(behind.points + np.array([0.0, 0.0, 2.0]))
+    each = [replace(zone, zone=k, zones=2) for k, zone in enumerate((front, apart), 1)]
+    sv.write(folder / "rows.su2", join_zones(each))
+    return folder / "rows.su2"
+
+
+def turned_blades():
+    names = dict.fromkeys(("hub", "shroud"), "sliding")
+    sides = dict.fromkeys(("per1", "per2"), "periodic")
+    here = names | sides | {"blade": "moving"}
+    roles = {f"{zone}:{name}": role for zone in (1, 2) for name, role in here.items()}
+    motions = tuple(sv.Translate(f"{zone}:blade", (0.0, 0.0, 0.03)) for zone in (1, 2))
+    return sv.Case(
+        roles=roles,
+        motions=motions,
+        sliding="ps",
+        periodic="moving",
+        steps=2,
+        quality_metric="knupp",
+    )
+
+
+SLID = sv.Case(
+    roles={"1:x_m": "moving", "1:x_p": "sliding"},
+    motions=(sv.Scale("1:x_m", (1.0, 0.9), (0.0, 0.0)),),
+    sliding="ps",
+)
+FOLLOW = sv.Case(
+    roles={"2:core": "moving"}, motions=(sv.Translate("2:core", (0.02, 0.01)),), steps=3
+)
+FOLDED = both().change(
+    motions=(sv.Rotate("1:BLOCK", 90.0), sv.Rotate("2:BLOCK", 120.0)),
+    steps=1,
+    sliding="none",
+    periodic="none",
+)
+CASES = {
+    "rows": (rows, both()),
+    "one of two": (rows, sv.Case(roles=roles_of("2:"), motions=(turn("2:"),), sliding="ps")),
+    "automatic": (rows, both().change(steps=0)),
+    "folded": (rows, FOLDED),
+    "repaired": (rows, FOLDED.change(repair="yes", repair_below=0.5)),
+    "followed": (core_in_a_square, FOLLOW),
+    "slid": (sliding_pair, SLID),
+    "slid and repaired": (sliding_pair, SLID.change(repair="yes", repair_below=0.99)),
+    "passages": (passages, turned_blades()),
+}
+
+
+@pytest.mark.parametrize("ending", ["su2", "su2b"])
+@pytest.mark.parametrize("name", CASES)
+def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
+    make, case = CASES[name]
+    path = make(tmp_path)
+    if ending == "su2b":
+        sv.convert(path, path.with_suffix(".su2b"))
+        path = path.with_suffix(".su2b")
+    mesh = sv.read(path)
+    steps = list(sv.deform(case, mesh, certify=True))
+    found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
+    sv.write(tmp_path / f"memory.{ending}", steps[-1].mesh)
+    ids = found.inverted_cells(100)
+    assert len(ids) or name not in ("folded", "repaired")
+    monkeypatch.setattr(output, "CHUNK", 37)
+    monkeypatch.setattr(repair, "CELLS", 37)
+    done = stream(case.change(mesh_file=path), tmp_path / f"out.{ending}", worst=5)
+    assert (done.mesh.zone, done.mesh.zones) == (None, 2)
+    moved = sv.read(tmp_path / f"out.{ending}")
+    assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
+    out, memory = ((tmp_path / f"{one}.{ending}").read_bytes() for one in ("out", "memory"))
+    assert out == memory
+    assert done.quality.summary() == found.summary()
+    assert np.array_equal(done.quality.values, found.values)
+    assert np.array_equal(done.quality.totals.worst, found.worst(5))
+    assert done.undeformed.summary() == before.summary()
+    when = {cell: step for cell, (_, step) in done.folded.items()}
+    assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
+    for one, other in zip(steps, done.steps, strict=True):
+        for field in ("index", "total", "part", "max_error", "control_nodes", "node_counts"):
+            assert getattr(one, field) == getattr(other, field)
+        for field in ("warnings", "tried", "safe", "periodic_misfit", "candidates"):
+            assert getattr(one, field) == getattr(other, field)
+        repairs = [step.repaired and step.repaired.report() for step in (one, other)]
+        assert repairs[0] == repairs[1]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_repair_of_a_zone_is_seen_by_the_zones_that_follow_it(tmp_path):
+    make, case = CASES["slid and repaired"]
+    mesh = sv.read(make(tmp_path))
+    *_, step = sv.deform(case, mesh)
+    assert step.repaired is not None
+    assert len(np.intersect1d(step.repaired.nodes, mesh.marker("1:x_p").nodes))
+
+
+@pytest.mark.parametrize("ending", ["su2", "su2b"])
+def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, ending):
+    monkeypatch.setattr(output, "CHUNK", 20)
+    path, out = rows(tmp_path), tmp_path / f"out.{ending}"
+    case = both().change(mesh_file=path)
+    stream(case, out)
+    whole, move = out.read_bytes(), output.write_points
+    parts = sum(-(-len(sv.read(path, zone).points) // 20) for zone in (1, 2))
+    for stop in (2, parts - 1):
+        calls = []
+
+        def stopping(*arguments, stop=stop, calls=calls):
+            if len(calls) == stop:
+                raise KilledError
+            calls.append(1)
+            return move(*arguments)
+
+        monkeypatch.setattr(output, "write_points", stopping)
+        with pytest.raises(KilledError):
+            stream(case, out)
+        again, told = [], []
+        monkeypatch.setattr(output, "write_points", lambda *a, s=again: (s.append(1), move(*a))[1])
+        stream(case, out, resume=True, note=told.append)
+        assert f"continues after {stop} of {parts} parts" in told[0]
+        assert len(again) == parts - stop
+        assert out.read_bytes() == whole
+
+
+def test_a_text_becomes_binary_and_back(tmp_path):
+    path, case = rows(tmp_path), both()
+    sv.convert(path, tmp_path / "rows.su2b")
+    points = list(sv.deform(case, sv.read(path)))[-1].mesh.points
+    for source, target in (("stage.su2", "out.su2b"), ("rows.su2b", "out.su2")):
+        told: list[str] = []
+        stream(case.change(mesh_file=tmp_path / source), tmp_path / target, warn=told.append)
+        assert told == [""]
+        moved = sv.read(tmp_path / target)
+        assert np.array_equal(bits(moved.points), bits(points))
+        assert moved.marker_names == sv.read(path).marker_names
