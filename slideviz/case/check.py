@@ -77,7 +77,7 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     if not case.markers_with("periodic"):
         yield from _periodic_problems(case, mesh)
     try:
-        cases = zone_cases(case, mesh)
+        cases = zone_cases(case, mesh, False)
     except CaseError as problem:
         yield str(problem)
         return

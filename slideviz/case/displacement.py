@@ -7,7 +7,7 @@ by spaces, tabs, commas or semicolons; ``%``, ``#`` and ``$`` start comments.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,9 +16,10 @@ import numpy as np
 from slideviz.case.lines import Problem, listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
 from slideviz.errors import CaseError, shown
-from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
+_ZONE = re.compile(r"\s*(\d+):(.*)")
 _SEPARATORS = str.maketrans(",;", "  ")
 
 
@@ -66,21 +67,67 @@ def mean_of(several: Sequence[Displacements]) -> Displacements:
     return replace(several[0], vectors=np.mean([each.vectors for each in several], axis=0))
 
 
-def read_displacements(
-    path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
-) -> Displacements:
+def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
     """Return the displacements that a file lists for ``nodes``, zero for those not in it.
 
     Raises CaseError if the file cannot be read, or has mistakes: a line ``file:line: sentence`` for
     each.
-    ``path``: the file.
+    ``path``: the file, whose nodes have the numbers that `in_zones` tells.
     ``nodes`` (k,) int64: the nodes that the file may list, sorted, each once.
-    ``shape`` (n, d): shape of the points of the mesh: number of nodes and dimension.
     ``of``: what the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
     """
     text, warnings = read_text(path, "displacement file")
-    read = parse_displacements(text, path, nodes, shape, of)
-    return Displacements(read.nodes, read.vectors, (*warnings, *read.warnings))
+    each = []
+    for first, here, part, lines in in_zones(text, path, mesh, nodes):
+        whole = part.part
+        numbers, count = (
+            (here, len(part.points)) if whole is None else (whole.points[here], whole.n_points)
+        )
+        read = parse_displacements(lines, path, numbers, (count, part.dim), of)
+        each.append(replace(read, nodes=here + first))
+    return Displacements(
+        np.concatenate([read.nodes for read in each]),
+        np.concatenate([read.vectors for read in each]),
+        tuple(dict.fromkeys((*warnings, *(text for read in each for text in read.warnings)))),
+    )
+
+
+def in_zones(
+    text: str, path: Path, mesh: Mesh, nodes: IntArray
+) -> Iterator[tuple[int, IntArray, Mesh, str]]:
+    """Yield what the text of a file has for each zone of a mesh that has some of ``nodes``.
+
+    First node, ``nodes`` (k,) of the zone in its own numbers, its mesh, and the lines, as many as
+    there are. A file for nodes of one zone numbers them as in the zone, one for several names the
+    zone, too: ``2:15 dx dy``. Raises CaseError with a line for each that does not.
+    """
+    zones = enumerate(mesh.zone_parts, 1)
+    each = [(k, p, nodes[(p.points.start <= nodes) & (nodes < p.points.stop)]) for k, p in zones]
+    each = [zone for zone in each if len(zone[2])]
+    if len(each) < 2:
+        first, alone = (each[0][1].points.start, each[0][1].mesh) if each else (0, mesh)
+        yield first, nodes - first, alone, text
+        return
+    lines = _COMMENT.sub("", text).splitlines()
+    heads = [_ZONE.match(line) for line in lines]
+    several = {str(k): None for k, *_ in each}
+    wrong = [
+        (at, f"{shown(line.strip())} begins with none of the zones {' and '.join(several)}")
+        for at, (line, head) in enumerate(zip(lines, heads, strict=True), 1)
+        if line.strip() and (head is None or head[1] not in several)
+    ]
+    if wrong:
+        (at, said), (k, part, here) = wrong[0], each[0]
+        said += f"; write zone and node, as {k}:{here[0] - part.points.start}"
+        raise CaseError(listed(path, [(at, _with_count(said, len(wrong)))]))
+    missing = [k for k in several if not any(head is not None and head[1] == k for head in heads)]
+    if missing:
+        raise CaseError(
+            f"{path}: lists no node of zone {missing[0]}, whose boundaries it is to move"
+        )
+    for k, part, here in each:
+        mine = [head[2] if head is not None and head[1] == str(k) else "" for head in heads]
+        yield part.points.start, here - part.points.start, part.mesh, "\n".join(mine)
 
 
 def parse_displacements(
@@ -88,8 +135,9 @@ def parse_displacements(
 ) -> Displacements:
     """Return the displacements that the text of a file lists for ``nodes``, zero for others.
 
-    Parameters as of `read_displacements`; ``path`` is for messages only. Raises CaseError if the
-    text has mistakes: a line ``file:line: sentence`` for each.
+    Parameters as of `read_displacements`; ``path`` is for messages only, ``shape`` (n, d) that of
+    the points of the mesh. Raises CaseError if the text has mistakes: a line ``file:line:
+    sentence`` for each.
     """
     table = parse_rows(text, path, nodes, shape, of)
     numbers = table[:, 0].astype(np.int64)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -37,6 +36,7 @@ from slideviz.case.model import (
 from slideviz.case.motion_text import term_of
 from slideviz.case.onto import laid_displacements
 from slideviz.case.spans import span_displacements
+from slideviz.case.zones import of_several_zones
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.cached_boundary import boundary_of
@@ -204,7 +204,7 @@ def reference_displacements(
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"
             try:
-                read = read_file(motion.path, mesh, nodes, of)
+                read = read_displacements(motion.path, mesh, nodes, of)
             except CaseError as problem:
                 problems.append(str(problem))
             else:
@@ -212,19 +212,6 @@ def reference_displacements(
     if problems:
         raise CaseError("\n".join(dict.fromkeys(problems)))
     return files
-
-
-def read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
-    """Return a file's displacements of ``nodes`` (k,), which it numbers as in the whole zone."""
-    for zone in mesh.zone_parts:
-        if len(nodes) and zone.points.start <= nodes[0] < zone.points.stop:
-            first = zone.points.start
-            read = read_file(path, zone.mesh, nodes - first, of)
-            return replace(read, nodes=read.nodes + first)
-    if mesh.part is None:
-        return read_displacements(path, nodes, mesh.points.shape, of)
-    shape = mesh.part.n_points, mesh.dim
-    return replace(read_displacements(path, mesh.part.points[nodes], shape, of), nodes=nodes)
 
 
 AGREE = 1e-9  # largest allowed difference of two displacements of one node, over the mesh's extent
@@ -292,13 +279,44 @@ def moved_together(
     d) float64: undeformed positions of all nodes. ``on``: the nodes of each moving marker.
     ``files``: as in `displacement_of`.
     """
-    total = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}
+    return _together(motions, points, on, files)[1]
+
+
+def _together(
+    motions: Iterable[Motion],
+    points: FloatArray,
+    on: Mapping[str, IntArray],
+    files: ReferenceDisplacements,
+) -> tuple[list[Motion], dict[str, FloatArray]]:
+    """Return the motions as one body each (`_as_one`), and the displacements by them."""
+    total, each = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}, []
     for motion in motions:
         here = {name: points[on[name]] + total[name] for name in on if applies_to(motion, name)}
-        one = motion if len(here) < 2 else _as_one(motion, here, on)
+        each.append(motion if len(here) < 2 else _as_one(motion, here, on))
         for name, at in here.items():
-            total[name] += _change(one, at, on[name], files)
-    return total
+            total[name] += _change(each[-1], at, on[name], files)
+    return each, total
+
+
+def apart(case: Case, mesh: Mesh) -> Case:
+    """Return a case each of whose motions is of every zone alone, for `zone_cases`.
+
+    A common centroid becomes a point, a file what it displaces. Raises CaseError as
+    `displacements`.
+    """
+    shared = [motion for motion in case.motions if of_several_zones(motion, case, mesh)]
+    if not shared:
+        return case
+    on = {name: mesh.marker(name).nodes for name in case.markers_with("moving")}
+    files = reference_displacements(case, mesh, on)
+    motions, _ = _together(case.motions, mesh.points, on, files)
+    warnings = case.warnings
+    for place, motion in enumerate(motions):
+        if motion in shared and isinstance(motion, FromFile):
+            listed = files[key_of(motion)]
+            motions[place] = Prescribed(listed.nodes, listed.vectors, motion.marker)
+            warnings = *warnings, *listed.warnings
+    return case.change(motions=tuple(motions), warnings=tuple(dict.fromkeys(warnings)))
 
 
 def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, IntArray]) -> Motion:

@@ -11,6 +11,7 @@ from slideviz.case.model import (
     Case,
     FromFile,
     Motion,
+    Onto,
     Prescribed,
     Rotate,
     Scale,
@@ -53,23 +54,22 @@ def renamed(case: Case, names: Mapping[str, str]) -> Case:
     )
 
 
-def zone_cases(case: Case, mesh: Mesh) -> tuple[Case, ...]:
+def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...]:
     """Return the case of each zone of a mesh: its roles and motions, named as in the file.
 
-    Raises CaseError if a motion is about the common centroid of boundaries of several zones, or a
-    displacement file is for several: it numbers the nodes of one.
+    Raises CaseError if a motion of several zones together (`of_several_zones`) is to be
+    ``computed``: `slideviz.case.motion.apart` makes one of each zone. One that lays boundaries of
+    several zones onto one target is always refused.
     """
     case = with_marker_names(case, mesh)
     if not mesh.zone_parts:
         return (case,)
-    moving = case.markers_with("moving")
-    problems = [
-        f"motion {place}: {problem}"
-        for place, motion in enumerate(case.motions, start=1)
-        if (problem := _shared(motion, mesh, [name for name in moving if applies_to(motion, name)]))
-    ]
-    if problems:
-        raise CaseError("\n".join(problems))
+    for place, motion in enumerate(case.motions, start=1):
+        if (computed or isinstance(motion, Onto)) and of_several_zones(motion, case, mesh):
+            raise CaseError(
+                f"motion {place} is of boundaries of several zones together, which are deformed "
+                "alone; give one for each"
+            )
     settings = case.zone_settings or (case,) * mesh.zones
     each = zip(settings, mesh.zone_parts, strict=True)
     return tuple(_zone_case(case, one, mesh, part) for one, part in each)
@@ -80,24 +80,15 @@ def each_zone(case: Case, mesh: Mesh) -> Iterator[tuple[Case, Mesh]]:
     return zip(zone_cases(case, mesh), zones_of(mesh), strict=True)
 
 
-def _shared(motion: Motion, mesh: Mesh, moved: list[str]) -> str:
-    """Return why a motion cannot be of the boundaries of several zones together, or ""."""
-    zones = [
-        str(number)
-        for number, part in enumerate(mesh.zone_parts, 1)
-        if not names_in(mesh, part).keys().isdisjoint(moved)
-    ]
-    if len(zones) < 2:
-        return ""
-    where = f"of the zones {' and '.join(zones)}"
-    if isinstance(motion, Rotate | Scale) and motion.point == "centroid":
-        return f"boundaries {where} have no common centroid; give the point, or a motion for each"
-    if isinstance(motion, FromFile):
-        return (
-            f"{motion.path} is for boundaries {where}, but numbers the nodes of one zone; give a "
-            "file for each"
-        )
-    return ""
+def of_several_zones(motion: Motion, case: Case, mesh: Mesh) -> bool:
+    """Return whether what a motion does in a zone depends on its boundaries in other zones.
+
+    So do those about their common centroid, and displacement files.
+    """
+    about = isinstance(motion, Rotate | Scale) and motion.point == "centroid"
+    moved = [name for name in case.markers_with("moving") if applies_to(motion, name)]
+    zones = [not names_in(mesh, part).keys().isdisjoint(moved) for part in mesh.zone_parts]
+    return (about or isinstance(motion, FromFile)) and sum(zones) > 1
 
 
 def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:

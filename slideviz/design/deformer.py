@@ -175,6 +175,7 @@ class Deformer:
         solved with twice the digits (a note)."""
         if mesh.zone_parts:
             require_valid(case, mesh)
+            case = motion.apart(case, mesh)
             make = partial(Deformer, progress=report)
             self._zones = zone_designs(case, mesh, asked.nodes, references, make)
             points = self.deform(references[0])

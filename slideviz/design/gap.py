@@ -133,7 +133,7 @@ def gaps(
     0.008
     """
     at, base = np.asarray(places, float), reference or mesh
-    zones = zip(zone_cases(case, mesh), zones_of(mesh), zones_of(base), strict=True)
+    zones = zip(zone_cases(case, mesh, False), zones_of(mesh), zones_of(base), strict=True)
     names = [names_from(mesh, part) for part in mesh.zone_parts] or [{}]
     each = zip(zones, names, _by_zone(mesh, between), strict=True)
     out, blades = list[Gap](), False

@@ -148,7 +148,7 @@ def wheel(
 
 def _require_passages(case: Case, mesh: Mesh, rows: Sequence[Case], counts: Sequence[int]) -> None:
     """Raise CaseError if a row of a table moves a passage that a zone does not have."""
-    moved = [[zone.motions for zone in zone_cases(each, mesh)] for each in (case, *rows)]
+    moved = [[zone.motions for zone in zone_cases(each, mesh, False)] for each in (case, *rows)]
     for zone, count in enumerate(counts):
         for number, motions in enumerate(moved[1 + count :], count + 1):
             if motions[zone] != moved[0][zone]:
@@ -173,7 +173,7 @@ def _repeated(
     case: Case, mesh: Mesh, passages: Count | Sequence[Count]
 ) -> list[tuple[Mesh, tuple[Pair, ...], int]]:
     """Return the passage of each zone without halo, its periodic sides, and how many it has."""
-    cases, zones = zone_cases(case, mesh), zones_of(mesh)
+    cases, zones = zone_cases(case, mesh, False), zones_of(mesh)
     each = [passages] * len(zones) if isinstance(passages, int | str) else passages
     if len(each) != len(zones):
         raise CaseError(

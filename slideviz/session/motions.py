@@ -11,7 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.boxes import box_definition, boxes_for
-from slideviz.case.displacement import Displacements, parse_displacements
+from slideviz.case.displacement import (
+    Displacements,
+    parse_displacements,
+    read_displacements,
+)
 from slideviz.case.lines import read_text
 from slideviz.case.model import (
     Bump,
@@ -39,7 +43,6 @@ from slideviz.case.motion import (
     key_of,
     moved_together,
     placed_displacements,
-    read_file,
 )
 from slideviz.case.motion_words import direction_words
 from slideviz.case.onto import is_laid, laid_displacements
@@ -71,6 +74,10 @@ class TableRows:
         """Return the rows for the boundaries of a motion; all moving ones where it is empty."""
         names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
+        for zone in (part for part in mesh.zone_parts if len(nodes)):
+            if zone.points.start <= nodes[0] and nodes[-1] < zone.points.stop:
+                nodes, mesh = nodes - zone.points.start, zone.mesh  # as a file numbers them
+                break
         return cls(", ".join(names), nodes, mesh.points.shape)
 
     @property
@@ -385,7 +392,7 @@ class Ghosts:
             wanted = np.unique(np.concatenate([on[name] for name in names]))
             of = f"boundaries {', '.join(names)}"
             try:
-                self._files[key] = read_file(motion.path, self.mesh, wanted, of)
+                self._files[key] = read_displacements(motion.path, self.mesh, wanted, of)
             except SlidevizError:
                 self._files[key] = None
         return self._files[key]

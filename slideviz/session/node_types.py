@@ -103,7 +103,7 @@ class NodeTypes:
 
     def _of_zones(self, mesh: Mesh, case: Case) -> TypedNodes:
         try:
-            cases = zone_cases(case, mesh)
+            cases = zone_cases(case, mesh, False)
         except SlidevizError:
             return NOTHING
         each = [

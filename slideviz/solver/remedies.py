@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
+from slideviz.case.motion import apart, displacements
 from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -99,7 +99,9 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
     if not names or case.periodic == "none":
         return ""
     if mesh.zone_parts:
-        return next(filter(None, (beyond_pitch(*one) for one in each_zone(case, mesh))), "")
+        return next(
+            filter(None, (beyond_pitch(*one) for one in each_zone(apart(case, mesh), mesh))), ""
+        )
     try:
         moved = displacements(case, mesh)
         pairs = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)

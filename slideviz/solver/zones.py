@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.check import require_valid
 from slideviz.case.model import Case, Prescribed
-from slideviz.case.motion import displacements
+from slideviz.case.motion import apart, displacements
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.interfaces import (
@@ -44,8 +44,11 @@ class InterfaceMotion:
     def __init__(self, case: Case, mesh: Mesh) -> None:
         self.mesh, self.roles = mesh, case.roles
         self.interfaces = named_interfaces(mesh, case.interfaces)
-        self.cases = list(zone_cases(case, mesh))
+        alone = apart(case, mesh)
+        self.cases = list(zone_cases(alone, mesh))
         """The case of each zone."""
+        self.warnings = *alone.warnings, *apart_interfaces(mesh, case.interfaces)
+        """Those of the case, of files of several zones, and on pairs that do not coincide."""
         self.led = np.zeros(len(mesh.points), bool)
         """(n,) bool: the nodes that follow others."""
         self.leader = np.arange(len(mesh.points))
@@ -140,7 +143,7 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
     does not fit the mesh.
     """
     case = with_marker_names(case, mesh)
-    yield from joined_steps(case, *zone_runs(case, mesh, run, report))
+    yield from joined_steps(*zone_runs(case, mesh, run, report))
 
 
 def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
@@ -166,10 +169,9 @@ def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[Interfa
     return motion, runs
 
 
-def joined_steps(case: Case, motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
+def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
     """Yield the steps of zones as those of the mesh of all."""
     mesh, longest = motion.mesh, max(runs.values(), key=len)
-    apart = apart_interfaces(mesh, case.interfaces)
     before: dict[int, Step] = {}
     for leader in longest:
         steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
@@ -181,7 +183,7 @@ def joined_steps(case: Case, motion: InterfaceMotion, runs: Runs) -> Iterator[St
             index=leader.index,
             total=len(longest),
             part=leader.part,
-            warnings=(*case.warnings, *apart, *_warnings(steps), *torn),
+            warnings=(*motion.warnings, *_warnings(steps), *torn),
         )
         before = steps
 

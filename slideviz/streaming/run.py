@@ -217,7 +217,7 @@ class _ZoneRuns:
         self._out, self._remaining, self._listed = out, remaining, listed
         self._displacers: dict[int, InteriorDisplacer] = {}
         self._measured: dict[int, RunCollector] = {}
-        self._joined: tuple[Case, InterfaceMotion] | None = None
+        self._joined: InterfaceMotion | None = None
 
     def deform_all(self, case: Case, read: Callable[[], Mesh]) -> None:
         """Deform all zones of the skin that ``read`` returns, and write all their points."""
@@ -225,9 +225,8 @@ class _ZoneRuns:
             deque(self._deform(case, read(), self._remaining), 0)
             return
         skin = read()
-        case = with_marker_names(case, skin)
-        motion, _ = zone_runs(case, skin, self._deform, self._remaining)
-        self._joined = case, motion
+        motion, _ = zone_runs(with_marker_names(case, skin), skin, self._deform, self._remaining)
+        self._joined = motion
         last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
         for zone, after in enumerate(zones_of(motion.after(last))):
             if zone not in last:
@@ -318,8 +317,8 @@ class _ZoneRuns:
         if self._joined is None:
             skin, steps, first = self._displacers[0].skin, runs[0], [0]
         else:
-            case, motion = self._joined
-            skin, steps = without_cells(motion.mesh), list(joined_steps(case, motion, runs))
+            motion = self._joined
+            skin, steps = without_cells(motion.mesh), list(joined_steps(motion, runs))
             first = [part.first_cell for part in motion.mesh.zone_parts]
         folded = {
             start + cell: when

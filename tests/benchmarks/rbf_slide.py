@@ -132,7 +132,7 @@ def write_whole_boundary(folder: Path, scale: float, nodes: int) -> Path:
     sv.write(folder / "stator.su2", mesh)
     blade = mesh.marker("BLADE").nodes
     source = MESHES / FILES["stator"][1]
-    moved = read_displacements(source, blade, mesh.points.shape, "BLADE")
+    moved = read_displacements(source, mesh, blade, "BLADE")
     table = np.column_stack([moved.nodes, scale * moved.vectors])
     np.savetxt(folder / "moved.txt", table, fmt=["%d", "%.17g", "%.17g", "%.17g"])
     case.change(

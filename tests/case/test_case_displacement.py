@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
+import slideviz as sv
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.errors import CaseError
 
 NODES = np.array([2, 3, 5, 8])
+
+
+def of_ten(dim):
+    """A mesh of ten points."""
+    cells = sv.Cells.from_blocks([(9, [[0, 1, 2, 3]])])
+    return sv.Mesh(np.zeros((10, dim)), cells)
 
 
 @pytest.fixture
@@ -14,7 +21,7 @@ def read(tmp_path):
     def read(text: str | bytes, dim: int = 2) -> Displacements:
         path = tmp_path / "d.txt"
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_displacements(path, NODES, (10, dim), "a moving marker")
+        return read_displacements(path, of_ten(dim), NODES, "a moving marker")
 
     return read
 
@@ -132,4 +139,4 @@ def test_a_file_of_another_mesh_gives_a_short_answer(read):
 
 def test_missing_file(tmp_path):
     with pytest.raises(CaseError, match=r"no\.txt: there is no such displacement file; check"):
-        read_displacements(tmp_path / "no.txt", NODES, (10, 2), "a moving marker")
+        read_displacements(tmp_path / "no.txt", of_ten(2), NODES, "a moving marker")

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+import slideviz as sv
 from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.session import motions
 from slideviz.session.motions import TableRows, table_text, write_table
+from tests.solver.test_zones import stage
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
 
@@ -57,10 +59,10 @@ def test_rows_of_zeros_are_added_for_nodes_without_one(rows):
     assert rows.fill(some) == some
 
 
-def test_it_is_written_as_a_displacement_file(rows, tmp_path):
+def test_it_is_written_as_a_displacement_file(square, rows, tmp_path):
     path = tmp_path / "table.txt"
     write_table(path, "% typed\n3\t0.25\t-0.5\n\n")
-    read = read_displacements(path, rows.nodes, rows.shape, "bottom")
+    read = read_displacements(path, square, rows.nodes, "bottom")
     assert np.array_equal(read.at(np.array([3, 4])), [[0.25, -0.5], [0.0, 0.0]])
     assert table_text(path) == "% typed\n3\t0.25\t-0.5\n"
     assert table_text(tmp_path / "none.txt") == ""
@@ -74,3 +76,13 @@ def test_a_large_file_is_not_edited_by_hand(tmp_path, monkeypatch):
     monkeypatch.setattr(motions, "MOST_BYTES", 59)
     with pytest.raises(CaseError, match="too much to be edited here"):
         table_text(path)
+
+
+def test_nodes_of_a_zone_have_the_numbers_of_the_zone(tmp_path):
+    mesh = sv.read(stage(tmp_path))
+    case = Case(roles={"1:BLOCK": "moving", "2:BLOCK": "moving"})
+    alone = sv.read(tmp_path / "stage.su2", 2)
+    rows = TableRows.on(mesh, case, "2:BLOCK")
+    assert np.array_equal(rows.nodes, alone.marker("BLOCK").nodes)
+    assert rows.shape == alone.points.shape
+    assert len(TableRows.on(mesh, case, "").nodes) > len(rows.nodes)

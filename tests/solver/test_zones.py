@@ -9,6 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import check_case
+from slideviz.case.zones import zone_cases
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks
@@ -93,15 +94,75 @@ def test_a_name_of_several_zones_needs_its_number(tmp_path):
     assert said.startswith("MOTION: several zones of ")
 
 
-def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
-    (tmp_path / "d.txt").write_text("1 0 0\n")
-    several = ("1:BLOCK", "2:BLOCK")
-    for motion, message in (
-        (sv.Rotate(several, 1.0), "motion 1: boundaries of the zones 1 and 2 have no common cent"),
-        (sv.FromFile(tmp_path / "d.txt", several), "numbers the nodes of one zone; give a file"),
+BLOCKS = ("1:BLOCK", "2:BLOCK")
+SLIDE = sv.Translate("2:BLOCK", (0.01, 0.0))
+
+
+@pytest.mark.parametrize("motion", [sv.Rotate(BLOCKS, 1.0), sv.Scale("", (1.02,))])
+def test_boundaries_of_several_zones_move_about_their_common_centroid(tmp_path, motion):
+    """The second motion begins where the first one ends; common nodes would count once."""
+    mesh = sv.read(stage(tmp_path))
+    case = both().change(motions=(SLIDE, motion))
+    nodes = [mesh.marker(name).nodes for name in BLOCKS]
+    start = [mesh.points[nodes[0]], mesh.points[nodes[1]] + SLIDE.vector]
+    centre = np.concatenate(start).mean(axis=0)
+    if isinstance(motion, sv.Rotate):
+        c, s = np.cos(np.radians(1.0)), np.sin(np.radians(1.0))
+        ends = [centre + (one - centre) @ np.array([[c, s], [-s, c]]) for one in start]
+    else:
+        ends = [centre + 1.02 * (one - centre) for one in start]
+    moved = last(case, mesh).mesh.points
+    for mine, end in zip(nodes, ends, strict=True):
+        np.testing.assert_allclose(moved[mine], end, atol=1e-14)
+    given = case.change(motions=(SLIDE, sv.Rotate(BLOCKS, 1.0, tuple(centre.tolist()))))
+    if isinstance(motion, sv.Rotate):
+        np.testing.assert_allclose(moved, last(given, mesh).mesh.points, atol=1e-13)
+    np.testing.assert_allclose(sv.Deformer(mesh, case).deform(), moved, atol=1e-13)
+    ghosts = Ghosts(mesh).moved(case)
+    np.testing.assert_allclose(ghosts["2:BLOCK"], ends[1], atol=1e-14)
+
+
+def test_a_displacement_file_of_several_zones_names_them(tmp_path):
+    mesh = sv.read(stage(tmp_path))
+    path, vectors = tmp_path / "d.txt", {}
+    rows = ["% zone:node dx dy"]
+    for number, part in enumerate(mesh.zone_parts, 1):
+        for k, node in enumerate(part.mesh.marker("BLOCK").nodes):
+            vectors[node + part.points.start] = 0.01 * number, 0.001 * k
+            rows.append(f"{number}:{node}, {0.01 * number}, {0.001 * k}")
+    path.write_text("\n".join(rows))
+    case = both().change(
+        motions=(sv.FromFile(path),), periodic="none", roles=dict.fromkeys(BLOCKS, "moving")
+    )
+    moved = last(case, mesh).mesh.points - mesh.points
+    np.testing.assert_allclose(moved[[*vectors]], [*vectors.values()], atol=1e-14)
+    deformer = sv.Deformer(mesh, case)
+    assert np.array_equal(deformer.displacement, [*vectors.values()])
+    np.testing.assert_allclose(deformer.deform() - mesh.points, moved, atol=1e-13)
+    path.write_text("\n".join(rows[:-1]))
+    assert any("1 of 8 nodes" in text for text in last(case, mesh).warnings)
+    for text, message in (
+        (
+            "1:16 0 0\n17 0 0\n3:1 0 0\n",
+            r"d.txt:2: '17 0 0' begins with none of the zones 1 and 2; wr",
+        ),
+        ("1:16 0 0\n", "lists no node of zone 2"),
+        ("1:16 0 0\n2:0 0 0\n", r"d.txt:2: node 0 is not on a moving marker"),
     ):
+        path.write_text(text)
         with pytest.raises(CaseError, match=message):
-            last(both().change(motions=(motion,)), sv.read(stage(tmp_path)))
+            last(case, mesh)
+
+
+def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
+    mesh = sv.read(stage(tmp_path))
+    for motion, parted in (
+        (sv.Onto(tmp_path / "d.stl", BLOCKS), False),
+        (sv.Rotate("", 1.0), True),
+    ):
+        case = both().change(motions=(motion,))
+        with pytest.raises(CaseError, match="motion 1 is of boundaries of several zones together"):
+            zone_cases(case, mesh, parted)
 
 
 def test_a_displacement_file_numbers_the_nodes_of_its_zone(tmp_path):
