@@ -252,7 +252,9 @@ def _mended_zones(
     """Return a mesh of all zones with the bad cells of each mended."""
     shapes = (None,) * mesh.zones if reference is None else zones_of(reference)
     shares = equal_shares(tick, mesh.zones)
-    each = zip(zone_cases(case, mesh, False), zones_of(mesh), zones_of(now), shapes, shares, strict=True)
+    each = zip(
+        zone_cases(case, mesh, False), zones_of(mesh), zones_of(now), shapes, shares, strict=True
+    )
     done = {k: mend(*of_zone) for k, of_zone in enumerate(each)}
     mended = joined_repairs(mesh, with_zones(now, [one.mesh for one in done.values()]), done)
     assert mended is not None
