@@ -32,6 +32,7 @@ from slideviz.elastic.multigrid import RIDGE
 from slideviz.elastic.stiffness import OPTIONS, ShapeBlock
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.rbf.compiled import one_at_a_time
+from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import transform, value
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -123,7 +124,8 @@ class LaplacianCycle:
         if depth == len(self.levels):
             for g, factor in enumerate(self.factors):
                 mine = self.group == g
-                out[:, mine] = cho_solve(factor, right[:, mine], check_finite=False)
+                with enough_threads(0.0):  # the same bits for any number of threads
+                    out[:, mine] = cho_solve(factor, right[:, mine], check_finite=False)
             return out
         level, x, group = self.levels[depth], np.empty_like(right), tuple(self.group.tolist())
         with one_at_a_time(3 * len(level.matrix[1])):
@@ -159,7 +161,8 @@ def _hierarchy(
         # A mesh that may move as a whole makes the matrix singular; rows of nothing are held.
         diagonal = np.diag(dense)
         dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, HELD)
-        factors.append(cho_factor(dense, lower=True, check_finite=False))
+        with enough_threads(0.0):
+            factors.append(cho_factor(dense, lower=True, check_finite=False))
     return tuple(levels), tuple(factors)
 
 

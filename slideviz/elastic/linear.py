@@ -40,7 +40,6 @@ from slideviz.rbf.frames import Frame
 from slideviz.rbf.methods import within
 from slideviz.rbf.operations import difference_from, each_of, points
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
-from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import (
     Array,
     Variable,
@@ -120,16 +119,14 @@ class Equilibrium:
         free = np.moveaxis(value(_without(axes, held_by)), 0, 1)
         given = held(self._place, self._turn, free, np.zeros_like(at))
         matrix = assemble(at, self._body.parts, given)[0]
-        with enough_threads(0.0):  # the coarsest matrix is small
-            return hierarchy(matrix, rigid_motions(at, given))
+        return hierarchy(matrix, rigid_motions(at, given))
 
     def _solved(self, right: FloatArray) -> FloatArray:
         """Return the unknowns (k, d) for a right-hand side (k, d); DeformError above `ENOUGH`."""
         if not right.any():
             return np.zeros_like(right)
         start = np.zeros(right.size)
-        with enough_threads(0.0):
-            solved = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
+        solved = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
         if not solved.residual_ratio <= ENOUGH:
             raise DeformError(
                 f"the equations of linear elasticity were solved to {solved.residual_ratio:.1g} "

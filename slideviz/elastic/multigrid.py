@@ -21,6 +21,7 @@ from scipy.sparse import bsr_array, bsr_matrix
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
+from slideviz.rbf.solve import enough_threads
 from slideviz.system.jit_cache import njit
 
 TOLERANCE = 1e-8
@@ -152,7 +153,8 @@ def hierarchy(matrix: bsr_array, modes: FloatArray) -> list[Level]:
     diagonal = np.diag(dense).copy()
     # Rows of nothing: motions that the nodes of an aggregate do not have.
     dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, 1.0)
-    factor = cho_factor(dense, lower=True, check_finite=False)
+    with enough_threads(0.0):
+        factor = cho_factor(dense, lower=True, check_finite=False)
     levels.append(Level(made[-1].A, np.empty((0, 1, 1)), factor=factor))
     return levels
 
@@ -218,6 +220,13 @@ def conjugate_gradients(
     tolerance
         Residual ratio at which the iteration ends.
     """
+    with enough_threads(0.0):  # the same bits for any number of threads
+        return _conjugate_gradients(levels, right, start, tick, tolerance)
+
+
+def _conjugate_gradients(
+    levels: list[Level], right: FloatArray, start: FloatArray, tick: Tick, tolerance: float
+) -> LinearSolution:
     matrix = levels[0].matrix
     first = float(right @ _cycle(levels, right))
     x = np.array(start, float)

@@ -31,7 +31,10 @@ LOOSE = {
     "multiquadric": 1e-9,
     "quadric": 1e-7,
     "elastic": 1e-10,
-    "annulus-ds": 1e-10,  # processors round differently
+    # The condition is 3.7e6: gradients differ by up to 1.2e-11 with the instructions of other
+    # processors (AVX2, SSE3, none), points by 2e-13.
+    "annulus-ds-1-exact-vjp": 3e-11,
+    "annulus-ds-3-exact-vjp": 3e-11,
 }
 EXACT, LEVELS = None, Reduction(tolerance=1e-4, multilevel=True, criterion="size", level_size=8)
 
@@ -136,10 +139,10 @@ def _numbers(array: FloatArray) -> FloatArray:
     "name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in CASES]
 )
 def test_points_and_derivatives_are_those_recorded(name):
-    accuracy = next((size for key, size in LOOSE.items() if key in name), ACCURACY)
     with RECORD.open() as lines:
         rows = {row[1]: np.array(row[2:], float) for row in csv.reader(lines) if row[0] == name}
     for kind, found in measured(name).items():
+        accuracy = next((v for key, v in LOOSE.items() if key in f"{name}-{kind}"), ACCURACY)
         allowed = accuracy * rows[kind][0]
         np.testing.assert_allclose(found, rows[kind], rtol=0, atol=allowed, err_msg=kind)
 

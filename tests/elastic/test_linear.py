@@ -8,6 +8,7 @@ import threading
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array
+from threadpoolctl import threadpool_limits
 
 import slideviz as sv
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
@@ -505,6 +506,15 @@ def test_the_same_case_gives_the_same_bits():
     )
     first, second = (list(sv.deform(case, mesh))[-1].mesh.points for _ in range(2))
     assert first.tobytes() == second.tobytes()
+
+
+def test_any_number_of_threads_of_blas_gives_the_same_bits():
+    mesh, points = builders.square(90), []  # with sums of more than 10,000 terms, which it divides
+    case = sv.Case(roles={"BLOCK": "moving"}, motions=(sv.Rotate("BLOCK", 10.0),), method="elastic")
+    for threads in (1, 2):
+        with threadpool_limits(threads, "blas"):
+            points.append([step.mesh.points for step in sv.deform(case, mesh)])
+    np.testing.assert_array_equal(*points)
 
 
 def test_a_product_has_the_same_bits_from_the_cache_as_from_the_compiler():

@@ -10,6 +10,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
 
 import slideviz as sv
 from slideviz.cli import run
@@ -230,6 +231,10 @@ def test_the_cycle_in_several_parts_is_symmetric_with_the_same_bits_for_any_thre
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(cycle(v), alone)
+    for threads in (1, 2):
+        with threadpool_limits(threads, "blas"):
+            other = LaplacianCycle.of(body, place, held, np.eye(2))(v)
+        np.testing.assert_array_equal(other, alone)
 
 
 def test_the_safeguard_keeps_the_worst_cells(monkeypatch):

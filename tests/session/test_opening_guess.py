@@ -1,7 +1,8 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import pytest
 
+from slideviz.case.model import Case
 from slideviz.mesh.periodic import find_pairs
 from slideviz.samples.table import sample
 from slideviz.session.opening import guess_by_name, guess_case, guess_roles
@@ -69,6 +70,23 @@ def test_a_box_that_matches_every_way_is_periodic_only_by_name(name, prefix, rol
 
 def test_without_a_pair_the_case_is_not_periodic(square):
     assert guess_case(square, guess_roles(square), ()).periodic == "none"
+
+
+def test_a_new_case_has_other_values_than_a_file_without_keys_and_saves_them(passage, tmp_path):
+    mesh, usual = passage.mesh, Case()
+    pairs = find_pairs(mesh)
+    case = guess_case(mesh, guess_roles(mesh, pairs), pairs)
+    differ = {f.name for f in fields(Case) if getattr(case, f.name) != getattr(usual, f.name)}
+    new = {"relax", "layers", "repair", "sliding", "steps", "periodic", "roles"}
+    assert new <= differ <= new | {"axis", "origin"}
+    assert (case.relax, case.layers, case.repair, case.sliding) == ("auto", "auto", "auto", "ps")
+    assert (case.steps, case.periodic) == (5, "moving")
+    assert (usual.relax, usual.layers, usual.repair, usual.steps) == ("no", "no", "no", 1)
+    (tmp_path / "bare.cfg").write_text("MESH_FILENAME= mesh.su2\n")
+    bare = Case.read(tmp_path / "bare.cfg")
+    assert bare.change(mesh_file=None, source=None) == usual
+    case.write(tmp_path / "new.cfg")
+    assert Case.read(tmp_path / "new.cfg").change(source=None) == case
 
 
 def test_the_passage_is_guessed_as_it_is_meant(passage):
