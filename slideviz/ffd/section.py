@@ -229,7 +229,9 @@ class _Reader:
         for marker, tails in on.items():
             table = self.table(key, tails, 4)
             number = table[:, 0]
-            bad = (number != np.floor(number)) | (number < 0) | (number >= n_points)
+            known = self.mesh.zones == 1 or marker in self.mesh.marker_names
+            most = n_points if known else np.inf  # SU2 lists nodes of all zones in one section
+            bad = (number != np.floor(number)) | (number < 0) | (number >= most)
             if bad.any():
                 line, words = tails[int(np.argmax(bad))]
                 raise self.error(f"{key} names node {words[0]}, which is none", line)
@@ -313,13 +315,34 @@ def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...
 
 
 def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:
-    """Return a box of a zone with the names and nodes that its boundaries have in the mesh."""
-    name = names_from(mesh, part)
-    embedded = {
-        name.get(marker, marker): (nodes + part.points.start, uvw)
-        for marker, (nodes, uvw) in box.embedded.items()
-    }
+    """Return a box of a zone with the names and nodes that boundaries have in the mesh.
+
+    SU2 has the boxes of all zones after the last one, and lists their nodes by boundary: one that
+    the zone lacks is that of another zone.
+    """
+    embedded = {}
+    for file, (nodes, uvw) in box.embedded.items():
+        name, zone = _holder(mesh, part, file, box)
+        if nodes.max(initial=-1) >= len(zone.mesh.points):
+            why = f"lists node {nodes.max()} of {name}, which has none of that number"
+            raise MeshError(f"{mesh.name}: the FFD box {box.name!r} {why}")
+        embedded[name] = nodes + zone.points.start, uvw
     return replace(box, embedded=embedded)
+
+
+def _holder(mesh: Mesh, part: ZonePart, file: str, box: Box) -> tuple[str, ZonePart]:
+    """Return the boundary that has a name in the file, from a zone's section, and its zone."""
+    each = [(names_from(mesh, zone).get(file), zone) for zone in (part, *mesh.zone_parts)]
+    known = [(name, zone) for name, zone in each if name is not None] or [(file, part)]
+    if len(known) > 1 and known[0][1] is not part:
+        raise MeshError(_ALIKE.format(mesh.name, box.name, file))
+    return known[0]
+
+
+_ALIKE = (
+    "{}: the FFD box {!r} has nodes on {}, which several zones have, and a mesh file lists them by "
+    "that name alone; rename one of these boundaries"
+)
 
 
 def with_boxes(
@@ -330,7 +353,8 @@ def with_boxes(
     ``boxes``: changed boxes, matched by name, and new ones; the mesh's other boxes stay.
     ``anew``: whether all boxes that the mesh had are dropped.
     ``renewed``: names of boxes whose surface points have other parametric coordinates than before.
-    Raises MeshError for new boxes of a mesh of several zones, and where two have boxes of one name.
+    Raises MeshError where two zones have boxes of one name, or boundaries of one name with nodes in
+    a box.
     """
     if mesh.zone_parts:
         return _with_boxes_of_zones(mesh, boxes, renewed, anew)
@@ -356,27 +380,45 @@ def with_boxes(
 def _with_boxes_of_zones(
     mesh: Mesh, boxes: Sequence[Box], renewed: Collection[str], anew: bool
 ) -> Mesh:
-    """Return the mesh of several zones with changed boxes, each in the zone that has it."""
+    """Return the mesh of several zones with changed boxes in the zone that has them, and new ones.
+
+    New ones are in the zone that has others; else in the only one whose nodes are in them, or, as
+    in SU2, in the last one.
+    """
     alone = zones_of(mesh)
-    names = [[box.name for box in boxes_of(zone)] for zone in alone]
-    if anew or any(sum(box.name in some for some in names) != 1 for box in boxes):
-        require_one_zone(mesh, "a new FFD box, or one whose name two zones have,")
+    names = [[] if anew else [box.name for box in boxes_of(zone)] for zone in alone]
+    count = len(alone)
+    uses = {box.name: [k for k in range(count) if box.name in names[k]] for box in boxes}
+    if twice := [name for name, zones in uses.items() if len(zones) > 1]:
+        require_one_zone(mesh, f"an FFD box {twice[0]!r}, of which two have one,")
+    within = {
+        k
+        for box in boxes
+        if not uses[box.name]
+        for k, part in enumerate(mesh.zone_parts)
+        if not box.embedded.keys().isdisjoint(names_in(mesh, part))
+    }
+    last = max((k for k in range(count) if names[k]), default=count - 1)
+    home = within.pop() if len(within) == 1 and not any(names) else last
     zones = []
-    for part, zone, some in zip(mesh.zone_parts, alone, names, strict=True):
-        in_file = names_in(mesh, part)
-        mine = [
-            replace(
-                box,
-                embedded={
-                    in_file[marker]: (nodes - part.points.start, uvw)
-                    for marker, (nodes, uvw) in box.embedded.items()
-                },
-            )
-            for box in boxes
-            if box.name in some
-        ]
-        zones.append(with_boxes(zone, mine, renewed=renewed) if mine else zone)
+    for k, (part, zone) in enumerate(zip(mesh.zone_parts, alone, strict=True)):
+        mine = [_in_file(mesh, part, box) for box in boxes if (uses[box.name] or [home])[0] == k]
+        without = replace(zone.origin, ffd=b"", ffd_at=()) if anew and _lines(zone) else zone.origin
+        boxed = with_boxes(zone, mine, anew=anew, renewed=renewed) if mine else None
+        zones.append(boxed or replace(zone, origin=without))
     return with_zones(mesh, zones)
+
+
+def _in_file(mesh: Mesh, part: ZonePart, box: Box) -> Box:
+    """Return a box as in the section of a zone: the reverse of `_in_whole`."""
+    files = {n: (f, zone) for zone in mesh.zone_parts for n, f in names_in(mesh, zone).items()}
+    embedded = {}
+    for name, (nodes, uvw) in box.embedded.items():
+        file, zone = files.get(name, (name, part))
+        if _holder(mesh, part, file, box)[1] is not zone:
+            raise MeshError(_ALIKE.format(mesh.name, box.name, file))
+        embedded[file] = nodes - zone.points.start, uvw
+    return replace(box, embedded=embedded)
 
 
 def _lines(mesh: Mesh) -> list[str]:

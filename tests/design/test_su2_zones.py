@@ -13,6 +13,7 @@ from slideviz.design.su2.config import read_config
 from slideviz.design.su2.on_mesh import on_mesh, read_mesh
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
+from slideviz.ffd.section import boxes_of
 from slideviz.mesh.zones import zones_of
 from tests.mesh.test_interfaces import zones as square_and_core
 from tests.solver.test_zones import stage
@@ -253,3 +254,80 @@ def test_coincident_nodes_of_zones_share_the_rows_of_a_file(tmp_path, monkeypatc
     nodes = mesh.marker("BLOCK").nodes
     rows(nodes)
     assert gradient() == pytest.approx((weights[nodes] @ [2.0, 1.0]).sum(), rel=1e-9)
+
+
+def test_a_surface_file_numbers_the_nodes_of_its_zone(here, capsys):
+    mesh = sv.read("stage.su2")
+    rows = []
+    for number, part in enumerate(mesh.zone_parts, 1):
+        nodes = part.mesh.marker("BLOCK").nodes
+        new = part.mesh.points[nodes] + [0.0, 0.01 * number]
+        lines = [f"{node} {x!r} {y!r}" for node, (x, y) in zip(nodes, new.tolist(), strict=True)]
+        Path(f"{number}.dat").write_text("\n".join(lines))
+        rows += [f"{number}:{line}" for line in lines]
+    Path("all.dat").write_text("\n".join(rows))
+    kind = "DV_KIND= SURFACE_FILE\nDV_FILENAME= "
+    main = MAIN[: MAIN.index("DV_KIND")]
+    write(main, f"{kind}1.dat\n", f"{kind}2.dat\n")
+    points = deformed()
+    for number in (1, 2):
+        nodes = mesh.marker(f"{number}:BLOCK").nodes
+        shift = points[nodes] - mesh.points[nodes]
+        np.testing.assert_allclose(shift, [[0.0, 0.01 * number]] * len(nodes), atol=1e-15)
+    single = ONE[: ONE.index("DV_KIND")].replace("2:inner", "2:inner, 2:outer") + kind
+    write(f"{single}all.dat\n")
+    assert np.array_equal(deformed(), points)
+    write(f"{single}1.dat\n")
+    assert run(["def", "main.cfg", "-q"]) != 0
+    assert "1.dat:1: '16 " in capsys.readouterr().err
+
+
+BOXED = """FFD_DEFINITION= (BOX, 0.4, -0.2, 0, 1.3, -0.2, 0, 1.3, 0.6, 0, 0.4, 0.6, 0, \\
+  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+FFD_DEGREE= (3, 2, 0)
+"""
+MOVES = """DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D
+DV_PARAM= (BOX, 1, 1, 0, 1); (BOX, 2, 1, 1, 0)
+DV_VALUE= 0.02, GIVEN
+"""
+
+
+def test_one_box_moves_boundaries_of_two_zones(tmp_path, monkeypatch, capsys):
+    """As in SU2, one section after the last zone has the boxes, and lists nodes of all zones."""
+    monkeypatch.chdir(tmp_path)
+    path = stage(tmp_path)
+    first, _, second = path.read_text().partition("IZONE= 2")
+    path.write_text(f"{first}IZONE= 2{second.replace('MARKER_TAG= ', 'MARKER_TAG= rotor_')}")
+    mesh = sv.read(path)
+    main = MAIN[: MAIN.index("MARKER_SYM")] + BOXED + "DV_MARKER= ( BLOCK, rotor_BLOCK )\n"
+    write(f"{main}DV_KIND= FFD_SETTING\n", "STEPS= 1\n", "STEPS= 1\n")
+    assert run(["def", "main.cfg"]) == 0
+    assert "FFD box BOX: 16 surface nodes" in capsys.readouterr().out
+    text = Path("out.su2").read_text()
+    assert text.count("FFD_NBOX") == 1
+    assert text.index("FFD_NBOX") > text.index("IZONE= 2")
+    boxed = Path("out.su2").rename("stage.su2")
+    weights = np.random.default_rng(5).normal(size=mesh.points.shape)
+
+    def prepare(value):
+        write(main + MOVES.replace("GIVEN", repr(value)) + LISTED, "STEPS= 1\n", "STEPS= 1\n")
+
+    ends = []
+    for value in (0.03 + 1e-4, 0.03 - 1e-4, 0.03):
+        prepare(value)
+        points = deformed()
+        ends.append((weights * points).sum())
+    (before,), (after,) = boxes_of(sv.read(boxed)), boxes_of(sv.read("out.su2"))
+    assert not np.array_equal(before.points, after.points)
+    for marker, (nodes, uvw) in after.embedded.items():
+        assert np.array_equal(mesh.marker(marker).nodes, nodes)
+        np.testing.assert_allclose(after.at(uvw)[:, :2], points[nodes], atol=1e-12)
+    restarts(mesh.with_points(points), weights)
+    slope = (ends[0] - ends[1]) / 2e-4
+    assert gradient()[1] == pytest.approx(slope, rel=1e-6)
+    # The same box from the configuration, which is written with all its nodes.
+    path.write_text(text.partition("FFD_NBOX")[0])
+    assert np.array_equal(deformed(), points)
+    (new,) = boxes_of(sv.read("out.su2"))
+    assert np.array_equal(new.points, after.points)
+    assert new.embedded.keys() == after.embedded.keys()

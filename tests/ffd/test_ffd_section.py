@@ -1,6 +1,7 @@
 """The boxes of SU2 mesh files: read, moved, written back."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.ffd.box import CORNERS, plane_corners, regular_box
+from slideviz.ffd.deformation import parametric
 from slideviz.ffd.section import boxes_of, with_boxes
 from tests.ffd.ffd_samples import DESIGN, REAL, square, unpacked
 
@@ -68,12 +70,10 @@ def test_control_points_of_design_cases_reproduce_their_surface_points(name, tmp
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real meshes are not here")
 @pytest.mark.parametrize("name", WITH_BOXES)
 def test_control_points_of_real_meshes_reproduce_their_surface_points(name):
-    zone = 2 if "CHT" in name else None
-    mesh = sv.read(REAL / name, zone=zone)
+    mesh = sv.read(REAL / name)
     boxes = boxes_of(mesh)
     assert len(boxes) == 1
-    if zone is None:
-        check_reproduced(mesh, boxes)
+    check_reproduced(mesh, boxes)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -179,10 +179,77 @@ def test_boxes_of_several_zones_change_where_they_are(tmp_path):
     first, moved = (boxes_of(sv.read(tmp_path / "out.su2", zone=k))[0] for k in (1, 2))
     assert np.array_equal(first.points, main.points)
     assert np.array_equal(moved.points, second.points + change)
-    new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
-    for anew in (False, True):
-        with pytest.raises(MeshError, match="has 2 zones, but a new FFD box"):
-            with_boxes(mesh, [new], anew=anew)
+    (tmp_path / "zones.su2").write_text(f"NZONE= 2\nIZONE= 1\n{body}IZONE= 2\n{body}")
+    mesh = sv.read(tmp_path / "zones.su2")
+    with pytest.raises(
+        MeshError, match=r"has 2 zones, but an FFD box 'MAIN', of which two have on"
+    ):
+        with_boxes(mesh, boxes_of(mesh)[:1])
+
+
+def test_new_boxes_of_several_zones_are_read_where_su2_has_them(tmp_path):
+    """SU2 has one section for all zones; it lists nodes by the names of boundaries alone."""
+    bare = written(tmp_path).read_text().partition("FFD_NBOX")[0]
+    others = bare.replace("MARKER_TAG= ", "MARKER_TAG= second_")
+    path = tmp_path / "zones.su2"
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{bare}IZONE= 2\n{others}")
+    mesh = sv.read(path)
+
+    def box(name, *markers):
+        new = regular_box(name, plane_corners(CORNERS[:4, :2] * 1.2 - 0.1), (1, 1, 1), None)
+        on = {}
+        for marker in markers:
+            nodes = mesh.marker(marker).nodes
+            on[marker] = nodes, parametric(new, mesh.points[nodes])[0]
+        return replace(new, embedded=on)
+
+    def again(boxes, **how):
+        sv.write(tmp_path / "out.su2", with_boxes(mesh, boxes, **how))
+        text = (tmp_path / "out.su2").read_text()
+        assert text.count("FFD_NBOX") == 1
+        found = boxes_of(sv.read(tmp_path / "out.su2"))
+        for one, other in zip(found, boxes, strict=True):
+            assert one.name == other.name
+            assert one.embedded.keys() == other.embedded.keys()
+            for marker, (nodes, uvw) in other.embedded.items():
+                assert np.array_equal(one.embedded[marker][0], nodes)
+                assert np.array_equal(one.embedded[marker][1], uvw)
+        return text.index("FFD_NBOX") < text.index("IZONE= 2")
+
+    first, second = box("A", "y_low"), box("B", "second_x_low", "second_y_low")
+    assert again([first])
+    assert not again([second])
+    assert not again([first, second])
+    both = box("C", "x_high", "second_x_high")
+    assert not again([both])
+    sv.write(path, with_boxes(mesh, [first]), overwrite=True)
+    mesh = sv.read(path)
+    assert again([second], anew=True) is False
+    assert again([*boxes_of(mesh), both])
+    path.write_text(path.read_text().replace("y_low\t0\t", "second_y_low\t99\t", 1))
+    with pytest.raises(
+        MeshError, match="'A' lists node 99 of second_y_low, which has none of that"
+    ):
+        boxes_of(sv.read(path))
+
+
+def test_boundaries_of_one_name_have_no_nodes_in_one_box(tmp_path):
+    bare = written(tmp_path).read_text().partition("FFD_NBOX")[0]
+    path = tmp_path / "zones.su2"
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{bare}IZONE= 2\n{bare}")
+    mesh = sv.read(path)
+    new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.2 - 0.1), (1, 1, 1), None)
+    on = {name: (mesh.marker(name).nodes[:1], np.zeros((1, 3))) for name in ("1:y_low", "2:y_low")}
+    with pytest.raises(MeshError, match="'NEW' has nodes on y_low, which several zones have, and"):
+        with_boxes(mesh, [replace(new, embedded=on)])
+    alone = {"1:y_low": on["1:y_low"]}
+    sv.write(tmp_path / "out.su2", with_boxes(mesh, [replace(new, embedded=alone)]))
+    assert boxes_of(sv.read(tmp_path / "out.su2"))[0].embedded.keys() == alone.keys()
+    three = f"NZONE= 3\nIZONE= 1\n{bare}IZONE= 2\n{bare}IZONE= 3\n"
+    listed = SECTION.replace("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\ny_low 0 0 0 0")
+    path.write_text(three + bare.replace("MARKER_TAG= ", "MARKER_TAG= third_") + listed)
+    with pytest.raises(MeshError, match="'MAIN' has nodes on y_low, which several zones have"):
+        boxes_of(sv.read(path))
 
 
 def test_lines_of_windows_keep_their_ends(tmp_path):

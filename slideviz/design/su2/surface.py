@@ -14,7 +14,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from slideviz.case.check import raise_all
-from slideviz.case.displacement import Columns, parse_rows
+from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Prescribed
 from slideviz.case.zones import each_zone
@@ -165,13 +165,17 @@ def read_positions(
     Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
     have a z of 0. As in SU2, nodes that are on none of the moving boundaries are ignored, but with
     a warning. Raises CaseError if the file cannot be read, has mistakes (a line ``file:line:
-    sentence`` for each), or none of these nodes. ``path``: the file. ``nodes`` (m,) int64: of the
-    moving boundaries, ascending. ``of``: key and moving boundaries for messages: ``DV_MARKER=
-    (low)``.
+    sentence`` for each), or none of these nodes. ``path``: the file, whose nodes have the numbers
+    that `in_zones` tells. ``nodes`` (m,) int64: of the moving boundaries, ascending. ``of``: key
+    and moving boundaries for messages: ``DV_MARKER= (low)``.
     """
     text, warnings = read_text(path, "surface file")
-    every = np.arange(len(mesh.points))
-    table = parse_rows(text, path, every, mesh.points.shape, "the mesh", POSITION)
+    tables = []
+    for first, _, part, lines in in_zones(text, path, mesh, nodes):
+        every = np.arange(len(part.points))
+        tables.append(parse_rows(lines, path, every, part.points.shape, "the mesh", POSITION))
+        tables[-1][:, 0] += first
+    table = np.concatenate(tables)
     listed = table[:, 0].astype(np.int64)
     moving = np.isin(listed, nodes)
     others = int(np.count_nonzero(~moving))
