@@ -13,9 +13,11 @@ from pathlib import Path
 
 import pytest
 
+import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.samples.table import write_sample
+from tests.builders import stage
 
 
 @pytest.fixture
@@ -236,3 +238,18 @@ def test_limits_are_a_column_and_missed_ones_are_said(square, tmp_path, capsys):
         count = int(row["inverted"])
         assert row["limits"] == (f"inverted = 0: {count}" if count else "met")
     assert out.count("not inverted = 0: ") == len(missed)
+
+
+def test_zones_are_compared_together(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mesh = stage()
+    sv.write("stage.su2", mesh)
+    roles = dict.fromkeys(("1:blade", "2:blade"), "moving") | {"1:hub": "sliding"}
+    motion = sv.Translate(("1:blade", "2:blade"), (0.0, 0.0, 0.01))
+    case = sv.Case(mesh_file=tmp_path / "stage.su2", roles=roles, motions=(motion,))
+    case.write("stage.cfg")
+    words = ["compare", "stage.cfg", "--methods", "none,ps", "--steps", "2", "-o", "out"]
+    assert run([*words, "--no-pictures"]) == 0
+    for row, method in zip(table(tmp_path / "out"), ("none", "ps"), strict=True):
+        *_, last = sv.deform(case.change(sliding=method, steps=2), mesh)
+        assert float(row["min"]) == sv.quality(last.mesh, mesh).min

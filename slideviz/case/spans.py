@@ -18,14 +18,12 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
-from slideviz.mesh.zones import require_one_zone
 
 HUBS, SHROUDS = ("hub",), ("shroud", "casing")
 """Words in the names of boundaries, by which SPAN= AUTO finds hub and shroud."""
 WALLS_KEY = "SPAN= ( HUB, SHROUD )"
 """How a case names both."""
 
-_FIELDS: WeakKeyDictionary[Mesh, dict[object, SpanField]] = WeakKeyDictionary()
 _SECTIONS: WeakKeyDictionary[Mesh, dict[object, BladeSections]] = WeakKeyDictionary()
 
 
@@ -57,29 +55,23 @@ def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str
 
 
 def span_field(case: Case, mesh: Mesh) -> SpanField:
-    """Return the span between hub and shroud of a case, about its axis; cached with the mesh.
+    """Return the span between hub and shroud of a case, about its axis, of a mesh of one zone.
 
     The axis is that of the rotational period; without one that of PERIODIC_AXIS, PERIODIC_ORIGIN.
     Raises CaseError or MeshError where there is none.
     """
-    sides = case.markers_with("periodic")
-    key = case.span, sides, case.periodic_type, case.axis, case.origin
-    cache = _FIELDS.setdefault(mesh, {})
-    if key not in cache:
-        require_one_zone(mesh, "a span")
-        hub, shroud = span_ends(case, mesh)
-        axis, origin, period = case.axis, case.origin, 2.0 * np.pi
-        if sides and mesh.dim == 3:
-            inside = without_halo(mesh)[0]
-            pair = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)[0]
-            if pair.kind != "rotational":
-                raise CaseError(
-                    f"{mesh.name} repeats by a translation ({pair.describe()}), so it has no axis "
-                    "for a span; move its boundaries otherwise, as with rotate or ffd-twist"
-                )
-            axis, origin, period = pair.axis, pair.origin, pair.period
-        cache[key] = find_span(mesh, hub, shroud, axis, origin, period)
-    return cache[key]
+    sides, (hub, shroud) = case.markers_with("periodic"), span_ends(case, mesh)
+    axis, origin, period = case.axis, case.origin, 2.0 * np.pi
+    if sides and mesh.dim == 3:
+        inside = without_halo(mesh)[0]
+        pair = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)[0]
+        if pair.kind != "rotational":
+            raise CaseError(
+                f"{mesh.name} repeats by a translation ({pair.describe()}), so it has no axis "
+                "for a span; move its boundaries otherwise, as with rotate or ffd-twist"
+            )
+        axis, origin, period = pair.axis, pair.origin, pair.period
+    return find_span(mesh, hub, shroud, axis, origin, period)
 
 
 def span_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ def with_marker_names(case: Case, mesh: Mesh) -> Case:
 def renamed(case: Case, names: Mapping[str, str]) -> Case:
     """Return a case with other names of boundaries: ``names`` by those that it has."""
     known = *case.roles, *case.interfaces, *(limit.marker for limit in case.limits)
-    if not any(name in names for name in known):
+    if not any(name in names for name in (*known, *(case.span or ()))):
         return case
     motions = []
     for motion in case.motions:
@@ -70,14 +70,20 @@ def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...
                 f"motion {place} is of boundaries of several zones together, which are deformed "
                 "alone; give one for each"
             )
+    zones = [names_in(mesh, part) for part in mesh.zone_parts]
+    if case.span and all(_zone_span(case, names) is None for names in zones):
+        raise CaseError(
+            f"SPAN: {' and '.join(case.span)} are not both boundaries of one zone of {mesh.name}, "
+            f"which has {', '.join(mesh.marker_names)}"
+        )
     settings = case.zone_settings or (case,) * mesh.zones
     each = zip(settings, mesh.zone_parts, strict=True)
     return tuple(_zone_case(case, one, mesh, part) for one, part in each)
 
 
 def each_zone(case: Case, mesh: Mesh) -> Iterator[tuple[Case, Mesh]]:
-    """Return the case of each zone with the zone; errors as `zone_cases`."""
-    return zip(zone_cases(case, mesh), zones_of(mesh), strict=True)
+    """Return the case of each zone with the zone; errors as `zone_cases` without ``computed``."""
+    return zip(zone_cases(case, mesh, False), zones_of(mesh), strict=True)
 
 
 def of_several_zones(motion: Motion, case: Case, mesh: Mesh) -> bool:
@@ -95,15 +101,12 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
     names = names_in(mesh, part)
     roles = {names[name]: role for name, role in case.roles.items() if name in names}
     periodic = "periodic" in roles.values()
-    span = None
-    if settings.span is not None and all(name in names for name in settings.span):
-        span = names[settings.span[0]], names[settings.span[1]]
     zone = settings.change(
         roles=roles,
         motions=(),
         limits=(),
         zone=None,
-        span=span,
+        span=_zone_span(settings, names),
         warnings=(),
         interfaces=(),
         zone_settings=(),
@@ -111,6 +114,15 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
     )
     moved = [_zone_motion(case, motion, part, names, zone) for motion in case.motions]
     return zone.change(motions=tuple(motion for motion in moved if motion is not None))
+
+
+def _zone_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
+    """Return the walls of SPAN with their names in the file of a zone, if it has both.
+
+    A name that several zones have is that of each.
+    """
+    hub, shroud = (names.get(name, name) for name in case.span or ("", ""))
+    return (hub, shroud) if {hub, shroud} <= set(names.values()) else None
 
 
 def _zone_motion(

@@ -65,7 +65,6 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.terminal import DONE
     from slideviz.errors import CaseError
-    from slideviz.mesh.zones import require_one_zone
     from slideviz.study.combinations import (
         COMPARED_METHODS,
         MODES,
@@ -82,7 +81,6 @@ def compare(arguments: argparse.Namespace) -> int:
     wanted = _wanted(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
     case, mesh = read_mesh(case, mesh_file)
-    require_one_zone(mesh, "a comparison")
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
     require_output_paths(

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
     from slideviz.plots.section_picture import SectionInRun
     from slideviz.sections.model import Section
+    from slideviz.sections.span import SpanWalls
 
 CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
 WALLS_OPTION = "--between HUB,SHROUD"
@@ -232,22 +233,22 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     from slideviz.plots.meridional import draw_meridional, meridional_bins
     from slideviz.plots.section_paint import paint
     from slideviz.sections.span import find_walls
-    from slideviz.session.passages import find_period
+    from slideviz.session.passages import find_periods
 
     with open_mesh(arguments, case) as opened:
         mesh, reference = opened.source.mesh, opened.reference
         base, quality = opened.read_base(), opened.quality(arguments)
     undeformed = base or mesh
-    period = find_period(undeformed, case)
-    walls = find_walls(undeformed, case, period, arguments.between, remedy=WALLS_OPTION)
+    periods = find_periods(undeformed, case)
+    walls = find_walls(undeformed, case, periods, arguments.between, remedy=WALLS_OPTION)
     painted = paint(mesh, quality, arguments.color, base)
     painted = painted.within(*arguments.range) if arguments.range else painted
     bins = meridional_bins(undeformed, walls)
-    means = bins.means(painted.values)
     wide, high = arguments.size or (1600, 1000)
     figure = empty_figure((8.0, 8.0 * high / wide), wide / 8.0, "constrained")
     label = f"mean {QUANTITIES[painted.label].axis}"
-    draw_meridional(figure, bins, means, label, painted.limits, color_map=arguments.map)
+    values = painted.values
+    draw_meridional(figure, bins, values, label, painted.limits, color_map=arguments.map)
     if not arguments.axes:
         figure.axes[0].set_axis_off()
     summary = painted.summary(np.arange(len(mesh.cells)))
@@ -255,20 +256,28 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     facts = f"{painted.label}: {painted.worst} {summary[painted.worst]:.4g}, "
     facts += f"mean {summary['mean']:.4g}; {summary['cells']:,} cells"
     if arguments.title:
-        figure.suptitle(f"{name}: from {walls.hub} to {walls.shroud}\n{facts}", fontsize=10.0)
+        figure.suptitle(f"{name}: from {walls.words}\n{facts}", fontsize=10.0)
     write_figure(figure, arguments.output, figure.dpi)
+    zones = [
+        {
+            "between": list(one.walls),
+            "places": one.places.tolist(),
+            "means": [
+                [None if np.isnan(x) else x for x in row] for row in one.means(values).tolist()
+            ],
+        }
+        for one in bins
+    ]
     report: dict[str, Any] = {
         "mesh": mesh.name,
-        "between": [walls.hub, walls.shroud],
         "color": painted.label,
         "reference": str(reference) if reference else None,
         "picture": str(arguments.output),
-        "places": bins.places.tolist(),
-        "means": [[None if np.isnan(x) else x for x in row] for row in means.tolist()],
+        **(zones[0] if len(zones) == 1 else {"zones": zones}),
         **summary,
     }
     if not save_json(arguments.json, report):
-        print(f"{name}: from {walls.hub} to {walls.shroud}\n  {facts}")
+        print(f"{name}: from {walls.words}\n  {facts}")
         print(f"  {reference_words(reference)}\n  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE
 
@@ -300,7 +309,7 @@ def _section_and_passages(
 
     from slideviz.errors import CaseError
     from slideviz.sections.span import find_walls
-    from slideviz.session.passages import find_period, passages
+    from slideviz.session.passages import find_period, find_periods, passages
 
     asked = arguments.asked
     chosen = replace(
@@ -317,16 +326,28 @@ def _section_and_passages(
     if chosen.kind == "span":
         about = chosen.direction, chosen.origin
         base = read_base() or mesh
-        walls = find_walls(base, case, pair, arguments.between, about, WALLS_OPTION)
+        periods = find_periods(base, case)
+        walls = find_walls(base, case, periods, arguments.between, about, WALLS_OPTION)
         chosen = replace(chosen, walls=walls)
     if not arguments.copies:
         return chosen, {0: np.eye(4)}
     if pair is None:
+        if find_periods(read_base() or mesh, case):
+            raise CaseError(
+                f"{mesh.name}: its zones have different periods, so there are no copies of all "
+                "together; choose one with --zone, or leave out --copies"
+            )
         raise CaseError(
             f"{mesh.name}: no boundaries match each other, so there is no period for --copies; "
             "name a case with MARKER_PERIODIC by --case"
         )
     return chosen, passages(pair, arguments.copies)
+
+
+def _between(walls: SpanWalls | None) -> dict[str, Any]:
+    """Return hub and shroud, of several zones those of each."""
+    pairs = [[one.hub, one.shroud] for one in walls.channels] if walls is not None else []
+    return {} if not pairs else {"between": pairs[0] if len(pairs) == 1 else pairs}
 
 
 def _as_json(chosen: Section) -> dict[str, Any]:
@@ -338,6 +359,6 @@ def _as_json(chosen: Section) -> dict[str, Any]:
         "direction": list(chosen.direction),
         "radius": None,
         **sizes,
-        **({} if chosen.walls is None else {"between": [chosen.walls.hub, chosen.walls.shroud]}),
+        **_between(chosen.walls),
         "whole": chosen.whole_cells,
     }

@@ -30,7 +30,7 @@ from slideviz.mesh.zones import names_from, names_in, spellings, zones_of
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
 from slideviz.sections.cut import transformed
-from slideviz.sections.span import SpanWalls, find_walls
+from slideviz.sections.span import SpanChannel, find_walls
 
 PLACES = frozen_array(np.linspace(0.02, 0.98, 25).round(2), np.float64)
 """Spans, and parts of the chord, at which distances are measured; 0.1, 0.5, 0.9 among them."""
@@ -175,10 +175,10 @@ class _Measure:
         same = [p.nodes if _same_way(p, pairs[0]) else p.nodes[:, ::-1] for p in pairs]
         self.sides = np.concatenate([np.empty((0, 2), np.int64), *same])
         self.turn = lambda points, k: transformed(points, model.matrix(k)) if model else points
-        self.walls: SpanWalls | None = None
+        self.walls: SpanChannel | None = None
         # Without hub and shroud, distances are not by span; a SPAN that is wrong is an error.
         with suppress(CaseError) if case.span is None else nullcontext():
-            self.walls = find_walls(mesh, case, model) if mesh.dim == 3 else None
+            self.walls = find_walls(mesh, case, pairs).channels[0] if mesh.dim == 3 else None
         ends = () if self.walls is None else (self.walls.hub, self.walls.shroud)
         self.blades = tuple(n for n in case.markers_with("moving") if n not in ends)
 
@@ -212,7 +212,7 @@ class _Measure:
 
     def spans(self, points: FloatArray) -> FloatArray:
         assert self.walls is not None
-        of = self.walls.curves.field
+        of = self.walls.field
         return of.span(of.meridional(points))[0]
 
     def throat(self) -> Gap | None:

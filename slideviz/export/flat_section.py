@@ -28,7 +28,7 @@ from slideviz.sections.polygons import CellsInRange
 from slideviz.sections.span import find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.passages import Period, find_period, matrices, show_passages
+from slideviz.session.passages import Period, find_periods, matrices, show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, WALL_VALUES, ColorMap, Quantity, quantity_of
@@ -217,8 +217,8 @@ def section(
         raise CaseError("give either a section or a span, as in section(path, mesh, span=0.5)")
     if at is None:
         base = reference or mesh
-        walls = find_walls(base, case, find_period(base, case), between)
-        of = walls.curves.field
+        walls = find_walls(base, case, find_periods(base, case), between)
+        of = walls.field
         at = Section("span", of.origin, of.axis, span=span or 0.0, walls=walls)
     if color_map not in COLOR_MAPS:
         raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")

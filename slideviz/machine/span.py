@@ -24,7 +24,8 @@ along theta) count as they are, in (z, r, rho theta), with their images one peri
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
+from slideviz.system.weak_cache import weak_cache
 
 REVOLUTION = 0.02
 """A wall is a surface of revolution if its normals at nodes have a smaller component along theta,
@@ -44,6 +46,7 @@ APART = 1e-3  # least distance of points of a profile, as a part of its extent
 STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
 NEAR = 1e-7  # part of the distance between the walls, within which a wall's own normal counts
 FACING = 0.3  # least cosine between the directions from hub to shroud at both walls
+AMID = 0.25  # curves begin at a node whose span is so near to the middle
 SPANS = 33  # curves that `SpanCurves` traces
 STEPS, MOST_STEPS = 64, 512
 """Steps of a curve along the extent of the walls, and most steps in each direction."""
@@ -65,6 +68,15 @@ class SpanField:
     radius: float  # the largest one of the walls
     walls: tuple[ClosestPoints, ClosestPoints]
     """Hub and shroud: segments in (z, r), or triangles in (z, r, radius theta)."""
+    start: tuple[float, float] = (0.0, 0.0)  # z and r of a node in the middle between the walls
+
+    @cached_property
+    def curves(self) -> SpanCurves:
+        """Return curves of constant span that begin in the middle of the passage.
+
+        Raises MeshError as `SpanCurves` does.
+        """
+        return SpanCurves(self, self.start)
 
     @property
     def revolved(self) -> bool:
@@ -158,6 +170,7 @@ def _meridional(
     return np.stack([z, np.hypot(x, y), theta + middle], axis=1)
 
 
+@weak_cache
 def find_span(
     mesh: Mesh,
     hub: str,
@@ -168,9 +181,26 @@ def find_span(
 ) -> SpanField:
     """Return the span between two boundaries of a 3D mesh, whose passages repeat by ``period``.
 
-    Raises MeshError if the mesh is 2D, a boundary is unknown or empty, both are one, or they do
-    not face each other.
+    Cached as long as the mesh lives. Raises MeshError if the mesh is 2D, a boundary is unknown or
+    empty, both are one, or they do not face each other.
     """
+    field = _span_between(mesh, hub, shroud, axis, origin, period)
+    coords = field.meridional(mesh.points[mesh.cells.nodes[:: 1 + len(mesh.points) // 20_000]])
+    amid = coords[np.abs(field.span(coords)[0] - 0.5) <= AMID]
+    coords = amid if len(amid) else coords
+    off = np.linalg.norm(coords[:, :2] - np.median(coords[:, :2], axis=0), axis=1)
+    z, r, _ = coords[int(np.argmin(off))].tolist()
+    return replace(field, start=(z, r))
+
+
+def _span_between(
+    mesh: Mesh,
+    hub: str,
+    shroud: str,
+    axis: tuple[float, float, float],
+    origin: tuple[float, float, float],
+    period: float,
+) -> SpanField:
     if mesh.dim != 3:
         raise MeshError(f"{mesh.name}: the span between two boundaries needs a mesh in 3D")
     boundary, facets = boundary_of(mesh), list[IntArray]()

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.system.weak_cache import weak_cache
 
 FITS = 1e-5
 """Largest distance between a receiver and its donor's image, as a part of the mesh's extent."""
@@ -185,9 +186,11 @@ def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
 
     All points stay, with their numbers. Without a halo: the same mesh and None.
     """
-    halo = mesh.halo
-    if halo is None:
-        return mesh, None
+    return (mesh, None) if mesh.halo is None else _inside(mesh, mesh.halo)
+
+
+@weak_cache
+def _inside(mesh: Mesh, halo: Halo) -> tuple[Mesh, IntArray]:
     beyond = halo.outer_mask(len(mesh.points))
     markers = tuple(
         Marker(marker.name, marker.cells.take(~_touching(marker.cells, beyond)))

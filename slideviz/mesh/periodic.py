@@ -20,6 +20,7 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.mesh.nearest import nearest
 from slideviz.mesh.zones import names_from, names_in
+from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
@@ -203,6 +204,17 @@ def pair_up(
     others (two halves of a straight side), the partner with this transformation is chosen. Raises
     MeshError if a marker has no partner, or the pairs have different transformations.
     """
+    return _paired(mesh, tuple(names), kind, tuple(axis), tuple(origin))
+
+
+@weak_cache
+def _paired(
+    mesh: Mesh,
+    names: tuple[str, ...],
+    kind: PeriodicType,
+    axis: tuple[float, ...],
+    origin: tuple[float, ...],
+) -> tuple[Pair, ...]:
     if mesh.zone_parts:
         of_zones = [(part, names_in(mesh, part)) for part in mesh.zone_parts]
         here = [(part, [own[n] for n in names if n in own]) for part, own in of_zones]

@@ -5,14 +5,18 @@ A place is a bin of span and of length along the passage, in which all cells aro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.machine.span import SpanField
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.zones import zones_of
 from slideviz.plots.style import PRINT, Style, style_axes
-from slideviz.sections.span import SpanWalls
+from slideviz.sections.span import SpanChannel, SpanWalls
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,13 +27,14 @@ MOST_BINS = 120  # most bins in each direction
 
 @dataclass(frozen=True, eq=False)
 class MeridionalBins:
-    """Cells by their meridional place: k bins from hub to shroud and l along the passage."""
+    """Cells of a zone by meridional place: k bins from hub to shroud, and l along the passage."""
 
     places: FloatArray
     """(k + 1, l + 1, 2): z and r of the corners of bins, in the mesh's length unit."""
     bin_of: IntArray
     """(m,): the bin of each cell, row by row."""
     walls: tuple[str, str]
+    cells: slice  # those of the zone in the mesh
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -37,7 +42,8 @@ class MeridionalBins:
         return self.places.shape[0] - 1, self.places.shape[1] - 1
 
     def means(self, values: FloatArray) -> FloatArray:
-        """Return the mean (k, l) of values (m,) of cells; NaN where no cell has a finite one."""
+        """Return the mean (k, l) of values of all cells; NaN where no cell has a finite one."""
+        values = values[self.cells]
         there = np.isfinite(values)
         total, count = (
             np.bincount(self.bin_of[there], weights, int(np.prod(self.shape)))
@@ -46,11 +52,25 @@ class MeridionalBins:
         return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(self.shape)
 
 
-def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
-    """Return the bins of the cells of a mesh; a cell is in that of the mean of its nodes.
+_BINS: WeakKeyDictionary[SpanField, MeridionalBins] = WeakKeyDictionary()
+"""Results of `meridional_bins`."""
+
+
+def meridional_bins(mesh: Mesh, walls: SpanWalls) -> tuple[MeridionalBins, ...]:
+    """Return the bins of the cells of each zone; a cell is in that of the mean of its nodes.
 
     Along the passage bins are equal parts of the length from first to last node at each span.
+    Cached as long as the span lives.
     """
+    zones = zones_of(mesh)
+    for one in walls.channels:
+        if one.field not in _BINS:
+            part = mesh.zone_parts[one.zone].cells if mesh.zone_parts else slice(None)
+            _BINS[one.field] = _zone_bins(zones[one.zone], one, part)
+    return tuple(_BINS[one.field] for one in walls.channels)
+
+
+def _zone_bins(mesh: Mesh, walls: SpanChannel, part: slice) -> MeridionalBins:
     curves, cells = walls.curves, mesh.cells
     plane = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))
     used = np.stack([np.clip(plane[:, 2], 0.0, 1.0), curves.length(plane)], axis=1)
@@ -74,7 +94,7 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> MeridionalBins:
     m_prime = curves.at_length((low + share * (high - low)).ravel(), span.ravel())
     plane = np.stack([m_prime, 0.0 * m_prime, span.ravel()], axis=1)
     places = curves.traced(plane).reshape(k + 1, n + 1, 2)
-    return MeridionalBins(places, at_row * n + at_column, (walls.hub, walls.shroud))
+    return MeridionalBins(places, at_row * n + at_column, (walls.hub, walls.shroud), part)
 
 
 def _bins_of(mesh: Mesh, used: FloatArray) -> int:
@@ -89,8 +109,8 @@ def _bins_of(mesh: Mesh, used: FloatArray) -> int:
 
 def draw_meridional(
     figure: Figure,
-    bins: MeridionalBins,
-    means: FloatArray,
+    zones: Sequence[MeridionalBins],
+    values: FloatArray,
     label: str,
     limits: tuple[float, float],
     *,
@@ -98,23 +118,24 @@ def draw_meridional(
     style: Style = PRINT,
     unit: str = "mesh units",
 ) -> None:
-    """Draw means (k, l) of bins by z and r, with a color bar; ``label`` names the quantity."""
+    """Draw the means of values of all cells by z and r, with a color bar; ``label`` names them."""
     axes: Any = figure.add_subplot()
     style_axes(axes, style, f"z [{unit}]", f"r [{unit}]")
     axes.grid(False)
-    z, r = bins.places[..., 0], bins.places[..., 1]
-    mesh = axes.pcolormesh(z, r, means, cmap=color_map, vmin=limits[0], vmax=limits[1])
-    mesh.set_rasterized(True)
-    for row, name in zip((0, -1), bins.walls, strict=True):
-        axes.plot(z[row], r[row], color=style.scheme.text, linewidth=style.width)
-        at, other = bins.places[[row, -1 - row], z.shape[1] // 2]
-        outwards = (at - other) / np.linalg.norm(at - other)
-        axes.annotate(
-            name, at, xytext=tuple(4.0 * outwards), textcoords="offset points",
-            ha=("right", "center", "left")[1 + int(np.sign(outwards[0].round(1)))],
-            va=("top", "center", "bottom")[1 + int(np.sign(outwards[1].round(1)))],
-            fontsize=style.size, color=style.scheme.text,
-        )  # fmt: skip
+    for bins in zones:
+        (z, r), means = np.moveaxis(bins.places, -1, 0), bins.means(values)
+        mesh = axes.pcolormesh(z, r, means, cmap=color_map, vmin=limits[0], vmax=limits[1])
+        mesh.set_rasterized(True)
+        for row, name in zip((0, -1), bins.walls, strict=True):
+            axes.plot(z[row], r[row], color=style.scheme.text, linewidth=style.width)
+            at, other = bins.places[[row, -1 - row], z.shape[1] // 2]
+            outwards = (at - other) / np.linalg.norm(at - other)
+            axes.annotate(
+                name, at, xytext=tuple(4.0 * outwards), textcoords="offset points",
+                ha=("right", "center", "left")[1 + int(np.sign(outwards[0].round(1)))],
+                va=("top", "center", "bottom")[1 + int(np.sign(outwards[1].round(1)))],
+                fontsize=style.size, color=style.scheme.text,
+            )  # fmt: skip
     axes.locator_params(axis="x", nbins=4)
     axes.set_aspect("equal", adjustable="datalim")
     bar = figure.colorbar(mesh, ax=axes)

@@ -15,7 +15,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE, INVERTED
 from slideviz.plots.gap import Measured
 from slideviz.plots.histogram import draw_distribution
-from slideviz.plots.meridional import MeridionalBins, draw_meridional, meridional_bins
+from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
@@ -25,7 +25,7 @@ from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.span import SpanWalls, find_walls
 from slideviz.session.changes import show_frame
-from slideviz.session.passages import find_period
+from slideviz.session.passages import find_periods
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.terms import (
@@ -128,8 +128,8 @@ class Profiles:
             # In layers of the undeformed mesh, so that layers of cells stay together.
             values = frame.quality.values
             if coordinate == "span":
-                field = walls_in(session).curves.field
-                span = field.span(field.meridional(mesh.points))[0]
+                walls = walls_in(session)
+                span = walls.span(walls.field.meridional(mesh.points))
                 made = along_span(mesh, values, span, label=label)
             elif coordinate == "r":
                 made = along_radius(mesh, values, case.axis, case.origin, label=label)
@@ -162,12 +162,11 @@ def walls_in(session: Session) -> SpanWalls:
     """Return hub and shroud of a session; CaseError or MeshError if there are none."""
     mesh, case = session.mesh, session.case
     assert mesh is not None
-    return find_walls(mesh, case, find_period(mesh, case, session.pairs))
+    return find_walls(mesh, case, find_periods(mesh, case, session.pairs))
 
 
-_BINS: WeakKeyDictionary[SpanWalls, MeridionalBins] = WeakKeyDictionary()
 _GAPS: WeakKeyDictionary[StepFrame, dict[object, tuple[Gap, ...]]] = WeakKeyDictionary()
-"""Caches of `draw_meridional_view` and of `gaps_of`."""
+"""Results of `gaps_of`."""
 
 
 def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None:
@@ -178,13 +177,12 @@ def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None
     frame, mesh, walls = session.frame, session.mesh, walls_in(session)
     assert frame is not None
     assert mesh is not None
-    if walls not in _BINS:
-        _BINS[walls] = meridional_bins(mesh, walls)
+    bins = meridional_bins(mesh, walls)
     what = quantity_drawn(session)
     limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
-    means = _BINS[walls].means(frame.values(what, mesh))
-    label, color_map = f"mean {QUANTITIES[what].axis}", session.view.color_map
-    draw_meridional(figure, _BINS[walls], means, label, limits, color_map=color_map, style=style)
+    values, color_map = frame.values(what, mesh), session.view.color_map
+    label = f"mean {QUANTITIES[what].axis}"
+    draw_meridional(figure, bins, values, label, limits, color_map=color_map, style=style)
 
 
 def gaps_of(session: Session) -> list[Measured]:

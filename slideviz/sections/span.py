@@ -7,90 +7,190 @@ this shape; shapes of arrays are in `slideviz.sections.shape` and
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.spans import WALLS_KEY, span_ends
+from slideviz.case.zones import each_zone
 from slideviz.errors import CaseError
-from slideviz.machine.span import SpanCurves, find_span
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.machine.span import SpanCurves, SpanField, find_span
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.zones import require_one_zone
+from slideviz.mesh.zones import names_from
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
 from slideviz.sections.shape import Label
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section, Triple
 
+_SPANS = np.linspace(0.0, 1.0, 33)  # at which zones are joined to each other
 _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number of right digits
-_AMID = 0.25  # curves begin at a node whose span is so near to the middle
 
 
-@dataclass(frozen=True, eq=False)
-class SpanWalls:
-    """Two walls of a mesh, and the curves of constant span between them."""
+@dataclass(frozen=True)
+class SpanChannel:
+    """The walls of a zone, and the span between them."""
 
     hub: str
     shroud: str
     """`hub`, `shroud`: their boundaries."""
-    curves: SpanCurves
+    field: SpanField
+    zone: int  # the number of the zone in the mesh, from 0
 
-    @cached_property
-    def lean(self) -> float:
-        """The angle in radians between the curves and the axis, where m is 0 at mid-span."""
-        (z, r) = np.diff(self.curves.traced(np.array([[-1e-3, 0, 0.5], [1e-3, 0, 0.5]])), axis=0)[0]
-        return float(np.arctan2(r, z))
+    @property
+    def curves(self) -> SpanCurves:
+        """Return the curves of constant span."""
+        return self.field.curves
 
     @cached_property
     def scale(self) -> float:
         """The most that `level` may change per length, over its usual rate of 1: its inverse."""
-        field = self.curves.field
-        if field.revolved:
+        if self.field.revolved:
             return 1.0
-        least = min(float(wall.corners[..., 1].min()) for wall in field.walls)
-        return max(least, 1e-3 * field.radius) / field.radius
+        least = min(float(wall.corners[..., 1].min()) for wall in self.field.walls)
+        return max(least, 1e-3 * self.field.radius) / self.field.radius
 
     def level(self, coords: FloatArray, span: float) -> FloatArray:
         """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
-        (hub, _, _), (shroud, _, _) = self.curves.field.distances(coords)
+        (hub, _, _), (shroud, _, _) = self.field.distances(coords)
         return np.asarray(((1.0 - span) * hub - span * shroud) * self.scale)
 
+    def outside(self, coords: FloatArray) -> FloatArray:
+        """Return numbers (n,): 0 between the walls, and more beyond them or their rims."""
+        ends = self.field.distances(coords)
+        span = self.field.span_of(ends)[0]
+        return np.maximum(np.maximum(-span, span - 1.0), 0.0) + np.maximum(ends[0][2], ends[1][2])
 
-_WALLS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], SpanWalls]] = WeakKeyDictionary()
-"""Results of `span_walls`."""
+    @cached_property
+    def begin(self) -> FloatArray:
+        """Meridional coordinates (s, 3) at `_SPANS`, on a line between the first ends of walls."""
+        ends = []
+        for wall in self.field.walls:
+            coords = np.unique(wall.corners[..., :2].reshape(-1, 2), axis=0)
+            coords = np.column_stack([coords, np.full(len(coords), self.field.middle)])
+            ends.append(coords[np.argmin(self.curves.plane(coords)[:, 0])])
+        return np.outer(1.0 - _SPANS, ends[0]) + np.outer(_SPANS, ends[1])
 
 
-def span_walls(
-    mesh: Mesh,
-    hub: str,
-    shroud: str,
-    axis: tuple[float, float, float],
-    origin: tuple[float, float, float],
-    period: float = 2.0 * np.pi,
-) -> SpanWalls:
-    """Return two walls with their curves; cached as long as the mesh lives.
+@dataclass(frozen=True)
+class SpanWalls:
+    """The walls of all zones of a machine: at each place the span is that of the zone there.
 
-    Raises MeshError as `find_span` does.
+    Lengths m and m' go on from zone to zone, in the order in which the flow passes them.
     """
-    key = hub, shroud, axis, origin, period
-    cache = _WALLS.setdefault(mesh, {})
-    if key not in cache:
-        field = find_span(mesh, hub, shroud, axis, origin, period)
-        coords = field.meridional(mesh.points[mesh.cells.nodes[:: 1 + len(mesh.points) // 20_000]])
-        amid = coords[np.abs(field.span(coords)[0] - 0.5) <= _AMID]
-        coords = amid if len(amid) else coords
-        off = np.linalg.norm(coords[:, :2] - np.median(coords[:, :2], axis=0), axis=1)
-        cache[key] = SpanWalls(
-            hub, shroud, SpanCurves(field, coords[int(np.argmin(off)), :2].tolist())
+
+    channels: tuple[SpanChannel, ...]
+
+    @property
+    def field(self) -> SpanField:
+        """Return the span of the first zone, with the axis of all."""
+        return self.channels[0].field
+
+    @property
+    def words(self) -> str:
+        """Return hub and shroud of each zone in words."""
+        return ", ".join(f"{one.hub} to {one.shroud}" for one in self.channels)
+
+    @cached_property
+    def lean(self) -> float:
+        """The angle in radians between the curves and the axis, where m is 0 at mid-span."""
+        places = np.array([[-1e-3, 0, 0.5], [1e-3, 0, 0.5]])
+        (z, r) = np.diff(self.field.curves.traced(places), axis=0)[0]
+        return float(np.arctan2(r, z))
+
+    @cached_property
+    def _begin(self) -> FloatArray:
+        """(c, 3, s): by how much m' and m of each zone go on, and m at its begin, at `_SPANS`."""
+        out, before = np.zeros((len(self.channels), 3, len(_SPANS))), -1
+        middles = [np.array([[*one.field.start, one.field.middle]]) for one in self.channels]
+        order = np.argsort([float(self.field.curves.plane(at)[0, 0]) for at in middles])
+        for k in order.tolist():
+            one, last = self.channels[k], self.channels[before].curves
+            start = one.curves.plane(one.begin)
+            length = one.curves.length(start)
+            if k != order[0]:
+                met = last.plane(one.begin)
+                out[k, 0] = out[before, 0] + met[:, 0] - start[:, 0]
+                out[k, 1] = out[before, 1] + last.length(met) - length
+            out[k, 2] = out[k, 1] + length
+            before = k
+        return out
+
+    def _each(
+        self, coords: FloatArray, value: Callable[[int, FloatArray], FloatArray]
+    ) -> FloatArray:
+        """Return values (n, ...) at meridional coordinates (n, 3), of the zone at each place."""
+        if len(self.channels) == 1:
+            return value(0, self._branch(0, coords))
+        places = range(len(self.channels))
+        outside = [self.channels[k].outside(self._branch(k, coords)) for k in places]
+        return self._chosen(np.argmin(outside, axis=0), coords, value)
+
+    def _chosen(
+        self, which: IntArray, rows: FloatArray, value: Callable[[int, FloatArray], FloatArray]
+    ) -> FloatArray:
+        """Return values (n, ...) of rows (n, 3), each of the zone ``which`` (n,)."""
+        parts = [value(k, rows[which == k]) for k in range(len(self.channels))]
+        order = np.argsort(np.argsort(which, kind="stable"), kind="stable")
+        return np.asarray(np.concatenate(parts)[order])
+
+    def _branch(self, k: int, coords: FloatArray) -> FloatArray:
+        """Return meridional coordinates (n, 3), theta within half a turn of the walls' middle."""
+        turns = np.round((coords[:, 2] - self.channels[k].field.middle) / (2.0 * np.pi))
+        return coords - np.outer(2.0 * np.pi * turns, (0.0, 0.0, 1.0))
+
+    def level(self, coords: FloatArray, span: float) -> FloatArray:
+        """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
+        return self._each(coords, lambda k, some: self.channels[k].level(some, span))
+
+    def span(self, coords: FloatArray) -> FloatArray:
+        """Return the span (n,) at meridional coordinates (n, 3)."""
+        return self._each(coords, lambda k, some: self.channels[k].field.span(some)[0])
+
+    def height(self, coords: FloatArray) -> FloatArray:
+        """Return the distance of the walls (n,) at meridional coordinates (n, 3)."""
+
+        def value(k: int, some: FloatArray) -> FloatArray:
+            (hub, _, _), (shroud, _, _) = self.channels[k].field.distances(some)
+            return hub + shroud
+
+        return self._each(coords, value)
+
+    def plane(self, coords: FloatArray) -> FloatArray:
+        """Return m', m and span (n, 3) at meridional coordinates (n, 3)."""
+
+        def value(k: int, some: FloatArray) -> FloatArray:
+            curves = self.channels[k].curves
+            plane = curves.plane(some)
+            m_prime, m, _ = (np.interp(plane[:, 2], _SPANS, row) for row in self._begin[k])
+            return np.column_stack([plane[:, 0] + m_prime, curves.length(plane) + m, plane[:, 2]])
+
+        return self._each(coords, value)
+
+    def coords(self, places: FloatArray) -> FloatArray:
+        """Return meridional coordinates (n, 3) at places (n, 3): theta, m and span.
+
+        On the spline, not exactly on the span: so they go on beyond the rims of the walls.
+        """
+
+        def value(k: int, some: FloatArray) -> FloatArray:
+            curves, (theta, m, span) = self.channels[k].curves, some.T
+            at = m - np.interp(span, _SPANS, self._begin[k, 1])
+            plane = np.stack([curves.at_length(at, span), theta, span], axis=1)
+            return np.column_stack([curves.traced(plane), theta])
+
+        starts = np.array([np.interp(places[:, 2], _SPANS, rows[2]) for rows in self._begin])
+        past = np.where(starts <= places[:, 1], starts, -np.inf)
+        none = np.isinf(past).all(axis=0)
+        return self._chosen(
+            np.where(none, starts.argmin(axis=0), past.argmax(axis=0)), places, value
         )
-    return cache[key]
 
 
 def walls_of(section: Section) -> SpanWalls:
@@ -114,7 +214,7 @@ class ConstantSpan(AboutAxis):
         """Return signed numbers (n,), positive towards the shroud, that grow as distances do."""
         x, y = along(0), along(1)
         coords = np.stack([along(2), np.hypot(x, y), np.arctan2(y, x)], axis=1)
-        return walls_of(section).level(self._branch(section, coords), section.span)
+        return walls_of(section).level(coords, section.span)
 
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
@@ -126,7 +226,7 @@ class ConstantSpan(AboutAxis):
 
         def value(share: FloatArray) -> FloatArray:
             points = start + share[:, None] * way
-            coords = walls_of(section).curves.field.meridional(points)
+            coords = walls_of(section).field.meridional(points)
             return walls_of(section).level(coords, section.span)
 
         for _ in range(_ROUNDS):
@@ -146,8 +246,8 @@ class ConstantSpan(AboutAxis):
         return root
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        field = walls_of(section).curves.field
-        return field.span(field.meridional(points))[0]
+        walls = walls_of(section)
+        return walls.span(walls.field.meridional(points))
 
     def first(self, section: Section, points: FloatArray) -> Section:
         """Return the section at mid-span."""
@@ -159,7 +259,7 @@ class ConstantSpan(AboutAxis):
 
     def describe(self, section: Section) -> str:
         walls = section.walls
-        between = "hub to shroud" if walls is None else f"{walls.hub} to {walls.shroud}"
+        between = "hub to shroud" if walls is None else walls.words
         return f"{self.brief(section)} from {between}"
 
     def brief(self, section: Section) -> str:
@@ -173,7 +273,7 @@ class ConstantSpan(AboutAxis):
         """Return m', theta, and the span above that of the section."""
         local = opened.local
         coords = np.stack([local[:, 2], np.hypot(local[:, 0], local[:, 1]), opened.angle], axis=1)
-        plane = walls_of(section).curves.plane(self._branch(section, coords))
+        plane = walls_of(section).plane(coords)
         return np.stack([plane[:, 0], opened.angle, plane[:, 2] - section.span], axis=1)
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
@@ -191,67 +291,70 @@ class ConstantSpan(AboutAxis):
 
     def places(self, section: Section, points: FloatArray) -> FloatArray:
         """Return angles in radians, and arc lengths m along the curve."""
-        curves = walls_of(section).curves
-        coords = curves.field.meridional(points)
-        return np.column_stack([coords[:, 2], curves.length(curves.plane(coords))])
+        walls = walls_of(section)
+        coords = walls.field.meridional(points)
+        return np.column_stack([coords[:, 2], walls.plane(coords)[:, 1]])
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        curves = walls_of(section).curves
-        span = np.full(len(places), size)
-        plane = np.column_stack([curves.at_length(places[:, 1], span), places[:, 0], span])
-        # The spline, not `SpanCurves.coords`: a frame goes beyond the rims of the walls.
-        return curves.field.points(np.column_stack([curves.traced(plane), plane[:, 1]]))
+        walls = walls_of(section)
+        return walls.field.points(
+            walls.coords(np.column_stack([places, np.full(len(places), size)]))
+        )
 
     def lean(self, section: Section) -> float:
         return walls_of(section).lean
 
     def lever(self, section: Section, along: float) -> float:
         """Return the height of the passage there."""
-        coords = self._coords(section, along)
-        (hub, _, _), (shroud, _, _) = walls_of(section).curves.field.distances(coords)
-        return float(hub[0] + shroud[0])
+        return float(walls_of(section).height(self._coords(section, along))[0])
 
     def girth(self, section: Section, along: float) -> float:
         return float(self._coords(section, along)[0, 1])
 
     def _coords(self, section: Section, along: float) -> FloatArray:
-        field = walls_of(section).curves.field
-        return field.meridional(
-            self.surface(section, np.array([[field.middle, along]]), section.span)
-        )
-
-    def _branch(self, section: Section, coords: FloatArray) -> FloatArray:
-        """Return meridional coordinates (n, 3), theta within half a turn of the walls' middle."""
-        middle = walls_of(section).curves.field.middle
-        coords[:, 2] -= 2.0 * np.pi * np.round((coords[:, 2] - middle) / (2.0 * np.pi))
-        return coords
+        walls = walls_of(section)
+        return walls.coords(np.array([[walls.field.middle, along, section.span]]))
 
 
 def find_walls(
     mesh: Mesh,
     case: Case | None = None,
-    pair: Pair | None = None,
+    periods: Sequence[Pair] = (),
     between: tuple[str, str] | None = None,
     about: tuple[Triple, Triple] | None = None,
     remedy: str = WALLS_KEY,
 ) -> SpanWalls:
-    """Return hub and shroud of a mesh: ``between``, or those of the case, or by their names.
+    """Return hub and shroud of each zone: ``between``, or those of the case, or by their names.
 
-    ``pair``: the period. ``about``: the axis of the span, and a point on it; without that it is the
-    axis of the period, and without a period that of the case. ``remedy``: see `span_ends`.
+    ``periods``: that of each zone. ``about``: the axis of the span, and a point on it; without that
+    it is the axis of the period, and without a period that of the case. ``remedy``: see
+    `span_ends`. Zones without walls are left out, unless they all are.
     Raises CaseError where none are known, or passages are not turned about an axis; and MeshError
     as `find_span` does.
     """
     case = case or Case()
-    require_one_zone(mesh, "a span")
-    hub, shroud = between or span_ends(case, mesh, remedy)
-    if pair is not None and pair.kind != "rotational":
-        if mesh.dim == 3 and case.markers_with("periodic"):
-            raise CaseError(
-                f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant span "
-                "need an axis about which they turn: set PERIODIC_TYPE= rotational"
-            )
-        pair = None  # it was guessed: inflow and outflow match, too
-    axis, origin = about or ((case.axis, case.origin) if pair is None else (pair.axis, pair.origin))
-    period = 2.0 * np.pi if pair is None else pair.period
-    return span_walls(mesh, hub, shroud, axis, origin, period)
+    case = case if between is None else case.change(span=between)
+    channels, missing = list[SpanChannel](), list[CaseError]()
+    for number, (one, zone) in enumerate(each_zone(case, mesh)):
+        try:
+            hub, shroud = span_ends(one, zone, remedy)
+        except CaseError as problem:
+            missing.append(problem)
+            continue
+        label = dict(zip(zone.marker_names, zone.marker_names, strict=True))
+        label = names_from(mesh, mesh.zone_parts[number]) if mesh.zone_parts else label
+        pair = next((each for each in periods if each.first in label.values()), None)
+        if pair is not None and pair.kind != "rotational":
+            if mesh.dim == 3 and one.markers_with("periodic"):
+                raise CaseError(
+                    f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant "
+                    "span need an axis about which they turn: set PERIODIC_TYPE= rotational"
+                )
+            pair = None  # it was guessed: inflow and outflow match, too
+        about = about or ((one.axis, one.origin) if pair is None else (pair.axis, pair.origin))
+        period = 2.0 * np.pi if pair is None else pair.period
+        field = find_span(zone, hub, shroud, *about, period)
+        channels.append(SpanChannel(label[hub], label[shroud], field, number))
+    if not channels:
+        raise missing[0]
+    return SpanWalls(tuple(channels))

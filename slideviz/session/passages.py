@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -24,44 +23,45 @@ _SAME = 1e-9
 UNENDING = 2
 """Neighbours drawn on each side if all are wanted of a translational period, which is endless."""
 
-_PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair | None]] = WeakKeyDictionary()
-"""Periodic pairs found before, by mesh, and by the settings of the case that they depend on."""
-
 
 def find_period(
     mesh: Mesh, case: Case | None = None, pairs: Sequence[Pair] | None = None
 ) -> Pair | None:
     """Return the pair of boundaries whose transformation repeats the mesh, or None.
 
+    None also where zones have different periods; see `find_periods`.
+    """
+    periods = find_periods(mesh, case, pairs)
+    named = case is not None and case.markers_with("periodic")
+    if not periods or (not named and len(periods) < len(mesh.zone_parts)):
+        return None
+    return periods[0] if all(agree(periods[0], one) for one in periods) else None
+
+
+def find_periods(
+    mesh: Mesh, case: Case | None = None, pairs: Sequence[Pair] | None = None
+) -> tuple[Pair, ...]:
+    """Return for each zone of a mesh the pair of boundaries whose transformation repeats it.
+
     Of a case with periodic boundaries it is their first pair. Otherwise it is guessed among the
     boundaries that match (``pairs``, if known already): those with names that hint at periodicity
-    come first, then rotations; the ends of every straight duct match, too. None also where zones
-    have different periods. Raises MeshError if the periodic boundaries of the case do not match.
+    come first, then rotations; the ends of every straight duct match, too. Zones without a pair
+    have none. Raises MeshError if the periodic boundaries of the case do not match.
     """
-    names = case.markers_with("periodic") if case is not None else ()
-    if case is not None and names:
-        key = names, case.periodic_type, case.axis, case.origin
-        known = _PERIODS.setdefault(mesh, {})
-        if key not in known:
-            first, *others = pair_up(mesh, *key)
-            known[key] = first if all(agree(first, one) for one in others) else None
-        return known[key]
 
     def rank(pair: Pair) -> tuple[int, bool]:
         guesses = [guess_by_name(name) for name in (pair.first, pair.second)]
         named = sum(guess is not None and guess.role == "periodic" for guess in guesses)
         return -named, pair.kind != "rotational"
 
-    every = find_pairs(mesh) if pairs is None else pairs
-    if not every:
-        return None
-    best = min(every, key=rank)
-    for part in mesh.zone_parts:  # the first pair of each zone must have the same period
-        names = mesh.marker_names[part.markers]
-        alike = [pair for pair in every if pair.first in names and agree(best, pair)]
-        if not alike or min((p for p in every if p.first in names), key=rank) not in alike:
-            return None
-    return best
+    sides = case.markers_with("periodic") if case is not None else ()
+    if case is not None and sides:
+        every: Sequence[Pair] = pair_up(mesh, sides, case.periodic_type, case.axis, case.origin)
+    else:
+        every = sorted(find_pairs(mesh) if pairs is None else pairs, key=rank)
+    zones = [mesh.marker_names[part.markers] for part in mesh.zone_parts] or [mesh.marker_names]
+    first = [next((pair for pair in every if pair.first in names), None) for names in zones]
+    return tuple(pair for pair in first if pair is not None)
 
 
 def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]:

@@ -219,9 +219,9 @@ def with_walls(section: Section, mesh: Mesh, case: Case, pairs: Sequence[Pair] =
     """
     if section.kind != "span":
         return section
-    period = next((pair for pair in pairs if pair.kind == "rotational"), None)
+    periods = [pair for pair in pairs if pair.kind == "rotational"]
     about = section.direction, section.origin
-    return replace(section, walls=find_walls(mesh, case, period, about=about))
+    return replace(section, walls=find_walls(mesh, case, periods, about=about))
 
 
 def bound_sections(

@@ -240,7 +240,7 @@ def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[Combina
 @dataclass(frozen=True, eq=False)
 class _Shared:
     first: Combination
-    setup: Setup
+    setup: Setup | None  # None of a mesh of several zones, each of which has its own
     seconds: float
     processor_seconds: float
 
@@ -321,7 +321,7 @@ def compare(
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
     clock = _Clock()
     with clock:
-        setup = make_setup(combination.applied(case), mesh)
+        setup = None if mesh.zone_parts else make_setup(combination.applied(case), mesh)
     return _Shared(combination, setup, clock.seconds, clock.processor)
 
 
@@ -360,7 +360,7 @@ def _result(
         condition=max(step.condition for step in steps),
         seconds=clock.seconds,
         processor_seconds=clock.processor,
-        tolerance=shared.setup.reduction.tolerance if shared.setup.reduction else None,
+        tolerance=steps[-1].tolerance,
         history=tuple((step.index, cycle) for step in steps for cycle in step.history),
         warnings=steps[-1].warnings,
         limits=outcome(check_case_limits(applied, measured, steps[-1].mesh, mesh)),

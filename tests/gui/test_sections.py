@@ -250,7 +250,7 @@ def test_a_section_of_constant_span_goes_to_10_50_and_90_percent(window, driver,
     window.dock_manager.bring_to_front("sections")
     panel = window.dock_manager.panels["sections"]
     driver.click(panel.add["span"])
-    assert sections(window)[0].walls.hub == "HUB"
+    assert sections(window)[0].walls.channels[0].hub == "HUB"
     assert not panel.editor.axis.isVisible()
     low, half, high = panel.editor.picks["span"].findChildren(QPushButton)
     assert [button.text() for button in (low, half, high)] == ["10 %", "50 %", "90 %"]

@@ -11,6 +11,7 @@ from slideviz.case.view_keys import write_sections
 from slideviz.cli import run
 from slideviz.errors import CaseError
 from slideviz.mesh.quality import quality
+from slideviz.mesh.zones import join_zones
 from slideviz.samples.impeller import impeller_mesh
 from slideviz.scene.axis_handle import frame_of
 from slideviz.sections.around_axis import patch_of
@@ -19,12 +20,12 @@ from slideviz.sections.model import Section
 from slideviz.sections.span import find_walls
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.passages import keeps
+from slideviz.session.passages import find_periods, keeps
 from slideviz.session.saving import view_to_case, with_walls
 from slideviz.session.section_cuts import can_cut, first_section, position_range
 from slideviz.session.state import StepFrame
 from slideviz.streaming.source import MemorySource, cut_cells
-from tests.builders import cube, pair, passage
+from tests.builders import cube, pair, passage, stage
 
 HALF = Section("span", span=0.5)
 
@@ -103,10 +104,11 @@ def test_periods_about_its_axis_keep_it():
     assert keeps(section, turn.matrix(1))
     assert not keeps(section, pair("translational", 3, vector=(0.0, 0.0, 1.0)).matrix(1))
     case = sv.Case(roles={"inflow": "periodic", "outflow": "periodic"})
+    side = replace(pair("translational", 3, vector=(0.0, 0.0, 1.0)), first="inflow")
     with pytest.raises(CaseError, match=r"repeat by .*need an axis about which they turn"):
-        find_walls(mesh, case, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
+        find_walls(mesh, case, [side])
     # One that was guessed does not count.
-    assert find_walls(mesh, None, pair("translational", 3, vector=(0.0, 0.0, 1.0)))
+    assert find_walls(mesh, None, [side])
 
 
 def test_without_walls_it_cuts_nothing():
@@ -127,7 +129,7 @@ def test_sessions_keep_it_with_the_walls_of_their_case():
     mesh = passage()
     session = session_of(mesh)
     section = first_section("span", session)
-    assert (section.span, section.walls.hub, section.walls.shroud) == (0.5, "hub", "shroud")
+    assert (section.span, section.walls.words) == (0.5, "hub to shroud")
     assert position_range(section, mesh.points) == pytest.approx((0.0, 1.0))
     session = changes.add_section(session, replace(section, flat=True))
     case = view_to_case(session)
@@ -137,7 +139,7 @@ def test_sessions_keep_it_with_the_walls_of_their_case():
     [again] = session_of(mesh, case).view.sections
     assert again == replace(section, flat=True)  # the walls are cached with the mesh
     swapped = changes.set_case(session, span=("shroud", "hub"))
-    assert swapped.view.section.walls.hub == "shroud"
+    assert swapped.view.section.walls.channels[0].hub == "shroud"
     gone = changes.set_case(session, span=("inflow", "hub"))
     assert gone.view.section.walls is None
     [lost] = session_of(cube(), case).view.sections
@@ -167,3 +169,60 @@ def test_command_and_library_draw_it(tmp_path, monkeypatch, capsys):
     assert shown.ids.tolist() == swapped.ids.tolist()
     with pytest.raises(CaseError, match="give either a section or a span"):
         sv.section("e.svg", mesh)
+
+
+@pytest.mark.parametrize("span", [0.1, 0.3, 0.9])
+def test_each_zone_is_cut_by_the_span_between_its_own_walls(span):
+    mesh = stage()
+    section = bound(mesh, span, periods=find_periods(mesh))
+    assert section.describe() == f"{100 * span:g} % span from 1:hub to 1:shroud, 2:hub to 2:shroud"
+    cut = Cutter.of(mesh).cut(mesh.points, section)
+    alone = [
+        Cutter.of(part.mesh).cut(part.mesh.points, bound(part.mesh, span)).cells + part.cells.start
+        for part in mesh.zone_parts
+    ]
+    assert cut.cells.tolist() == np.concatenate(alone).tolist()
+    radius = 0.5 + 0.5 * span
+    assert np.hypot(*cut.points[:, :2].T) == pytest.approx(radius, rel=0.02)
+    # Laid flat, the second zone goes on where the first one ends: m' is z / r there.
+    flat = section.shape.flatten(section, cut, None, None)
+    low, high = flat.points[:, 0].min(), flat.points[:, 0].max()
+    assert high - low == pytest.approx(1.75 / radius, rel=0.02)
+    along, z = section.shape.places(section, cut.points)[:, 1], cut.points[:, 2]
+    assert along - along[0] == pytest.approx(z - z[0], abs=1e-3)
+    # The handle's surface goes through both.
+    places = np.column_stack([np.full(5, 0.3), along.min() + np.linspace(0.1, 1.7, 5)])
+    surface = section.shape.surface(section, places, span)
+    assert surface[:, 2] == pytest.approx(np.linspace(0.1, 1.7, 5), abs=0.01)
+    assert section.shape.lever(section, float(along[-1])) == pytest.approx(0.5, rel=0.02)
+
+
+def test_zones_without_walls_are_left_out_and_others_are_named():
+    mesh = stage()
+    behind = mesh.zone_parts[1].mesh
+    names = [replace(one, name=one.name.replace("hub", "inner")) for one in behind.markers]
+    other = join_zones([mesh.zone_parts[0].mesh, replace(behind, markers=tuple(names))])
+    assert find_walls(other).words == "hub to 1:shroud"
+    named = sv.Case(span=("inner", "2:shroud"))
+    assert find_walls(other, named).words == "hub to 1:shroud, inner to 2:shroud"
+    assert find_walls(mesh, None, between=("shroud", "hub")).words == (
+        "1:shroud to 1:hub, 2:shroud to 2:hub"
+    )
+    with pytest.raises(CaseError, match="SPAN: hub and inner are not both boundaries of one zone"):
+        find_walls(other, sv.Case(span=("hub", "inner")))
+
+
+def test_the_commands_show_all_zones(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sv.write("stage.su2", stage())
+    assert run(["section", "stage.su2", "--span", "0.5", "-o", "a.png", "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["section"]["between"] == [["1:hub", "1:shroud"], ["2:hub", "2:shroud"]]
+    assert run(["section", "stage.su2", "--meridional", "-o", "a.png", "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert [np.shape(zone["means"]) for zone in report["zones"]] == [(4, 8), (4, 8)]
+    assert report["zones"][1]["between"] == ["2:hub", "2:shroud"]
+    front, behind = (np.array(zone["places"])[..., 0] for zone in report["zones"])
+    assert front.max() == pytest.approx(behind.min(), abs=1e-3)
+    assert run(["section", "stage.su2", "--span", "0.5", "--copies", "1", "-o", "a.png"]) == 1
+    assert "its zones have different periods" in capsys.readouterr().err
