@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import chain
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
+from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.zones import marker_zones
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.session.passages import Period, matrices
+from slideviz.session.passages import Period, find_periods, matrices
 from slideviz.session.state import Session
 
 PALER = 0.45
@@ -59,7 +62,7 @@ class PassageLayer(KeyedLayer):
     def clear(self) -> None:
         self._period = Period()
         self._key = ()
-        self._matrices: dict[int, FloatArray] = {}
+        self._matrices: list[FloatArray] = []
         for copy in chain.from_iterable(self._actors.values()):
             self.stage.plotter.renderer.RemoveActor(copy)
         self._mappers: dict[str, Any] = {}
@@ -73,19 +76,36 @@ class PassageLayer(KeyedLayer):
         drawn = [*self._cells.shapes(), *self._boundaries.shapes()]
         every = [np.asarray(shape.points) for shape in drawn]
         ends = outermost(np.concatenate(every))
-        return [pv.PolyData(transformed(ends, matrix)) for matrix in self._matrices.values()]
+        return [pv.PolyData(transformed(ends, matrix)) for matrix in self._matrices]
 
     def update(self, old: Session | None, new: Session) -> None:
         super().update(old, new)
         if self._matrices:
             self._style()
 
-    def _pair(self, session: Session) -> Pair | None:
-        return self._period.of(session) if session.view.passages else None
+    def _pairs(self, session: Session) -> tuple[Pair, ...]:
+        """Return the pair whose period repeats the mesh; those of zones where they differ."""
+        mesh = session.mesh
+        if not session.view.passages or mesh is None:
+            return ()
+        pair = self._period.of(session)
+        if pair is not None or not mesh.zone_parts:
+            return () if pair is None else (pair,)
+        with suppress(SlidevizError):  # said beside the Run button
+            return find_periods(mesh, session.case, session.pairs)
+        return ()
+
+    def _repeats(self, session: Session, pair: Pair, name: str) -> bool:
+        """Return whether a pair repeats a boundary, or what is shown of the cells of all zones."""
+        mesh = session.mesh
+        if mesh is None or self._period.of(session) is not None:
+            return True
+        zones = dict(zip(mesh.marker_names, marker_zones(mesh), strict=True))
+        return zones[pair.first] == zones.get(name)
 
     def key(self, session: Session) -> tuple[object, ...]:
         # The threshold's actor is made when it first has cells.
-        return self._pair(session), session.view.passages, self._threshold.actor
+        return self._pairs(session), session.view.passages, self._threshold.actor
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
         """Return data set and actor of everything that the passages repeat, by name."""
@@ -97,13 +117,14 @@ class PassageLayer(KeyedLayer):
         return sources
 
     def draw(self, session: Session) -> None:
-        wanted = matrices(session, self._pair(session))
+        wanted = [(pair, matrices(session, pair)) for pair in self._pairs(session)]
         # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer
         for copy in chain.from_iterable(self._actors.values()):
             renderer.RemoveActor(copy)
-        self._actors, self._matrices = {}, wanted
-        if not wanted:
+        self._actors = {}
+        self._matrices = [matrix for _, turns in wanted for matrix in turns.values()]
+        if not self._matrices:
             self._mappers, self._props = {}, {}
             return
         for name, (shape, actor) in self._sources().items():
@@ -111,7 +132,8 @@ class PassageLayer(KeyedLayer):
             self._mappers[name] = mapper
             prop = self._props.setdefault(name, pv.Property())
             made = []
-            for number, matrix in wanted.items():
+            turns = [some for pair, some in wanted if self._repeats(session, pair, name)]
+            for number, matrix in chain.from_iterable(some.items() for some in turns):
                 copy = pv.Actor(mapper=mapper, prop=prop, name=f"copy:{number}:{name}")
                 copy.user_matrix = matrix
                 copy.SetShaderProperty(actor.GetShaderProperty())

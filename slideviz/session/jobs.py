@@ -35,7 +35,7 @@ from slideviz.sections.span import find_walls
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
-from slideviz.session.passages import find_period
+from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.state import Session, StepFrame
@@ -179,7 +179,8 @@ def prepare_spans(case: Case, mesh: Mesh) -> None:
         for one, zone in each_zone(case, mesh):
             prepare_span(one, zone)
         if mesh.dim == 3 and case.markers_with("periodic"):
-            find_walls(mesh, case, find_period(mesh, case))
+            for channel in find_walls(mesh, case, find_periods(mesh, case)).channels:
+                _ = channel.curves
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:
@@ -310,7 +311,7 @@ def prepare(
     session = open_mesh(first, path, pairs, case)
     enclosing_of(mesh, surfaces)
     with suppress(SlidevizError):  # said beside the Run button
-        find_period(mesh, session.case, pairs)
+        find_periods(mesh, session.case, pairs)
     ghosts = Ghosts(mesh)
     ghosts.moved(session.case, wait=True)
     coarse = coarse_surfaces(surfaces, mesh.points)

@@ -49,6 +49,7 @@ from slideviz.case.onto import is_laid, laid_displacements
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.zones import marker_zones
 from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.system.atomic import atomic_write
@@ -237,11 +238,13 @@ def targets(session: Session) -> tuple[Target, ...]:
 
 def machine_pair(session: Session) -> Pair | None:
     """Return the first rotational pair of periodic boundaries, or None."""
-    for pair in session.pairs:
-        both = {session.role(pair.first), session.role(pair.second)}
-        if pair.kind == "rotational" and both == {"periodic"}:
-            return pair
-    return None
+    return next((pair for pair in session.pairs if is_turned(session, pair)), None)
+
+
+def is_turned(session: Session, pair: Pair) -> bool:
+    """Return whether a pair is periodic by a rotation."""
+    both = {session.role(pair.first), session.role(pair.second)}
+    return pair.kind == "rotational" and both == {"periodic"}
 
 
 def machine_axis(session: Session) -> Axis | None:
@@ -250,12 +253,15 @@ def machine_axis(session: Session) -> Axis | None:
     return None if pair is None else (pair.axis, pair.origin)
 
 
-def wheel_passages(session: Session) -> int | None:
-    """Return how many passages make the wheel; None where there is none, or for several zones."""
-    pair, mesh = machine_pair(session), session.mesh
-    if pair is None or mesh is None or mesh.zone_parts:
-        return None
-    return pair.around
+def wheel_passages(session: Session) -> tuple[int, ...]:
+    """Return how many passages make the wheel of each zone; () where a zone has none."""
+    if session.mesh is None:
+        return ()
+    pairs = [pair for pair in session.pairs if is_turned(session, pair)]
+    zone_of = dict(zip(session.mesh.marker_names, marker_zones(session.mesh), strict=True))
+    around = {zone_of[pair.first]: pair.around for pair in reversed(pairs)}
+    counts = tuple(around[zone] or 0 for zone in sorted(around))
+    return counts if all(counts) and len(counts) == max(len(session.mesh.zone_parts), 1) else ()
 
 
 def box_names(session: Session) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from slideviz.sections.model import ON_SECTION, SHAPES, Section, Triple
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
 from slideviz.session.large import block_frame
+from slideviz.session.motions import machine_pair
 from slideviz.session.results import StepFrame
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import Session
@@ -154,6 +155,7 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     """
     mesh, case, shape = session.mesh, session.case, SHAPES[kind]
     assert mesh is not None
+    pair = machine_pair(session) if pair is None else pair  # None, too, of zones that differ
     if pair is not None and pair.kind == "rotational":
         axis, origin = pair.axis, pair.origin
     elif mesh.dim == 2:
@@ -163,7 +165,8 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     at, way = triple(np.asarray(origin)), triple(np.asarray(axis))
     section = Section.of(kind, at, way, shape.terms.size.usual if shape.terms.size else 0.0)
     section = replace(section, whole_cells=mesh.dim == 2)
-    [section] = bound_sections([section], mesh, case, () if pair is None else (pair,))
+    pairs = session.pairs if pair is None else (pair, *session.pairs)
+    [section] = bound_sections([section], mesh, case, pairs)
     return shape.first(section, _shown_points(session))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from qtpy.QtCore import Qt, QTimer, QUrl
 from qtpy.QtGui import QShortcut
@@ -29,8 +30,11 @@ from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
+from slideviz.plots.session_plots import draw_meridional_view, gaps_of
+from slideviz.plots.style import PRINT
 from slideviz.session import changes, jobs, pieces
-from tests.builders import passage
+from slideviz.session.section_cuts import first_section
+from tests.builders import passage, stage
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -517,6 +521,41 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
     driver.window.store.change(changes.set_role, ["per1"], "fixed")
     assert not act.isEnabled()
     assert "must be periodic, by a whole part of a turn" in " ".join(act.toolTip().split())
+
+
+def test_a_stage_has_wheels_gaps_and_spans_of_its_zones(driver, answers, tmp_path):
+    mesh, window = stage(), driver.window
+    names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
+    roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
+    case, path = Case(roles=roles, periodic_type="rotational"), tmp_path / "stage.su2"
+    window.show_opened(jobs.prepare(mesh, path, case, lambda _: None, lambda: False))
+    words = []
+
+    def look(dialog):
+        words.extend((dialog.passages.currentText(), dialog.words.text()))
+        driver.qtbot.waitUntil(lambda: not dialog._runner.busy)
+        dialog.preview.pixmap().save(str(tmp_path / "preview.png"))
+        return True
+
+    answers("ask_save", tmp_path / "wheel.su2")
+    in_dialog(look)
+    window.actions_table.by_name["save_wheel"].trigger()
+    driver.settle()
+    assert words[0] == "the whole wheel, 9 and 12"
+    shown = np.asarray(Image.open(tmp_path / "preview.png").convert("L"), float)
+    assert (shown < 250).mean() > 0.2  # two rings, not a passage of each
+    assert words[1].startswith(f"{21 * len(mesh.zone_parts[0].mesh.cells):,} cells")
+    assert len(read(tmp_path / "wheel.su2").cells) == 21 * len(mesh.zone_parts[0].mesh.cells)
+    section = first_section("span", window.store.session)
+    assert section.describe() == "50 % span from 1:hub to 1:shroud, 2:hub to 2:shroud"
+    [(_, _, gaps)] = gaps_of(window.store.session)
+    assert [gap.words for gap in gaps] == [f"zone {k}: throat of {k}:blade" for k in (1, 2)]
+    figure = Figure()
+    draw_meridional_view(window.store.session, figure, PRINT)
+    assert [text.get_text() for text in figure.axes[0].texts] == [
+        *("1:hub", "1:shroud"),
+        *("2:hub", "2:shroud"),
+    ]
 
 
 def test_steps_that_exist_are_asked_about(ran, answers, tmp_path):

@@ -218,7 +218,7 @@ class Exports(QObject):
         """Ask for passages and a file name, and write the wheel of the shown step."""
         session, files = self._session, self.window.files
         frame, mesh, around = session.frame, session.mesh, wheel_passages(session)
-        if frame is None or mesh is None or around is None or self.window.runner.busy:
+        if frame is None or mesh is None or not around or self.window.runner.busy:
             return
         with self._renderer() as renderer:
             dialog = WheelDialog(self.window, renderer, around)

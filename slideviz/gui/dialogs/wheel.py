@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from typing import Any, Literal
 
 from qtpy.QtGui import QShowEvent
@@ -14,17 +14,19 @@ from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets.build import check_box, dialog_buttons, hint_label, in_column
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
+from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
 from slideviz.session.state import Session
 
 PREVIEW = (460, 360)  # largest width and height of the picture, in pixels
 
 
-def passage_choices(session: Session, around: int) -> dict[int | Literal["all"], str]:
+def passage_choices(session: Session, around: Sequence[int]) -> dict[int | Literal["all"], str]:
     """Return the numbers of passages that can be saved, in words: all, and those in the view."""
     shown = 2 * session.view.passages + 1
-    words: dict[int | Literal["all"], str] = {"all": f"the whole wheel, {around}"}
-    if 1 < shown < around:
+    numbers = " and ".join(map(str, around))
+    words: dict[int | Literal["all"], str] = {"all": f"the whole wheel, {numbers}"}
+    if 1 < shown < min(around):
         words[shown] = f"those in the view, {shown}"
     return words
 
@@ -32,10 +34,11 @@ def passage_choices(session: Session, around: int) -> dict[int | Literal["all"],
 class WheelDialog(QDialog):
     """The dialog for the options of a wheel, with a picture of it.
 
-    ``renderer``: draws the session whose step is saved. ``around``: the passages of the wheel.
+    ``renderer``: draws the session whose step is saved. ``around``: the passages of the wheel of
+    each zone.
     """
 
-    def __init__(self, parent: QWidget, renderer: OffscreenRenderer, around: int) -> None:
+    def __init__(self, parent: QWidget, renderer: OffscreenRenderer, around: Sequence[int]) -> None:
         super().__init__(parent)
         self.setWindowTitle("Save as wheel")
         self.renderer, self._session, self._around = renderer, renderer.session, around
@@ -72,8 +75,9 @@ class WheelDialog(QDialog):
     def _draw(self) -> None:
         mesh, count = self._session.mesh, self.count
         assert mesh is not None
-        many = self._around if count == "all" else count
-        self.words.setText(f"{many * len(mesh.cells):,} cells; where passages meet, nodes are one.")
+        many = self._around if count == "all" else [count] * len(self._around)
+        cells = sum(k * len(zone.cells) for k, zone in zip(many, zones_of(mesh), strict=True))
+        self.words.setText(f"{cells:,} cells; where passages meet, nodes are one.")
         self._runner.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:

@@ -439,7 +439,7 @@ class SectionsPanel(Panel):
         section = first_section(kind, session, pair)
         self.store.change(changes.add_section, section)
         try:
-            with_walls(section, session.mesh, session.case, () if pair is None else (pair,))
+            with_walls(section, session.mesh, session.case, session.pairs)
         except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
             main_window(self).banner.show_message(with_field_labels(str(error)))
 

@@ -230,7 +230,7 @@ def has_steps_and_is_idle(now: CommandState) -> bool:
 
 def has_wheel(now: CommandState) -> bool:
     """Return whether periodic boundaries make the mesh a passage of a wheel, and no job runs."""
-    return is_idle(now) and wheel_passages(now.session) is not None
+    return is_idle(now) and bool(wheel_passages(now.session))
 
 
 def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], bool]:
