@@ -300,12 +300,6 @@ def test_a_binary_of_several_zones_is_opened_in_memory(tmp_path):
     assert not is_large(path, 2)
 
 
-def test_a_comparison_is_of_one_zone(tmp_path, capsys):
-    both().change(mesh_file=stage(tmp_path)).write(tmp_path / "c.cfg")
-    assert command(["compare", str(tmp_path / "c.cfg"), "--no-pictures"]) == 1
-    assert "has 2 zones, but a " in capsys.readouterr().err
-
-
 def test_a_setup_is_of_one_zone(tmp_path):
     from slideviz.solver.setup import make_setup
 
