@@ -100,7 +100,7 @@ def test_all_kinds_of_a_list_act_one_after_the_other(here):
     assert found.idle == (False,) * 11 + (True,)
     (angle,) = found.warnings
     assert "FFD_ANGLE_OF_ATTACK moves no node; add 1 degrees, its value times" in angle
-    after = boxes_of(found.displacer.boxed(found.mesh))[0]
+    after = boxes_of(found.boxed(found.mesh))[0]
     np.testing.assert_allclose(after.points, points, rtol=0, atol=1e-14)
 
 
@@ -177,7 +177,7 @@ def test_boxes_in_other_coordinates_are_set_and_deform(kind, here):
         uvw = (system.q_of(at[None])[0] - low) / (high - low)
         right = system.points_of(blended(points, uvw)) - at
         np.testing.assert_allclose(by, right, rtol=0, atol=1e-12)
-    after = boxes_of(found.displacer.boxed(found.mesh), system)[0]
+    after = boxes_of(found.boxed(found.mesh), system)[0]
     np.testing.assert_allclose(after.q, points, rtol=0, atol=1e-12)
 
 
@@ -325,7 +325,7 @@ def test_box_in_a_box_without_variables_or_nodes_moves_alone(here):
     unit = moved("FFD_CONTROL_POINT", (1, 1, 0), (0.2, 0.4, 0.3), (0.2,), np.zeros((3, 3, 2, 3)))
     for node, uvw in zip(inside.nodes, inside.uvw, strict=True):
         np.testing.assert_allclose(found.displacement[node], blended(unit, uvw), atol=1e-14)
-    outer, inner = boxes_of(found.displacer.boxed(found.mesh))
+    outer, inner = boxes_of(found.boxed(found.mesh))
     np.testing.assert_array_equal(outer.points, boxes_of(found.mesh)[0].points)
     assert (inner.points != boxes_of(found.mesh)[1].points).any()
 
@@ -504,7 +504,7 @@ def test_held_planes_act_on_each_kind_in_its_way(fixed, here):
         still += [place] * (reach[1] == 0 < reach[0])
         partly += [place] * (0 < reach[1] < reach[0])
         points = both[1]
-    after = boxes_of(found.displacer.boxed(found.mesh))[0]
+    after = boxes_of(found.boxed(found.mesh))[0]
     np.testing.assert_allclose(after.points, points, rtol=0, atol=1e-14)
     said = " ".join(found.warnings)
     for places, effect in ((still, "do nothing"), (partly, "leave the control points there")):
