@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 import slideviz as sv
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
@@ -511,9 +511,18 @@ def test_the_same_case_gives_the_same_bits():
 def test_any_number_of_threads_of_blas_gives_the_same_bits():
     mesh, points = builders.square(90), []  # with sums of more than 10,000 terms, which it divides
     case = sv.Case(roles={"BLOCK": "moving"}, motions=(sv.Rotate("BLOCK", 10.0),), method="elastic")
-    for threads in (1, 2):
-        with threadpool_limits(threads, "blas"):
+    libraries = ThreadpoolController().select(user_api="blas").lib_controllers
+    before = [library.get_num_threads() for library in libraries]
+    try:
+        for threads in (1, 2):
+            for library in libraries:
+                library.set_num_threads(threads)
+                library.clear_controlling_thread()
             points.append([step.mesh.points for step in sv.deform(case, mesh)])
+    finally:
+        for library, threads in zip(libraries, before, strict=True):
+            library.set_num_threads(threads)
+            library.clear_controlling_thread()
     np.testing.assert_array_equal(*points)
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import gc
+import os
 import re
 import subprocess
 import sys
@@ -210,14 +211,31 @@ from threadpoolctl import threadpool_info
 blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
 numpys = [one["num_threads"] for one in blas if "numpy.libs" in one["filepath"]]
 print(len(blas) > len(numpys) > 0, numpys)
+from threading import Thread
+from slideviz.rbf.solve import enough_threads
+
+def limited():
+    with enough_threads(0.0):
+        print({one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"})
+
+thread = Thread(target=limited)
+thread.start()
+thread.join()
 """
 
 
 def test_numpy_multiplies_in_the_thread_that_asks():
     done = subprocess.run(
-        [sys.executable, "-c", NUMERICS], capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, "-c", NUMERICS],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "2"},
     )
-    apart, threads = done.stdout.strip().split(" ", 1)
+    first, limited = done.stdout.splitlines()
+    assert limited == "{1}", "a run rounds as it does without the window"
+    apart, threads = first.split(" ", 1)
     if apart != "True":
         pytest.skip("NumPy and SciPy share a BLAS here")
     assert set(threads.strip("[]").split(", ")) == {"1"}

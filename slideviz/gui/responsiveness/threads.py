@@ -125,6 +125,9 @@ def import_numerics() -> None:
     if len(numpys) < len(blas):
         for one in numpys:
             one.set_num_threads(NUMPY_THREADS)
+    # Else threadpoolctl would let this thread alone set threads: limits of runs had no effect.
+    for one in blas:
+        getattr(one, "clear_controlling_thread", lambda: None)()
 
 
 def tune_interpreter() -> GarbageCollector:
