@@ -20,8 +20,8 @@ from slideviz.mesh.interfaces import (
     named_interfaces,
     torn_interfaces,
 )
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
-from slideviz.mesh.zones import names_from, names_in, with_zones
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, ZoneInterface, sealed
+from slideviz.mesh.zones import join_zones, names_from, names_in, with_zones
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.steps import MeshRepair, Progress, Step
@@ -273,6 +273,13 @@ def joined_repairs(
         each = [getattr(one, name) + getattr(part, start) for part, one in done]
         return sealed(np.concatenate(each))
 
+    if mesh.part is not None:  # of streamed zones, the bad cells and the moved nodes
+        parts = [(place, one.mesh.part) for place, one in done if one.mesh.part is not None]
+        points = np.concatenate([each.points + place.first_point for place, each in parts])
+        cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
+        part = Part(sealed(points), sealed(cells), *mesh.part.sizes)
+        bare = [replace(one.mesh, markers=()) for _, one in done]
+        now = replace(join_zones(bare), part=part)
     return MeshRepair(
         mesh=now,
         cells=numbers("cells"),
