@@ -15,6 +15,7 @@ from slideviz.session import changes, large
 from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import IN_FILE
 from slideviz.solver.deform import deform
+from tests.builders import stage
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +163,7 @@ def test_a_run_goes_from_file_to_file(stator, folder, tmp_path, answers):
     waited(stator)
     assert len(asked) == 1
     whole = sv.read(folder / "mesh.su2b")
-    (step,) = deform(case, whole)
+    *_, step = deform(case, whole)
     np.testing.assert_array_equal(sv.read(output).points, step.mesh.points)
     found, frame = quality(step.mesh, whole), stator.session.frame
     assert (frame.quality.min, frame.quality.inverted) == (found.min, found.inverted)
@@ -188,3 +189,39 @@ def test_a_run_that_is_cancelled_leaves_no_file(stator, tmp_path, answers):
 
 def test_the_reason_is_a_sentence():
     assert IN_FILE.endswith(".")
+
+
+def test_all_zones_of_a_large_mesh_are_opened_and_run(driver, tmp_path, monkeypatch, answers):
+    monkeypatch.setattr(large, "LARGE_CELLS", 100)
+    whole, output = stage(), tmp_path / "out.su2b"
+    sv.write(tmp_path / "stage.su2b", whole)
+    driver.open(tmp_path / "stage.su2b")
+    mesh, table = driver.session.mesh, driver.window.boundaries.table
+    assert driver.session.in_file
+    assert mesh.marker_names == whole.marker_names
+    half = len(mesh.markers) // 2
+    assert [table.item(row, 0).text() for row in (0, half + 1)] == ["Zone 1", "Zone 2"]
+    assert driver.window.actions_table.bar.zone.currentText() == "all 2"
+    assert driver.session.frame.quality.min == quality(whole).min
+    blades = ("1:blade", "2:blade")
+    motions = tuple(sv.Rotate(name, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)) for name in blades)
+    roles = {**driver.session.case.roles, **dict.fromkeys(blades, "moving")}
+    driver.window.store.change(changes.set_case, roles=roles, motions=motions, relax="no")
+    section = Section("cylinder", (0.0, 0.0, 0.0), (0, 0, 1), 0.8)
+    add(driver, section)
+    answers("ask_save", output)
+    case = driver.session.case
+    driver.window.start_run()
+    driver.settle()
+    waited(driver)
+    *_, step = deform(case, whole)
+    np.testing.assert_array_equal(sv.read(output).points, step.mesh.points)
+    assert driver.session.frame.quality.min == quality(step.mesh, whole).min
+    cut = Cutter.of(whole).cut(step.mesh.points, driver.session.view.sections[0])
+    one = driver.window.scene.sections.drawn["section:0"]
+    np.testing.assert_array_equal(one.frame.mesh.part.cells[one.polygons.cells], cut.cells)
+    driver.window.dock_manager.bring_to_front("worst")
+    panel = driver.window.dock_manager.panels["worst"]
+    driver.qtbot.waitUntil(lambda: panel.model.worst is not None)
+    shown = [int(panel.model.index(row, 0).data()) for row in range(3)]
+    assert shown == quality(step.mesh, whole).worst(3).tolist()
