@@ -108,7 +108,7 @@ class Bar:
             remaining = max(self._expected - (now - self._start), 0.0)
         left = "" if remaining is None else f", about {remaining:.0f} s left"
         word = _PHASES.get(progress.phase, progress.phase)
-        steps = f"step {progress.step} of {progress.total}: {word}{left}"
+        steps = f"step {progress.step} of {progress.total}: {word}{progress.of_zone}{left}"
         self._draw(done, f"{self._head}{steps}")
 
     def phase(self, progress: Progress) -> None:
@@ -129,7 +129,7 @@ class Bar:
             self._filled = max(self._filled, spent / (spent + progress.left or 1.0))
             filled, left = self._filled, f", about {progress.left:.0f} s left in all"
         word = _PHASES.get(progress.phase, progress.phase)
-        self._draw(filled, f"{self._head}{word}: {100 * done:.0f} %{left}")
+        self._draw(filled, f"{self._head}{word}{progress.of_zone}: {100 * done:.0f} %{left}")
 
     def count(self, done: int, total: int, what: str, rest: float | None = None) -> None:
         """Draw the bar for ``done`` of ``total`` things; ``rest`` is the seconds left, if known."""

@@ -120,12 +120,14 @@ class SafeFraction:
     step: int = 1
     """The step on whose straight path that is. Beyond a fraction of 1 that is the last, straight
     on."""
+    zone: int | None = None  # the number of its zone, where the mesh has several
 
     @property
     def words(self) -> str:
         """Return a sentence, its number rounded down: ``the motion is safe up to 62 %, ...``."""
         place = ", ".join(f"{value:.4g}" for value in self.where)
-        who = f"cell {self.cell} ({self.kind}) at ({place})"
+        zone = "" if self.zone is None else f" of zone {self.zone}"
+        who = f"cell {self.cell} ({self.kind}{zone}) at ({place})"
         if self.cell is None:
             return f"the motion could go more than {self.fraction:g} times as far"
         if self.fraction <= 0:
@@ -146,14 +148,16 @@ class SafeFraction:
 
     def report(self) -> dict[str, object]:
         """Return the keys of a report: ``safe_fraction``, ``safe_cell`` and so on."""
-        return {f"safe_{name}": value for name, value in asdict(self).items()}
+        known = {f"safe_{name}": value for name, value in asdict(self).items()}
+        return known if self.zone else {key: known[key] for key in known if key != "safe_zone"}
 
     @classmethod
     def of_report(cls, report: Mapping[str, Any]) -> SafeFraction | None:
         """Return what `report` wrote into a report; None if it did not."""
         if "safe_fraction" not in report:
             return None
-        return cls(**{one.name: report[f"safe_{one.name}"] for one in fields(cls)})
+        names = {one.name: f"safe_{one.name}" for one in fields(cls)}
+        return cls(**{name: report[key] for name, key in names.items() if key in report})
 
 
 def reach_words(fraction: float) -> str:

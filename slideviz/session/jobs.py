@@ -346,7 +346,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         raise_if_cancelled(stopped)
         # Sliding has its phases more than once in a step; a bar must not run back.
         furthest = max(furthest, overall(now))
-        phase = PHASES.get(now.phase, now.phase)
+        phase = PHASES.get(now.phase, now.phase) + now.of_zone
         if case.steps:
             report(JobProgress(f"Step {now.step} of {now.total}: {phase}", furthest))
         elif now.phase == "classify":
@@ -429,7 +429,8 @@ def compute_in_file(
 
     def progress(now: Progress) -> None:
         raise_if_cancelled(stopped)
-        report(JobProgress(f"From file to file: {phases.get(now.phase, now.phase)}", overall(now)))
+        phase = phases.get(now.phase, now.phase) + now.of_zone
+        report(JobProgress(f"From file to file: {phase}", overall(now)))
 
     skin = first.mesh
     assert skin.source is not None

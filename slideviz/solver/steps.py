@@ -35,6 +35,14 @@ class Progress:
     fraction: float  # the part of the phase that is done, 0 to 1
     left: float | None = None
     """Estimate of the seconds that the whole run will still take; None where there is none."""
+    zone: int | None = None
+    """Number of the zone that is deformed, where the mesh has several: one zone is deformed after
+    the other, and the steps are those of all of them."""
+
+    @property
+    def of_zone(self) -> str:
+        """Return the zone in words, for the end of a sentence; "" where there is only one."""
+        return "" if self.zone is None else f" of zone {self.zone}"
 
 
 @dataclass(frozen=True)

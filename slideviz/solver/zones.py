@@ -156,9 +156,11 @@ def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[Interfa
         ahead.remove(index)
         done, part = len(runs), mesh.zone_parts[index]
 
-        def zone_report(now: Progress, done: int = done, count: int = len(moving)) -> None:
+        def zone_report(
+            now: Progress, done: int = done, count: int = len(moving), zone: int = index + 1
+        ) -> None:
             step, total = done * now.total + now.step, (done + count) * now.total
-            report(replace(now, step=step, total=total))
+            report(replace(now, step=step, total=total, zone=zone))
 
         try:
             runs[index] = list(run(motion.cases[index], part.mesh, zone_report))
@@ -211,7 +213,7 @@ def joined_step(
         spent.update(step.seconds)
     relaxed = [step.relaxed for step in new if step.relaxed is not None]
     safe = [
-        step.safe if step.safe.cell is None else replace(step.safe, cell=cell)
+        step.safe if step.safe.cell is None else replace(step.safe, cell=cell, zone=index + 1)
         for index, step in fresh.items()
         if step.safe is not None
         for cell in [mesh.zone_parts[index].first_cell + (step.safe.cell or 0)]

@@ -197,6 +197,21 @@ def pair(folder):
     return sv.read(zones(folder))
 
 
+def test_progress_and_margin_name_the_zone(tmp_path):
+    seen = []
+    case = both().change(motions=(turn("1:"), sv.Rotate("2:BLOCK", 90.0)))
+    *_, step = sv.deform(case, sv.read(stage(tmp_path)), seen.append, certify=True)
+    assert [*dict.fromkeys(now.of_zone for now in seen)] == [" of zone 1", " of zone 2"]
+    assert [*dict.fromkeys((now.zone, now.step, now.total) for now in seen)] == [
+        *[(1, 1, 4), (1, 2, 4), (2, 3, 4), (2, 4, 4)]
+    ]
+    assert step.safe.zone == 2
+    assert "(quadrilateral of zone 2) at (" in step.safe.words
+    again = type(step.safe).of_report(step.safe.report())
+    assert again.zone == 2
+    assert "safe_zone" not in type(step.safe)(1.0).report()
+
+
 MOVE = (0.02, 0.01)
 
 
