@@ -20,12 +20,9 @@ from slideviz.rbf.tape import value
 class Body:
     """The mesh as an elastic body, the same over all steps."""
 
-    parts: list[ShapeBlock]
-    """Its elements."""
-    frame: Frame
-    """The frame of the problem's displacements; the body is solved in Cartesian ones."""
-    axis: np.ndarray
-    """(n,): nodes on the axis of a cylindrical frame, which move along it only."""
+    parts: list[ShapeBlock]  # its elements
+    frame: Frame  # the frame of the problem's displacements; the body is solved in Cartesian ones
+    axis: np.ndarray  # (n,): nodes on the axis of a cylindrical frame, which move along it only
 
 
 def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:
@@ -48,10 +45,7 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
 def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, FloatArray]:
     """Return each node's block of unknowns (n,), -1 if it has none, and R_i (n, d, d).
 
-    Parameters
-    ----------
-    known : (m,)
-        Nodes with known displacement; of coinciding nodes, the one that represents them.
+    ``known`` (m,): nodes with known displacement; of coinciding ones, the one that represents them.
     """
     same = problem.same_as
     n, d = value(problem.coords).shape
@@ -70,14 +64,9 @@ def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, F
 def held(place: IntArray, turn: FloatArray, free: FloatArray, known: FloatArray) -> Conditions:
     """Return the conditions with the unknowns restricted by the projections ``free``.
 
-    Parameters
-    ----------
-    place, turn : (n,), (n, d, d)
-        As ``unknowns`` returns them.
-    free : (k, d, d)
-        P_k of each block of unknowns.
-    known : (n, d)
-        g_i.
+    ``place``, ``turn`` (n,), (n, d, d): as ``unknowns`` returns them.
+    ``free`` (k, d, d): P_k of each block of unknowns.
+    ``known`` (n, d): g_i.
     """
     inside = np.flatnonzero(place >= 0)
     turn = turn.copy()

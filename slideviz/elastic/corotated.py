@@ -25,20 +25,19 @@ from functools import cached_property, partial
 import numpy as np
 
 from slideviz.elastic.stiffness import (
-    OPTIONS,
     POISSON,
     ReferenceShape,
     ShapeBlock,
     cell_volumes,
 )
+from slideviz.mesh.jacobians import add3, cross3, dot3
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.polar import rotation, spin
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.system.threads import in_parts
 
 MU = 1.0 / (2.0 * (1.0 + POISSON))
-LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
-"""Lamé's constants for a modulus of 1."""
+LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))  # Lamé's constants for a modulus of 1
 
 LANES = 64
 """Elements that are computed together: loops over fewer are unrolled, and become no vectors."""
@@ -55,10 +54,8 @@ Elements = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]
 class Corotated:
     """An elastic body whose cells turn. Elements are numbered through all ``parts``."""
 
-    points: FloatArray
-    """(n, d): undeformed positions X."""
-    parts: list[ShapeBlock]
-    """The elements."""
+    points: FloatArray  # (n, d): undeformed positions X
+    parts: list[ShapeBlock]  # the elements
     moduli: tuple[FloatArray, ...]
     """(m,) of each part: Young's modulus times the share of each element."""
 
@@ -259,6 +256,39 @@ def _map(x, w, f):  # type: ignore[no-untyped-def]
                     f[at + k] += x[a, i, k] * w[a, j, k]
 
 
+@njit(inline="always", **OPTIONS)
+def _row(m, i, k):  # type: ignore[no-untyped-def]
+    """Return row i, a triple, of matrix k of m (9 LANES,), as of `_map`."""
+    return m[3 * i * LANES + k], m[(3 * i + 1) * LANES + k], m[(3 * i + 2) * LANES + k]
+
+
+@njit(inline="always", **OPTIONS)
+def _set_row(m, i, k, row):  # type: ignore[no-untyped-def]
+    m[3 * i * LANES + k], m[(3 * i + 1) * LANES + k] = row[0], row[1]
+    m[(3 * i + 2) * LANES + k] = row[2]
+
+
+@njit(inline="always", **OPTIONS)
+def _half_change(cofactors, row, det):  # type: ignore[no-untyped-def]
+    """Return (cofactors / det - row) / 2: the change of a row of M in Newton's iteration."""
+    h = 1.0 / det
+    return (
+        0.5 * (h * cofactors[0] - row[0]),
+        0.5 * (h * cofactors[1] - row[1]),
+        0.5 * (h * cofactors[2] - row[2]),
+    )
+
+
+@njit(inline="always", **OPTIONS)
+def _combined(h, a, b, c):  # type: ignore[no-untyped-def]
+    """Return h_0 a + h_1 b + h_2 c, of triples."""
+    return (
+        h[0] * a[0] + h[1] * b[0] + h[2] * c[0],
+        h[0] * a[1] + h[1] * b[1] + h[2] * c[1],
+        h[0] * a[2] + h[1] * b[2] + h[2] * c[2],
+    )
+
+
 @njit(**OPTIONS)
 def _polar(m, change):  # type: ignore[no-untyped-def]
     """Replace m (9 LANES,) by orthogonal matrices: Newton's M <- (M + M^-T) / 2 (Higham).
@@ -267,23 +297,15 @@ def _polar(m, change):  # type: ignore[no-untyped-def]
     """
     for _ in range(NEWTON):
         for k in range(LANES):
-            m00, m01, m02 = m[k], m[LANES + k], m[2 * LANES + k]
-            m10, m11, m12 = m[3 * LANES + k], m[4 * LANES + k], m[5 * LANES + k]
-            m20, m21, m22 = m[6 * LANES + k], m[7 * LANES + k], m[8 * LANES + k]
-            c00, c01, c02 = m11 * m22 - m12 * m21, m12 * m20 - m10 * m22, m10 * m21 - m11 * m20
-            c10, c11, c12 = m02 * m21 - m01 * m22, m00 * m22 - m02 * m20, m01 * m20 - m00 * m21
-            c20, c21, c22 = m01 * m12 - m02 * m11, m02 * m10 - m00 * m12, m00 * m11 - m01 * m10
-            det = m00 * c00 + m01 * c01 + m02 * c02
-            h = 1.0 / det
-            c00, c01, c02 = 0.5 * (h * c00 - m00), 0.5 * (h * c01 - m01), 0.5 * (h * c02 - m02)
-            c10, c11, c12 = 0.5 * (h * c10 - m10), 0.5 * (h * c11 - m11), 0.5 * (h * c12 - m12)
-            c20, c21, c22 = 0.5 * (h * c20 - m20), 0.5 * (h * c21 - m21), 0.5 * (h * c22 - m22)
-            size = abs(c00) + abs(c01) + abs(c02) + abs(c10) + abs(c11) + abs(c12)
-            change[k] = size + abs(c20) + abs(c21) + abs(c22) if det > 0.0 else np.inf
-            m[k], m[LANES + k], m[2 * LANES + k] = m00 + c00, m01 + c01, m02 + c02
-            m[3 * LANES + k], m[4 * LANES + k] = m10 + c10, m11 + c11
-            m[5 * LANES + k], m[6 * LANES + k] = m12 + c12, m20 + c20
-            m[7 * LANES + k], m[8 * LANES + k] = m21 + c21, m22 + c22
+            a, b, c = _row(m, 0, k), _row(m, 1, k), _row(m, 2, k)
+            x, y, z = cross3(b, c), cross3(c, a), cross3(a, b)
+            det = dot3(a, x)
+            x, y, z = _half_change(x, a, det), _half_change(y, b, det), _half_change(z, c, det)
+            size = abs(x[0]) + abs(x[1]) + abs(x[2]) + abs(y[0]) + abs(y[1]) + abs(y[2])
+            change[k] = size + abs(z[0]) + abs(z[1]) + abs(z[2]) if det > 0.0 else np.inf
+            _set_row(m, 0, k, add3(a, x))
+            _set_row(m, 1, k, add3(b, y))
+            _set_row(m, 2, k, add3(c, z))
 
 
 @njit(**OPTIONS)
@@ -381,53 +403,22 @@ def _stiffness_times(elements, first, x, y, f, scratch):  # type: ignore[no-unty
                     for k in range(LANES):
                         slopes[there + k] += c * y[a, i, k]
         for k in range(LANES):
-            j00, j01, j02 = jacobian[k], jacobian[LANES + k], jacobian[2 * LANES + k]
-            j10, j11, j12 = (
-                jacobian[3 * LANES + k],
-                jacobian[4 * LANES + k],
-                jacobian[5 * LANES + k],
-            )
-            j20, j21, j22 = (
-                jacobian[6 * LANES + k],
-                jacobian[7 * LANES + k],
-                jacobian[8 * LANES + k],
-            )
-            a00, a10, a20 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
-            a01, a11, a21 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
-            a02, a12, a22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
-            det = j00 * a00 + j01 * a10 + j02 * a20
+            one, two, three = _row(jacobian, 0, k), _row(jacobian, 1, k), _row(jacobian, 2, k)
+            a, b, c = cross3(two, three), cross3(three, one), cross3(one, two)
             # The cofactors are det J^-1: the gradients are divided by det here, the forces there.
-            size = modulus[k] * weights[q] / abs(det)
-            h0, h1, h2 = slopes[k], slopes[LANES + k], slopes[2 * LANES + k]
-            g00 = h0 * a00 + h1 * a01 + h2 * a02
-            g01 = h0 * a10 + h1 * a11 + h2 * a12
-            g02 = h0 * a20 + h1 * a21 + h2 * a22
-            h0, h1, h2 = slopes[3 * LANES + k], slopes[4 * LANES + k], slopes[5 * LANES + k]
-            g10 = h0 * a00 + h1 * a01 + h2 * a02
-            g11 = h0 * a10 + h1 * a11 + h2 * a12
-            g12 = h0 * a20 + h1 * a21 + h2 * a22
-            h0, h1, h2 = slopes[6 * LANES + k], slopes[7 * LANES + k], slopes[8 * LANES + k]
-            g20 = h0 * a00 + h1 * a01 + h2 * a02
-            g21 = h0 * a10 + h1 * a11 + h2 * a12
-            g22 = h0 * a20 + h1 * a21 + h2 * a22
-            trace = LAM * (g00 + g11 + g22)
-            s00 = size * (trace + 2.0 * MU * g00)
-            s11 = size * (trace + 2.0 * MU * g11)
-            s22 = size * (trace + 2.0 * MU * g22)
-            s01, s02, s12 = (
-                size * (MU * (g01 + g10)),
-                size * (MU * (g02 + g20)),
-                size * (MU * (g12 + g21)),
-            )
-            slopes[k] = s00 * a00 + s01 * a10 + s02 * a20
-            slopes[LANES + k] = s00 * a01 + s01 * a11 + s02 * a21
-            slopes[2 * LANES + k] = s00 * a02 + s01 * a12 + s02 * a22
-            slopes[3 * LANES + k] = s01 * a00 + s11 * a10 + s12 * a20
-            slopes[4 * LANES + k] = s01 * a01 + s11 * a11 + s12 * a21
-            slopes[5 * LANES + k] = s01 * a02 + s11 * a12 + s12 * a22
-            slopes[6 * LANES + k] = s02 * a00 + s12 * a10 + s22 * a20
-            slopes[7 * LANES + k] = s02 * a01 + s12 * a11 + s22 * a21
-            slopes[8 * LANES + k] = s02 * a02 + s12 * a12 + s22 * a22
+            size = modulus[k] * weights[q] / abs(dot3(one, a))
+            g = _combined(_row(slopes, 0, k), a, b, c)
+            h = _combined(_row(slopes, 1, k), a, b, c)
+            u = _combined(_row(slopes, 2, k), a, b, c)
+            trace = LAM * (g[0] + h[1] + u[2])
+            s01, s02 = size * (MU * (g[1] + h[0])), size * (MU * (g[2] + u[0]))
+            s12 = size * (MU * (h[2] + u[1]))
+            stress = size * (trace + 2.0 * MU * g[0]), s01, s02
+            _set_row(slopes, 0, k, (dot3(stress, a), dot3(stress, b), dot3(stress, c)))
+            stress = s01, size * (trace + 2.0 * MU * h[1]), s12
+            _set_row(slopes, 1, k, (dot3(stress, a), dot3(stress, b), dot3(stress, c)))
+            stress = s02, s12, size * (trace + 2.0 * MU * u[2])
+            _set_row(slopes, 2, k, (dot3(stress, a), dot3(stress, b), dot3(stress, c)))
         for a in range(n):
             for j in range(d):
                 c = gradients[q, a, j]

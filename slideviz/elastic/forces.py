@@ -20,21 +20,18 @@ from functools import cached_property
 import numpy as np
 
 from slideviz.elastic.corotated import LAM, MU, Corotated
-from slideviz.elastic.stiffness import OPTIONS, ShapeBlock, _gather, _jacobian, cell_volumes
+from slideviz.elastic.stiffness import ShapeBlock, _gather, _jacobian, cell_volumes
 from slideviz.mesh.model import FloatArray, IntArray, sealed
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
     """Computes the forces of a body, and their derivatives."""
 
-    points: FloatArray
-    """(n, d): positions of the nodes."""
-    parts: list[ShapeBlock]
-    """The elements."""
-    volume: FloatArray
-    """(c,): volume (area in 2D) of each cell."""
+    points: FloatArray  # (n, d): positions of the nodes
+    parts: list[ShapeBlock]  # the elements
+    volume: FloatArray  # (c,): volume (area in 2D) of each cell
 
     @classmethod
     def at(cls, points: FloatArray, parts: list[ShapeBlock]) -> Forces:

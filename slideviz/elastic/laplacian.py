@@ -29,28 +29,23 @@ from scipy.sparse import csr_array
 from slideviz.elastic.corotated import Corotated, invert
 from slideviz.elastic.forces import _at
 from slideviz.elastic.multigrid import RIDGE
-from slideviz.elastic.stiffness import OPTIONS, ShapeBlock
+from slideviz.elastic.stiffness import ShapeBlock
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import transform, value
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.system.threads import in_parts
 
-COARSE = 300
-"""Largest number of unknowns of the coarsest level, which has a dense factor."""
+COARSE = 300  # largest number of unknowns of the coarsest level, which has a dense factor
 
-HELD = 1e60
-"""On the diagonal of the coarsest matrix, in rows of nothing."""
+HELD = 1e60  # on the diagonal of the coarsest matrix, in rows of nothing
 
-PART = 4096
-"""Rows that are smoothed one after the other."""
+PART = 4096  # rows that are smoothed one after the other
 
-CHUNKS = 16
-"""Into how many parts long matrices are cut while they are made."""
+CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
-OMEGA = 4.0 / 3.0
-"""Damping of the Jacobi step that smooths prolongations, by row sums."""
+OMEGA = 4.0 / 3.0  # damping of the Jacobi step that smooths prolongations, by row sums
 
 PARALLEL: dict[str, Any] = {"parallel": True, "nogil": True, "cache": True}
 
@@ -70,20 +65,17 @@ class LaplacianLevel:
     """(k, w): of the diagonal, with what couples a row to other parts added; zero in rows that are
     held."""
     up: Sparse
-    down: Sparse
-    """`up`, `down`: prolongation from the next coarser level, and restriction to it."""
+    down: Sparse  # `up`, `down`: prolongation from the next coarser level, and restriction to it
 
 
 @dataclass(frozen=True, eq=False)
 class LaplacianCycle:
     """One V-cycle for the Laplacian of each component: a symmetric, positive definite map."""
 
-    levels: tuple[LaplacianLevel, ...]
-    """Finest first, without the coarsest."""
+    levels: tuple[LaplacianLevel, ...]  # finest first, without the coarsest
     factors: tuple[Any, ...]
     """Dense Cholesky factors of the coarsest level, of each group of components."""
-    group: IntArray
-    """(3,): the group of each component: those that are held at the same nodes."""
+    group: IntArray  # (3,): the group of each component: those that are held at the same nodes
     axes: FloatArray
     """(k, d, d) or (d, d): rows are the axes of the components; Cartesian ones if (d, d)."""
 
@@ -151,8 +143,10 @@ def _hierarchy(
     levels, modes = [], free
     while len(modes) > COARSE:
         up, modes_below = _prolongation(matrix, modes)
-        down = _transposed(up, len(modes_below))
-        below = _sorted(_product(down, _product(matrix, up, len(modes_below)), len(modes_below)))
+        count = len(modes_below)
+        down = _rearranged(up, lambda each: each.T.tocsr(), count)
+        below = _product(down, _product(matrix, up, count), count)
+        below = _rearranged(below, lambda each: each.sorted_indices(), count)
         levels.append(_level(matrix, modes > 0.0, up, down))
         matrix, modes = below, modes_below
     factors = []
@@ -205,14 +199,6 @@ def _rearranged(matrix: Sparse, change: Callable[[csr_array], csr_array], column
     shape = len(indptr) - 1, columns
     changed = change(csr_array((np.arange(len(indices)), indices, indptr), shape=shape))
     return changed.indptr, changed.indices, data[changed.data]
-
-
-def _transposed(matrix: Sparse, columns: int) -> Sparse:
-    return _rearranged(matrix, lambda each: each.T.tocsr(), columns)
-
-
-def _sorted(matrix: Sparse) -> Sparse:
-    return _rearranged(matrix, lambda each: each.sorted_indices(), len(matrix[0]) - 1)
 
 
 def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:

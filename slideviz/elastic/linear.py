@@ -59,24 +59,18 @@ from slideviz.rbf.tape import (
     value,
 )
 
-EXACT = 1e-13
-"""Residual ratio at which the solver ends: derivatives are to be exact."""
+EXACT = 1e-13  # residual ratio at which the solver ends: derivatives are to be exact
 
-ENOUGH = 1e-8
-"""Largest residual ratio that is accepted."""
+ENOUGH = 1e-8  # largest residual ratio that is accepted
 
 
 class Equilibrium:
     """The displacement of an elastic body, at given positions.
 
-    Parameters
-    ----------
-    problem : Problem
-        The step; its positions and normals may be variables of a tape.
-    nodes : (m,) int64
-        Nodes with known displacement, ascending; of coinciding nodes, the one that represents them.
-    name : str
-        Begins the names of its choices, to tell two solutions of one step apart.
+    ``problem``: the step; its positions and normals may be variables of a tape.
+    ``nodes`` (m,): nodes with known displacement, ascending; of coinciding nodes, the one that
+    represents them.
+    ``name``: begins the names of its choices, to tell two solutions of one step apart.
     """
 
     def __init__(self, problem: Problem, body: Body, nodes: IntArray, *, name: str) -> None:
@@ -95,12 +89,8 @@ class Equilibrium:
     def displacement(self, data: Array) -> Array:
         """Return the displacement (..., n, d) in the frame, of all nodes.
 
-        Raises DeformError if the equations cannot be solved well enough.
-
-        Parameters
-        ----------
-        data : (..., m, d)
-            Displacement of the known nodes, in the frame.
+        ``data`` (..., m, d) is that of the known nodes, in the frame. Raises DeformError if the
+        equations cannot be solved well enough.
         """
         known = self._known(data)
         right = -value(self._collected(self._force(known)))
@@ -252,8 +242,7 @@ def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
 HOPELESS = 1e-3
 """Largest residual ratio of a usable solution; above ``multigrid.TOLERANCE`` there is a warning."""
 
-ASSEMBLING = 0.2
-"""The part of the phase ``solve`` that the matrix takes."""
+ASSEMBLING = 0.2  # the part of the phase solve that the matrix takes
 
 
 def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
@@ -296,13 +285,8 @@ def _equilibrium(
     """Return the displacement of all nodes in the frame (..., n, d), and warnings of the solver.
 
     In a frozen step it is solved to rounding, for derivatives are to be exact (`Equilibrium`).
-
-    Parameters
-    ----------
-    nodes, values : (m,), (..., m, d)
-        Nodes with known displacement, in the frame.
-    start : (n, d), optional
-        A guess of the displacement, in the frame.
+    ``nodes``, ``values`` (m,), (..., m, d): nodes with known displacement, in the frame.
+    ``start`` (n, d): a guess of the displacement, in the frame.
     """
     if problem.frozen is not None:
         merged, data = merge(problem, nodes, values)

@@ -29,18 +29,15 @@ TOLERANCE = 1e-8
 
 MAX_ITERATIONS = 300
 
-COARSE = 600
-"""Largest number of unknowns of the coarsest level, which has a dense factor."""
+COARSE = 600  # largest number of unknowns of the coarsest level, which has a dense factor
 
 RIDGE = 1e-12
 """Added to the diagonal of the coarsest matrix, relative to it. A mesh that may slide as a whole
 makes the matrix singular; its right-hand side is consistent then."""
 
-WAIT_SECONDS = 0.1
-"""Between two calls of ``tick`` while the hierarchy is made."""
+WAIT_SECONDS = 0.1  # between two calls of tick while the hierarchy is made
 
-MAKING = 0.3
-"""The part of the progress at which the hierarchy is made."""
+MAKING = 0.3  # the part of the progress at which the hierarchy is made
 
 Made = TypeVar("Made")
 
@@ -51,8 +48,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 class LinearSolution:
     """What the iteration found."""
 
-    x: FloatArray
-    """(n,): the solution."""
+    x: FloatArray  # (n,): the solution
     iterations: int
     residual_ratio: float
     """Last residual over that of x = 0, in the energy norm of the preconditioner: small is good."""
@@ -68,14 +64,12 @@ class Level:
     """A level of the hierarchy."""
 
     matrix: bsr_array
-    inverse: FloatArray
-    """(m, b, b): inverses of its diagonal blocks; empty on the coarsest level."""
+    inverse: FloatArray  # (m, b, b): inverses of its diagonal blocks; empty on the coarsest level
     up: Any = None
     down: Any = None
     """`up`, `down`: prolongation from the next coarser level, and restriction to it; None on the
     coarsest."""
-    factor: Any = None
-    """Dense Cholesky factor, on the coarsest level only."""
+    factor: Any = None  # dense Cholesky factor, on the coarsest level only
 
 
 def solve(
@@ -87,14 +81,9 @@ def solve(
 ) -> LinearSolution:
     """Solve a symmetric positive definite system; x = 0 where the right-hand side is zero.
 
-    Parameters
-    ----------
-    matrix : (n, n)
-        In blocks.
-    right, start : (n,)
-        Right-hand side, and a guess of the solution.
-    modes : (n, m)
-        Vectors of nearly no energy: the rigid motions.
+    ``matrix`` (n, n): in blocks.
+    ``right``, ``start`` (n,): right-hand side, and a guess of the solution.
+    ``modes`` (n, m): vectors of nearly no energy: the rigid motions.
     """
     if not np.any(right):
         return LinearSolution(np.zeros_like(right), 0, 0.0)
@@ -210,15 +199,9 @@ def conjugate_gradients(
     """Solve by conjugate gradients, preconditioned by V-cycles.
 
     Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.
-
-    Parameters
-    ----------
-    levels
-        Of the matrix, as ``hierarchy`` returns them.
-    right, start : (n,)
-        Right-hand side, and a guess of the solution.
-    tolerance
-        Residual ratio at which the iteration ends.
+    ``levels``: of the matrix, as ``hierarchy`` returns them.
+    ``right``, ``start`` (n,): right-hand side, and a guess of the solution.
+    ``tolerance``: residual ratio at which the iteration ends.
     """
     with enough_threads(0.0):  # the same bits for any number of threads
         return _conjugate_gradients(levels, right, start, tick, tolerance)

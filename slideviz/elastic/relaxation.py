@@ -41,8 +41,7 @@ from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
 from slideviz.rbf.tape import Array, add_at, multiply, put, recorded, take, transform, value
 from slideviz.terms import SkewMetric
 
-ITERATIONS = 6
-"""Enough to come to the mean quality of the equilibrium within 0.001 to 0.003."""
+ITERATIONS = 6  # enough to come to the mean quality of the equilibrium within 0.001 to 0.003
 
 SIZE = 1.5
 """The step, as a part of the direction, at which the energy's slope is found for the best step."""
@@ -51,18 +50,15 @@ TRIES, SLOWER = 20, 0.85
 """How often the safeguard changes the parts of the relaxation that it leaves, and how much slower
 they grow each time."""
 
-LEAST = 0.2
-"""A part below this becomes zero where cells are still worse."""
+LEAST = 0.2  # a part below this becomes zero where cells are still worse
 
 STRAINS = 0.6, 0.15
 """Along an edge, the part may grow by so much that the edge is strained by this: the first is
 better for most meshes, the second for some."""
 
-PARTS = 0.5, 0.25
-"""Parts of the relaxation that are tried everywhere."""
+PARTS = 0.5, 0.25  # parts of the relaxation that are tried everywhere
 
-TINY = 1e-9
-"""Growth along edges of no length, and between periodic images."""
+TINY = 1e-9  # growth along edges of no length, and between periodic images
 
 WORSE, ENOUGH = 0.9, 0.3
 """The lowest quality may become ``WORSE`` times what it was, or ``ENOUGH`` if that is less."""
@@ -81,13 +77,10 @@ the unknowns (n,) of the nodes, and which of their components are held, (k, d)."
 class Relaxation:
     """The relaxation of deformed meshes."""
 
-    mesh: Mesh
-    """Undeformed, with its halo."""
-    domain: Mesh
-    """Undeformed, without the halo."""
+    mesh: Mesh  # undeformed, with its halo
+    domain: Mesh  # undeformed, without the halo
     body: Body
-    metric: SkewMetric
-    """Of the quality that the safeguard keeps."""
+    metric: SkewMetric  # of the quality that the safeguard keeps
 
     def relaxed(
         self,
@@ -101,15 +94,9 @@ class Relaxation:
         """Return the displacement (..., n, d) of a step after relaxation, in the frame.
 
         And how it went; None for a mesh at rest, and one without nodes that could move.
-
-        Parameters
-        ----------
-        displacement : (..., n, d)
-            Of the step, as radial functions have it.
-        rigid : (r,)
-            Nodes that stay where they are, besides the known ones.
-        tie
-            Gives periodic images the displacement of the node that represents them.
+        ``displacement`` (..., n, d): of the step, as radial functions have it.
+        ``rigid`` (r,): nodes that stay where they are, besides the known ones.
+        ``tie``: gives periodic images the displacement of the node that represents them.
         """
         if problem.frozen is None and not value(displacement).any():
             return displacement, None  # at rest, where rounding is all that would move
@@ -379,12 +366,9 @@ class _Unknowns:
     """Maps between unknowns (k, d) and vectors of nodes (n, d), as conditions have them."""
 
     conditions: Conditions
-    inside: IntArray
-    """Nodes with unknowns."""
-    owner: IntArray
-    """(k,): a node of each block of unknowns."""
-    others: IntArray
-    """Further nodes with the same unknowns as another."""
+    inside: IntArray  # nodes with unknowns
+    owner: IntArray  # (k,): a node of each block of unknowns
+    others: IntArray  # further nodes with the same unknowns as another
     turned: IntArray
     held: IntArray
     """`turned`, `held`: nodes whose displacement is not just their unknowns, and blocks that are

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
@@ -23,7 +22,7 @@ from scipy.sparse import bsr_array, csr_array
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 PYRAMID = 14
 TETRAHEDRON = 10
@@ -98,12 +97,9 @@ class ShapeBlock:
     """The elements of a mesh that have one shape."""
 
     shape: ReferenceShape
-    nodes: IntArray
-    """(m, a)."""
-    cell: IntArray
-    """(m,): the cell of the mesh that each element is (a part of)."""
-    share: float
-    """Weight of each element: 1, or 1/2 for the parts of pyramids."""
+    nodes: IntArray  # (m, a)
+    cell: IntArray  # (m,): the cell of the mesh that each element is (a part of)
+    share: float  # weight of each element: 1, or 1/2 for the parts of pyramids
 
 
 def blocks(cells: Cells) -> list[ShapeBlock]:
@@ -121,13 +117,9 @@ def blocks(cells: Cells) -> list[ShapeBlock]:
     return shapes
 
 
-CHUNK = 20_000
-"""Elements between two calls of ``tick``: some tens of milliseconds."""
+CHUNK = 20_000  # elements between two calls of tick: some tens of milliseconds
 
-POISSON = 0.3
-"""Poisson's ratio, SU2's default."""
-
-OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+POISSON = 0.3  # Poisson's ratio, SU2's default
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +129,10 @@ class Conditions:
     place: IntArray
     """(n,): number of each node's block of unknowns; -1 for known nodes. Periodic images share
     one."""
-    turn: FloatArray
-    """(n, d, d): T_i; the identity for most."""
-    plain: np.ndarray
-    """(n,): whether T_i is the identity."""
-    known: FloatArray
-    """(n, d): g_i."""
-    free: FloatArray
-    """(k, d, d): P_k of each block of unknowns."""
+    turn: FloatArray  # (n, d, d): T_i; the identity for most
+    plain: np.ndarray  # (n,): whether T_i is the identity
+    known: FloatArray  # (n, d): g_i
+    free: FloatArray  # (k, d, d): P_k of each block of unknowns
 
 
 def assemble(
@@ -153,12 +141,8 @@ def assemble(
     """Return the matrix (k d, k d) and the right-hand side (k d,) of the unknowns z.
 
     Raises DeformError if an element has no volume.
-
-    Parameters
-    ----------
-    points : (n, d)
-        Current positions. Inverted elements count with the absolute value of their Jacobian, so
-        that the matrix stays positive definite.
+    ``points`` (n, d): current positions. Inverted elements count with the absolute value of their
+    Jacobian, so that the matrix stays positive definite.
     """
     count, d = len(conditions.free), points.shape[1]
     indptr, indices = _pattern(parts, conditions.place, count)

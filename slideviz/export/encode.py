@@ -44,12 +44,9 @@ _NUMBER = re.compile(r"(%(?:0\d)?d)")  # the place of the number in the name of 
 class EncoderSettings:
     """The settings that a writer has to know before the first image."""
 
-    size: tuple[int, int]
-    """(int, int): width and height in pixels."""
-    count: int
-    """Number of images."""
-    fps: float
-    """Images per second."""
+    size: tuple[int, int]  # (int, int): width and height in pixels
+    count: int  # number of images
+    fps: float  # images per second
     samples: Callable[[], Sequence[Pixels]]
     """Returns a few images from all over the film, by which a GIF's palette is chosen."""
 

@@ -242,7 +242,9 @@ def film_steps(
     """
     runs = renderer.shown(renderer.session, options)
     for one in runs:
-        require_steps(one.frames, file, film_options, overwrite)
+        if len(one.frames) < 2:
+            raise SlidevizError("there are no steps to make a film of; run the case first")
+        check_film(file, film_options, frames=len(one.frames), overwrite=overwrite)
     write = titles or _titles(runs[0], options)
     count = max(len(one.frames) for one in runs)
     yield from aim_at_largest(renderer, options)
@@ -285,15 +287,6 @@ def require_pair_width(size: tuple[int, int]) -> None:
             f"{size[0]}x{size[1]} pixels are too narrow for two runs beside each other; take "
             f"{least + least % 2} or more in width, or less in height"
         )
-
-
-def require_steps(
-    frames: Sequence[StepFrame], file: Path, film_options: FilmOptions, overwrite: bool
-) -> None:
-    """Raise SlidevizError if there are no steps, or `check_film` refuses the film."""
-    if len(frames) < 2:
-        raise SlidevizError("there are no steps to make a film of; run the case first")
-    check_film(file, film_options, frames=len(frames), overwrite=overwrite)
 
 
 def film_frame_at(

@@ -40,13 +40,10 @@ _SHOWN = "shown: "  # begin of the note about a threshold
 class PageFormat:
     """The format of a section's picture."""
 
-    size: tuple[int, int]
-    """(int, int): width and maximum height in pixels."""
-    dpi: float | None = None
-    """Pixels per inch of a picture for paper."""
+    size: tuple[int, int]  # (int, int): width and maximum height in pixels
+    dpi: float | None = None  # pixels per inch of a picture for paper
     title: bool = True
-    axes: bool = True
-    """`title`, `axes`: whether it has a title, and numbers along its axes."""
+    axes: bool = True  # `title`, `axes`: whether it has a title, and numbers along its axes
 
     @classmethod
     def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> PageFormat:

@@ -140,18 +140,11 @@ def title_of(session: Session, options: PictureOptions) -> str:
     return title_words(session, frame, place_words(at, steps), letters, longest)
 
 
-def titles_of(pair: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
-    """Return the titles of two pictures side by side, and their letters' relative size.
-
-    ``options`` are those of the narrower picture; 1 is the usual size.
-    """
-    return fitting(pair_titles(pair, options.title), letters_across(options))
-
-
 def headings(shown: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
     """Return the titles of a picture of one session or two, and their letters' relative size."""
     if len(shown) == 2:
-        return titles_of(shown, panes(options, options.gap)[0])
+        narrower = panes(options, options.gap)[0]
+        return fitting(pair_titles(shown, options.title), letters_across(narrower))
     if not options.headed:
         return [""], 1.0
     if options.heading:

@@ -178,10 +178,12 @@ def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: Seria
                 missing.append(lost)
             progress((k + 1) / len(tasks))
     require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(missing))
-    markers = [
-        name + marker_table(parse_cells(lines, m.rows, zone.dim - 1, text.n_points, _silent), conn)
-        for name, m in zip(layout.names(), zone.markers, strict=True)
-    ]
+    facets = (
+        parse_cells(lines, m.rows, zone.dim - 1, text.n_points, lambda _: None)
+        for m in zone.markers
+    )
+    names = layout.names()
+    markers = [name + marker_table(c, conn) for name, c in zip(names, facets, strict=True)]
     lines.raw.require_same()
     with open_temporary(path) as file:
         for at, content in (
@@ -193,10 +195,6 @@ def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: Seria
         ):
             file.seek(at)
             file.write(content)
-
-
-def _silent(_: float) -> None:
-    """Ignore the progress."""
 
 
 @contextmanager

@@ -136,9 +136,10 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
             "or use another format, such as .su2 or .vtu",
         )
     if code or not answer:
+        library = "meshio" if format_for(path).reader == MESHIO.reader else "HDF5"
         raise path_error(
             path,
-            f"cannot be read: {_library(path)} crashed on it (code {code}); check the file, "
+            f"cannot be read: {library} crashed on it (code {code}); check the file, "
             "or use another format, such as .su2 or .vtu",
         )
     content = pickle.loads(answer)
@@ -146,10 +147,6 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
         raise MeshError(content)
     assert isinstance(content, Mesh)
     return content
-
-
-def _library(path: Path) -> str:
-    return "meshio" if format_for(path).reader == MESHIO.reader else "HDF5"
 
 
 def main() -> None:
@@ -169,7 +166,12 @@ def main() -> None:
         except MeshError as problem:
             pickle.dump(str(problem), channel)
         except MemoryError:
-            pickle.dump(str(_too_large(path)), channel)
+            too_large = path_error(
+                path,
+                "cannot be read: it needs more memory than a file of this size should; check its "
+                "counts, or use another format, such as .su2 or .vtu",
+            )
+            pickle.dump(str(too_large), channel)
         else:
             # Without what they have cached; by protocol 5 read-only arrays stay read-only.
             markers = tuple(Marker(one.name, _bare(one.cells)) for one in mesh.markers)
@@ -194,14 +196,6 @@ def _die_with(parent: int) -> None:
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:  # it was killed before
         sys.exit(1)
-
-
-def _too_large(path: Path) -> MeshError:
-    return path_error(
-        path,
-        "cannot be read: it needs more memory than a file of this size should; check its counts, "
-        "or use another format, such as .su2 or .vtu",
-    )
 
 
 @check_types

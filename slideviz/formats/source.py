@@ -23,8 +23,7 @@ class Source:
     """The bytes of a file; a slice of it returns some of them."""
 
     def __init__(self, path: Path, content: bytes | BinaryIO) -> None:
-        self.path = path
-        """The file, for messages."""
+        self.path = path  # the file, for messages
         self._content = content if isinstance(content, bytes) else None
         self._file = None if isinstance(content, bytes) else content
         self._stamp = self._now()

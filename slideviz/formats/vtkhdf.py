@@ -109,25 +109,21 @@ class StepSeries:
                     steps[f"{kind}Offsets/{name}"] = numbers * length
 
 
-@contextmanager
-def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[StepSeries]:
-    """Context with a file to add steps to, which replaces ``path`` at the end; or MeshError."""
-    with _collection(path, mesh, replaces, is_series=True) as series:
-        yield series
-
-
 def write_vtkhdf(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh to a VTKHDF file, with values on its cells and points; or raise MeshError."""
     check_mesh(mesh)
-    with _collection(path, mesh, options.replaces, is_series=False) as series:
+    with vtkhdf_series(path, mesh, options.replaces, is_series=False) as series:
         series.add(mesh.points, options.cell_data, options.point_data)
 
 
 @contextmanager
-def _collection(
-    path: Path, mesh: Mesh, replaces: Path | None, is_series: bool
+def vtkhdf_series(
+    path: Path, mesh: Mesh, replaces: Path | None = None, is_series: bool = True
 ) -> Iterator[StepSeries]:
-    """Context with a new file that has blocks and topology of a mesh, but no points yet."""
+    """Context with a file to add steps to, which replaces ``path`` at the end; or MeshError.
+
+    It has blocks and topology of a mesh, but no points yet.
+    """
     with hdf5_write(path, replaces) as draft:
         # ParaView shows the assembly in the order in which it was made.
         root = draft.tree.create_group("VTKHDF", track_order=True)

@@ -20,8 +20,7 @@ from slideviz.system.weak_cache import weak_cache
 NONE, SEVERAL = -1, -2
 """In place of a neighbour: there is no other cell, or more than one (a non-manifold mesh)."""
 
-SIDES = np.zeros(256, np.int64)
-"""Number of sides of an element type, by VTK identifier."""
+SIDES = np.zeros(256, np.int64)  # number of sides of an element type, by VTK identifier
 SIDE_NODES = np.full((256, 6, 4), -1)
 """Local nodes of each side, filled up with -1, by VTK identifier."""
 for _row in ELEMENTS.values():
@@ -34,8 +33,7 @@ for _row in ELEMENTS.values():
 class Sides:
     """The sides of all cells."""
 
-    first: IntArray
-    """(m + 1,): number of the first side of each cell."""
+    first: IntArray  # (m + 1,): number of the first side of each cell
     neighbour: NDArray[np.int32]
     """(s,) int32: the cell that shares the side, or `NONE` or `SEVERAL`."""
 
@@ -44,12 +42,9 @@ class Sides:
 class CellsAround:
     """The cells that each node belongs to, in ascending order."""
 
-    offsets: IntArray
-    """(n + 1,): the entries of node ``i`` are ``offsets[i]`` to ``offsets[i + 1]``."""
-    cells: NDArray[np.int32]
-    """(k,) int32: the cell of each entry."""
-    local: NDArray[np.int8]
-    """(k,) int8: the local number of the node in that cell."""
+    offsets: IntArray  # (n + 1,): the entries of node i are offsets[i] to offsets[i + 1]
+    cells: NDArray[np.int32]  # (k,) int32: the cell of each entry
+    local: NDArray[np.int8]  # (k,) int8: the local number of the node in that cell
 
 
 @weak_cache

@@ -13,8 +13,7 @@ from slideviz.system.weak_cache import weak_cache
 
 _MOST_PARTS = 64
 """Most parts that `smooth_parts` returns; a surface with more is rough, its edges no borders."""
-_VTK = {2: 3, 3: 5, 4: 9}
-"""VTK identifier of a facet by its number of nodes."""
+_VTK = {2: 3, 3: 5, 4: 9}  # VTK identifier of a facet by its number of nodes
 
 
 def outer_facets(mesh: Mesh) -> Cells:
@@ -32,14 +31,8 @@ def smooth_parts(mesh: Mesh, facets: Cells) -> tuple[Marker, ...]:
     """Return the outer surface as markers, divided at its feature edges, most facets first.
 
     With more than ``_MOST_PARTS`` parts it is divided into its connected parts only, with more of
-    these or a single one not at all. No markers if there are no facets.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Points and cells.
-    facets : Cells
-        The sides to divide, each of one cell of the mesh.
+    these or a single one not at all. No markers if there are no facets. ``facets``: the sides to
+    divide, each of one cell of the mesh, which has points and cells.
     """
     if not len(facets):
         return ()

@@ -42,10 +42,8 @@ Hit = tuple["FloatArray", int, int]
 class Crossing:
     """A place where the moved boundary goes through another."""
 
-    marker: str
-    """Name of the other boundary."""
-    point: FloatArray
-    """(d,): A point of both."""
+    marker: str  # name of the other boundary
+    point: FloatArray  # (d,): a point of both
     facet: int
     other_facet: int
     """`facet`, `other_facet`: the two elements, counted from 0 in the moved and in the other
@@ -58,16 +56,10 @@ def first_crossing(
     """Return a place where the moved boundary crosses another, the first that it crosses, or None.
 
     Raises MeshError if an element has another dimension than a boundary.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-        All points of the mesh, those of the moved boundary at their new place.
-    moved : Cells
-        Its elements: lines in 2D, triangles and quadrilaterals (as two triangles) in 3D.
-    others : sequence of (str, Cells)
-        The other boundaries by name. Leave out those that will move along, such as periodic
-        ones with periodic displacement: their place in ``points`` is the old one.
+    ``points`` (n, d): all points of the mesh, those of the moved boundary at their new place.
+    ``moved``: its elements: lines in 2D, triangles and quadrilaterals (as two triangles) in 3D.
+    ``others``: the other boundaries by name. Leave out those that will move along,
+    such as periodic ones with periodic displacement: their place in ``points`` is the old one.
     """
     points = np.asarray(points, np.float64)
     body = FacetSimplices.of(moved, points.shape[1])
@@ -90,14 +82,8 @@ def swept_crossing(
 
     Paths are straight. So a body is found that has jumped over a wall. Facets of the others that
     move themselves are not tested. For a curved path, call it for one short piece after the other.
-    Raises MeshError if an element has another dimension than a boundary.
-
-    Parameters
-    ----------
-    before, after : (n, d) float64
-        All points of the mesh, before and after the motion.
-    moved, others
-        As in `first_crossing`.
+    ``before`` and ``after`` (n, d): all points of the mesh, before and after the motion; others as
+    in `first_crossing`. Raises MeshError if an element has another dimension than a boundary.
     """
     before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
     goes = reduce(np.logical_or, (before != after).T)
@@ -161,14 +147,8 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
 def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
     """Return where a boundary intersects itself (point, both facets), or None.
 
-    Facets that share a node are not compared. Raises MeshError if an element has another dimension
-    than a boundary.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-    cells : Cells
-        As ``moved`` in `first_crossing`.
+    Facets that share a node are not compared. ``cells`` are as ``moved`` in `first_crossing`.
+    Raises MeshError if an element has another dimension than a boundary.
     """
     surface = FacetSimplices.of(cells, points.shape[1])
     if not len(surface):
@@ -209,17 +189,11 @@ def _strike(
     """Return the first point where a line passes through its simplex, and the row, or None.
 
     Each row is one pair of a line and a simplex near it.
-
-    Parameters
-    ----------
-    lines : (p, 2, d)
-        The ends of each line.
-    height : (p, 2)
-        Signed distances of the ends from the plane of the simplex. Only rows count whose ends lie
-        on different sides, each by more than the margin.
-    i, j : (p,)
-        Line and simplex of each row. ``i`` is sorted, and has all simplices that may touch a line:
-        where the line hits the border of one, `Planes.separates` decides by all of them.
+    ``lines`` (p, 2, d): the ends of each line.
+    ``height`` (p, 2): signed distances of the ends from the plane of the simplex. Only rows count
+    whose ends lie on different sides, each by more than the margin.
+    ``i``, ``j`` (p,): line and simplex of each row. ``i`` is sorted, and has all simplices that may
+    touch a line: where the line hits the border of one, `Planes.separates` decides by all of them.
     """
     start, end = height.T
     apart = (height.min(axis=1) < -planes.margin) & (height.max(axis=1) > planes.margin)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import OPTIONS, add3, cross3, dot3, minus3
-from slideviz.system.jit_cache import njit
+from slideviz.mesh.jacobians import add3, cross3, dot3, minus3
+from slideviz.system.jit_cache import OPTIONS, njit
 
 
 def _around_nodes(vtk: int) -> list[list[tuple[int, int, int]]]:
@@ -79,19 +79,12 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
     """Write SU2's three metrics of nodes from number ``begin`` on into ``found`` (3, k).
 
     Orthogonality in degrees, area ratio and volume ratio; NaN for nodes of no cell.
-
-    Parameters
-    ----------
-    points : (N, 3)
-        In 2D with third coordinates of zero.
-    mesh
-        Types, offsets, connectivity, signs, and means of nodes (by `write_middles`) of all cells.
-    tables
-        `AROUND` and `slideviz.mesh.adjacency.SIDE_NODES`.
-    nodes
-        The arrays of `slideviz.mesh.adjacency.CellsAround`.
-    limits : (N, 2)
-        Smallest and largest area of a boundary at each node; inf and 0 without one.
+    ``points`` (N, 3): in 2D with third coordinates of zero.
+    ``mesh``: types, offsets, connectivity, signs, and means of nodes (by `write_middles`) of all
+    cells.
+    ``tables``: `AROUND` and `slideviz.mesh.adjacency.SIDE_NODES`.
+    ``nodes``: the arrays of `slideviz.mesh.adjacency.CellsAround`.
+    ``limits`` (N, 2): smallest and largest area of a boundary at each node; inf and 0 without one.
     """
     types, offsets, connectivity, signs, middles = mesh
     (around, side_nodes), (starts, cells, local) = tables, nodes

@@ -91,8 +91,7 @@ _ROWS = (
     ),
 )
 
-ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}
-"""Element type by VTK identifier."""
+ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}  # element type by VTK identifier
 
 SIZES, DIMS = np.zeros(256, np.int64), np.zeros(256, np.int64)
 """Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""

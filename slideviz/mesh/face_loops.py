@@ -10,7 +10,6 @@ import numpy as np
 
 from slideviz.mesh.jacobians import (
     LANES,
-    OPTIONS,
     add3,
     cross3,
     dot3,
@@ -19,7 +18,7 @@ from slideviz.mesh.jacobians import (
     half_sum,
     minus3,
 )
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 
 @njit(inline="always", **OPTIONS)
@@ -111,18 +110,12 @@ def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ig
 def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewness, expansion):  # type: ignore[no-untyped-def]
     """Write the worst values of the faces of cells of one type.
 
-    Parameters
-    ----------
-    nodes, ids, signs
-        (m, n), (m,), (m,): nodes, numbers and directions of the cells.
-    sides : (f, 4)
-        Their sides: ``SIDE_NODES`` of the type.
-    adjacent
-        The arrays ``first`` and ``neighbour`` of `slideviz.mesh.adjacency.Sides`.
-    rated
-        (M, 3), (M,): centres and volumes of all cells, by `write_centres`.
-    angle, skewness, expansion : (M,)
-        Written, at ``ids``: non-orthogonality in degrees, skewness, ratio of volumes.
+    ``nodes``, ``ids``, ``signs``: (m, n), (m,), (m,): nodes, numbers and directions of the cells.
+    ``sides`` (f, 4): their sides: ``SIDE_NODES`` of the type.
+    ``adjacent``: the arrays ``first`` and ``neighbour`` of `slideviz.mesh.adjacency.Sides`.
+    ``rated``: (M, 3), (M,): centres and volumes of all cells, by `write_centres`.
+    ``angle``, ``skewness``, ``expansion`` (M,): written, at ``ids``: non-orthogonality in degrees,
+    skewness, ratio of volumes.
     """
     at = np.zeros((3, nodes.shape[1], LANES))
     area, middle, across = np.empty((3, 3, LANES))

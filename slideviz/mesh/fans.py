@@ -37,8 +37,7 @@ class Fans:
     """`facet`, `node`, `fan` (i,): one entry for each pair of a facet and a node of it: the fan, an
     index below m, that the facet belongs to at that node."""
     fan_node: IntArray
-    fan_marker: IntArray
-    """`fan_node`, `fan_marker` (m,): the node and the marker of each fan."""
+    fan_marker: IntArray  # `fan_node`, `fan_marker` (m,): the node and the marker of each fan
 
 
 def smooth_joints(
@@ -46,10 +45,7 @@ def smooth_joints(
 ) -> NDArray[np.bool_]:
     """Return a mask (j,) of the joints of facets of one marker at less than the feature angle.
 
-    Parameters
-    ----------
-    points : (n, d)
-        Cartesian coordinates of the undeformed mesh.
+    ``points`` (n, d) are the Cartesian coordinates of the undeformed mesh.
     """
     normal = unit(facet_vectors(points, boundary.facets))
     a, b = boundary.joints.T
@@ -106,13 +102,9 @@ def fan_normals(
     """Return the unit normal of each fan, (m, d), in the frame of ``coords`` (n, d).
 
     It is the mean of the facets' unit normals, weighted with the inverse distance from the node
-    to the facet's centre (thesis section 2.4.4).
-
-    Parameters
-    ----------
-    corners : (f, k, d), optional
-        Corners of the facets in that frame, where they are not ``coords[boundary.facets]`` (in
-        cylindrical coordinates at the axis, where a node has no angle).
+    to the facet's centre (thesis section 2.4.4). ``corners`` (f, k, d) are those of the facets in
+    that frame, where they are not ``coords[boundary.facets]`` (in cylindrical coordinates at the
+    axis, where a node has no angle).
     """
     x = coords[boundary.facets] if corners is None else corners
     normal = unit(corner_vectors(x))
@@ -158,10 +150,7 @@ def find_pieces(
 def components(count: int, a: IntArray, b: IntArray) -> IntArray:
     """Return the index (count,) of the connected part that each of ``count`` vertices is in.
 
-    Parameters
-    ----------
-    a, b : (m,)
-        The pairs of vertices of a graph that are connected.
+    ``a`` and ``b`` (m,) are the pairs of vertices of a graph that are connected.
     """
     label = np.arange(count)
     _unite(np.ascontiguousarray(a, np.int64), np.ascontiguousarray(b, np.int64), label)

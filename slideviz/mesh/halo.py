@@ -43,10 +43,8 @@ class Halo:
     copy itself."""
     rotations: FloatArray
     """(h, d, d): matrices that turn the displacement of a donor into that of its receiver."""
-    outer: IntArray
-    """(o,): the receivers that belong to no cell of the domain, sorted."""
-    cells: NDArray[np.bool_]
-    """(m,): the cells of the halo: those with an outer receiver."""
+    outer: IntArray  # (o,): the receivers that belong to no cell of the domain, sorted
+    cells: NDArray[np.bool_]  # (m,): the cells of the halo: those with an outer receiver
     sides: tuple[tuple[str, str], ...]
     """tuple of (str, str): pairs of boundaries of the domain: the first is a copy of the second."""
     mismatch: FloatArray
@@ -55,12 +53,8 @@ class Halo:
     def move_receivers(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
         """Return ``after`` (n, d) with receivers displaced like their donors, and rotated.
 
-        Parameters
-        ----------
-        before, after : (n, d)
-            Undeformed points, at which the halo is in place, and deformed ones.
-        rows : (k,)
-            The pairs that are moved.
+        ``before``, ``after`` (n, d): undeformed points, at which the halo is in place, and deformed
+        ones. ``rows`` (k,): the pairs that are moved.
         """
         moved = np.einsum("hij,hj->hi", self.rotations[rows], (after - before)[self.donors[rows]])
         out = np.array(after)
@@ -94,14 +88,10 @@ def make_halo(
 ) -> Halo:
     """Return the halo of a mesh.
 
-    Parameters
-    ----------
-    receivers, donors : (h,)
-        Each receiver once; donors may be receivers of another side (a mesh with two periods).
-    motions : sequence of RigidMotion
-        The motions that occur, each from donors to receivers.
-    which : (h,)
-        Index into ``motions`` for each pair.
+    ``receivers``, ``donors`` (h,): each receiver once; donors may be receivers of another side (a
+    mesh with two periods).
+    ``motions``: the motions that occur, each from donors to receivers.
+    ``which`` (h,): index into ``motions`` for each pair.
     """
     rotations = np.stack([motion.rotation for motion in motions])[which]
     sides = _sides(mesh, receivers, donors)

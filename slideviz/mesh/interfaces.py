@@ -9,10 +9,8 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, Mesh, ZoneInterface, frozen_array
 from slideviz.mesh.nearest import nearest
 
-COINCIDENT = 1e-6
-"""Nodes of two zones nearer than this part of the mesh's extent are in one place."""
-ROUNDING = 1e-12
-"""Part of the mesh's extent by which nodes of an interface may move unseen."""
+COINCIDENT = 1e-6  # nodes of two zones nearer than this part of the mesh's extent are in one place
+ROUNDING = 1e-12  # part of the mesh's extent by which nodes of an interface may move unseen
 
 
 def find_interfaces(
@@ -21,12 +19,7 @@ def find_interfaces(
     """Return the interfaces of a mesh with boundaries of other zones of its file.
 
     Boundaries are one interface where all nodes of any element are in the places of nodes of the
-    other one.
-
-    Parameters
-    ----------
-    others
-        Zone, name and nodes (k, d) of each boundary of the other zones.
+    other one. ``others``: zone, name and nodes (k, d) of each boundary of the other zones.
     """
     others = list(others)
     if not others:

@@ -12,7 +12,6 @@ import numpy as np
 from slideviz.mesh.jacobians import (
     LANES,
     NODE,
-    OPTIONS,
     add3,
     corners,
     cross3,
@@ -22,24 +21,18 @@ from slideviz.mesh.jacobians import (
     half_sum,
     spreads,
 )
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 
 @njit(**OPTIONS)
 def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: ignore[no-untyped-def]
     """Write the derivative of ln f_ss by the nodes of each cell into ``out`` (m, n, d).
 
-    Parameters
-    ----------
-    points, nodes, table, turn
-        As of `slideviz.mesh.jacobians.measure`.
-    powers : (2,)
-        Exponents of spread and Jacobian, ``EXPONENTS`` of the metric and type.
-    sums : (m,)
-        Sums of the corner Jacobians of the undeformed cells; infinity where there are none: then
-        the derivative is that of ln f_skew.
-    out : (m, n, d)
-        Meaningless (possibly NaN) where a corner Jacobian is not positive.
+    ``points``, ``nodes``, ``table``, ``turn``: as of `slideviz.mesh.jacobians.measure`.
+    ``powers`` (2,): exponents of spread and Jacobian, ``EXPONENTS`` of the metric and type.
+    ``sums`` (m,): sums of the corner Jacobians of the undeformed cells; infinity where there are
+    none: then the derivative is that of ln f_skew.
+    ``out`` (m, n, d): meaningless (possibly NaN) where a corner Jacobian is not positive.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     slope = np.empty_like(at)
@@ -171,14 +164,9 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
 def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[no-untyped-def]
     """Write derivatives by nodes of the weighted sum of each cell's coefficients to ``out``.
 
-    Parameters
-    ----------
-    points, nodes, table
-        As of `slideviz.mesh.jacobians.measure`.
-    weights : (k, m)
-        Factors of the coefficients, in the order of `jacobians.write_coefficients`.
-    out : (m, n, d)
-        Written.
+    ``points``, ``nodes``, ``table``: as of `slideviz.mesh.jacobians.measure`.
+    ``weights`` (k, m): factors of the coefficients, in the order of `jacobians.write_coefficients`.
+    ``out`` (m, n, d): written.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     slope = np.empty_like(at)
@@ -292,18 +280,12 @@ def add_to_points(nodes, weights, slopes, lane, lanes, out):  # type: ignore[no-
     Lanes are shares of the points, one for each thread. No point is in two lanes, so that threads
     can add at the same time, and each point gets its terms in the order of the cells, whatever
     the number of lanes.
-
-    Parameters
-    ----------
-    nodes, slopes : (m, n), (m, n, d)
-        The nodes of cells of one type, and the derivatives of a value of each cell by them.
-    weights : (w, m)
-        Factors of these derivatives, for w sums. A cell whose weights are all zero adds nothing,
-        even if its slopes are NaN.
-    lane, lanes : int
-        Number of this lane, from 0, and of all lanes.
-    out : (w, N, d)
-        The sums, for all N points.
+    ``nodes``, ``slopes`` (m, n), (m, n, d): the nodes of cells of one type, and the derivatives of
+    a value of each cell by them.
+    ``weights`` (w, m): factors of these derivatives, for w sums. A cell whose weights are all zero
+    adds nothing, even if its slopes are NaN.
+    ``lane``, ``lanes``: number of this lane, from 0, and of all lanes.
+    ``out`` (w, N, d): the sums, for all N points.
     """
     for c in range(nodes.shape[0]):
         wanted = False

@@ -7,24 +7,22 @@ and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray, Mesh
 
-LEVELS = 6
-"""How often a hexahedron is cut before it is called unproven."""
+LEVELS = 6  # how often a hexahedron is cut before it is called unproven
 
-Status = NDArray[np.uint8]
-"""Codes (m,) ``VALID``, ``INVERTED`` or ``UNPROVEN``."""
+Status = NDArray[np.uint8]  # codes (m,) VALID, INVERTED or UNPROVEN
 
 # Matrices that turn the coefficients of a quadratic into those on each half of its interval.
 _HALVES = np.array(
@@ -38,14 +36,8 @@ _HALVES = np.array(
 def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
     """Return the status (m,) of cells with positive corner Jacobians, but not all coefficients.
 
-    Parameters
-    ----------
-    vtk : int
-        Element type: prism or hexahedron.
-    at : (3, n, m)
-        Node coordinates.
-    signs : (m,)
-        1, or -1 for a cell that is numbered the other way round.
+    They are prisms or hexahedra with nodes ``at`` (3, n, m). ``signs`` (m,) are 1, or -1 for a cell
+    that is numbered the other way round.
     """
     if vtk == 12:
         return subdivide(coefficients(12, at).reshape(3, 3, 3, -1) * signs)
@@ -79,9 +71,6 @@ def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:
     status[owner] = UNPROVEN
     return status
 
-
-OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
-"""Options of `njit` for the loops over cells; division by zero gives inf or NaN."""
 
 LANES = 64
 """Cells that a loop works on at a time, so that their arrays stay in the first-level cache."""
@@ -293,18 +282,13 @@ def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
 def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ignore[no-untyped-def]
     """Write corner Jacobians, spreads and a first status of cells of one type, in one pass.
 
-    Parameters
-    ----------
-    points, nodes, table
-        (N, d), (m, n), and ``CORNERS[vtk]``.
-    turn : (m,) int8
-        1, or -1 for a cell that is numbered the other way round: a factor of its Jacobians.
-    alpha, spread : (k, m)
-        Written: corner Jacobians times ``turn``, and spreads.
-    status : (m,) uint8
-        Written: ``INVERTED`` where a corner Jacobian is not a positive number; ``UNPROVEN`` where
-        another coefficient of a prism or a hexahedron is not, which
-        `slideviz.mesh.jacobians.decide_unproven` is still to decide; else ``VALID``.
+    ``points``, ``nodes``, ``table``: (N, d), (m, n), and ``CORNERS[vtk]``.
+    ``turn`` (m,): 1, or -1 for a cell that is numbered the other way round: a factor of its
+    Jacobians.
+    ``alpha``, ``spread`` (k, m): written: corner Jacobians times ``turn``, and spreads.
+    ``status`` (m,): written: ``INVERTED`` where a corner Jacobian is not a positive number;
+    ``UNPROVEN`` where another coefficient of a prism or a hexahedron is not, which
+    `slideviz.mesh.jacobians.decide_unproven` is still to decide; else ``VALID``.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     coefficients = np.empty((3, 3, 3, LANES))

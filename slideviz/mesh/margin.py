@@ -25,12 +25,11 @@ from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
     LEVELS,
-    OPTIONS,
     gather,
     write_coefficients,
 )
 from slideviz.mesh.orientation import reference_of
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
@@ -41,8 +40,7 @@ if TYPE_CHECKING:
 GAP = 2.0**-9
 """Largest relative distance from a lower bound to the margin at which a cell is not cut again."""
 
-PARTS = 1000
-"""Most parts that a cell is cut into; those left then count with their lower bounds."""
+PARTS = 1000  # most parts that a cell is cut into; those left then count with their lower bounds
 
 ROUNDING = 64 * np.finfo(float).eps
 """Bound for the error of a determinant, divided by the largest coordinate and by the squared (in 2D
@@ -82,18 +80,10 @@ def margins(
 
     A cell with margin 0 is not valid at s = 0, or not proved to be. The bits do not depend on the
     number of threads, nor on the other cells.
-
-    Parameters
-    ----------
-    points, displacement : (n, d)
-    cells : Cells
-        Cells of dimension d.
-    cap : float
-        Largest margin that is looked for; positive, finite.
-    signs : (m,), optional
-        1, or -1 for a cell that is numbered the other way round; without it all are 1.
-    going_on : callable
-        Called every few thousand cells; what it raises ends the work.
+    ``points``, ``displacement`` (n, d), and cells of dimension d.
+    ``cap``: largest margin that is looked for; positive, finite.
+    ``signs`` (m,): 1, or -1 for a cell that is numbered the other way round; without it all are 1.
+    ``going_on``: called every few thousand cells; what it raises ends the work.
     """
     found = np.empty(len(cells))
     turns = np.ones(len(cells), np.int8) if signs is None else signs
@@ -314,14 +304,9 @@ def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-unty
 def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
     """Return a lower bound for the first t, up to ``end``, at which a cell is not valid.
 
-    Parameters
-    ----------
-    poly : (k, 4)
-        Polynomials in t of the corner Jacobians, or of a cell's Bézier coefficients.
-    cuts : tuple
-        Of `_cuts`.
-    stack : (b, k, 4)
-        Memory for parts of the cell.
+    ``poly`` (k, 4): polynomials in t of the corner Jacobians, or of a cell's Bézier coefficients.
+    ``cuts``: of `_cuts`.
+    ``stack`` (b, k, 4): memory for parts of the cell.
     """
     strides, firsts, corner = cuts
     low, high = _bounds(poly, corner, end)

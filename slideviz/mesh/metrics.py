@@ -35,12 +35,10 @@ if TYPE_CHECKING:
 
 _CACHE: WeakKeyDictionary[Mesh, dict[object, FloatArray]] = WeakKeyDictionary()
 """Values of metrics computed last, by mesh, metric and signs."""
-_LOCK = Lock()
-"""Guards `_CACHE`: the window computes in several threads."""
+_LOCK = Lock()  # guards `_CACHE`: the window computes in several threads
 _OUTER: WeakKeyDictionary[Cells, tuple[tuple[Marker, ...], list[IntArray]]] = WeakKeyDictionary()
 """Results of `_outer_facets`, with the markers they belong to."""
-_CACHED = 1 << 26
-"""Most numbers in the cache, besides those of the mesh used last."""
+_CACHED = 1 << 26  # most numbers in the cache, besides those of the mesh used last
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +246,7 @@ def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no
         found[i] = worst
 
 
-Made = Mapping[Metric, FloatArray]
-"""Metrics that are computed together, with their values."""
+Made = Mapping[Metric, FloatArray]  # metrics that are computed together, with their values
 
 
 def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -108,6 +108,13 @@ class Cells:
             types.append(np.full(len(table), vtk, np.uint8))
             flats.append(table.ravel())
         return cls.from_types(np.concatenate(types), np.concatenate(flats))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Cells]) -> Cells:
+        """Return the elements of some parts, one after the other."""
+        types = np.concatenate([np.empty(0, np.uint8), *(part.types for part in parts)])
+        flat = np.concatenate([np.empty(0, np.int64), *(part.connectivity for part in parts)])
+        return cls.from_types(sealed(types), sealed(flat))
 
     def __len__(self) -> int:
         return len(self.types)

@@ -25,16 +25,8 @@ def sorted_in_rows(table: IntArray) -> IntArray:
 def row_groups(table: IntArray) -> IntArray:
     """Return a number for each row, (r,), that equal rows share.
 
-    Parameters
-    ----------
-    table : (r, k)
-        Indices: not negative, and below 3e9.
-
-    Returns
-    -------
-    (r,) int64
-        0 for the lowest row in lexicographic order, 1 for the next other one, and so on: the
-        inverse of ``numpy.unique(table, axis=0)``.
+    It is 0 for the lowest row in lexicographic order, 1 for the next other one, and so on: the
+    inverse of ``numpy.unique(table, axis=0)``. ``table`` (r, k): indices, not negative, below 3e9.
     """
     table = np.asarray(table, np.int64)
     if not table.size:
@@ -57,8 +49,7 @@ def row_groups(table: IntArray) -> IntArray:
 
 OBLIQUE = np.array([1.0, 0.6180339887, 0.4142135624])
 """A direction of no symmetry: points of a mesh seldom have the same projection onto it."""
-CROWDED = 16
-"""Candidates for each point, on average, above which a tree is faster."""
+CROWDED = 16  # candidates for each point, on average, above which a tree is faster
 
 
 def nearest(
@@ -66,16 +57,11 @@ def nearest(
 ) -> tuple[FloatArray, IntArray]:
     """Return distance (m,) and index (m,) of the point nearest to each place, as SciPy's cKDTree.
 
-    Parameters
-    ----------
-    points, at : (n, d), (m, d)
-        The points, and the places that a point is looked for at.
-    bound : float
-        Largest distance that is looked for. Where no point is nearer, the distance is infinite and
-        the index n.
-    likely : float
-        A distance within which each place probably has exactly one point: then no tree is built.
-        The result does not depend on it.
+    ``points``, ``at`` (n, d), (m, d): the points, and the places that a point is looked for at.
+    ``bound``: largest distance that is looked for. Where no point is nearer, the distance is
+    infinite and the index n.
+    ``likely``: a distance within which each place probably has exactly one point: then no tree is
+    built. The result does not depend on it.
     """
     match = _alone(points, at, min(bound, likely))
     if match is not None and (bound <= likely or np.isfinite(match[0]).all()):

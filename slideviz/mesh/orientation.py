@@ -57,14 +57,8 @@ def orientation(cells: Cells, sums: FloatArray) -> NDArray[np.int8]:
     Where all ``sums`` have one sign, all cells are taken to be numbered alike, without a look
     at their neighbours (which takes a second for 250,000 cells). Otherwise the cells of each
     connected part are made consistent over their common facets, and the part gets the sign
-    that makes its sum positive. So a folded cell keeps its negative Jacobian.
-
-    Parameters
-    ----------
-    cells : Cells
-        Cells of one dimension.
-    sums : (m,)
-        Sum of the corner Jacobians of each cell, as from `corner_sums`.
+    that makes its sum positive. So a folded cell keeps its negative Jacobian. The cells have one
+    dimension; ``sums`` (m,) are those of `corner_sums`.
     """
     if not (sums < 0).any():
         return np.ones(len(cells), np.int8)

@@ -47,21 +47,16 @@ class Pair:
     """Two markers that are images of each other."""
 
     first: str
-    second: str
-    """`first`, `second`: marker names; ``second`` is the image of ``first``."""
+    second: str  # `first`, `second`: marker names; second is the image of first
     kind: PeriodicKind
-    vector: FloatArray
-    """(d,): translation from first to second; zero when rotational."""
-    angle: float
-    """Rotation in radians about ``axis`` through ``origin``; zero when translational."""
+    vector: FloatArray  # (d,): translation from first to second; zero when rotational
+    angle: float  # rotation in radians about axis through origin; zero when translational
     axis: tuple[float, float, float]
     origin: tuple[float, float, float]
     """`axis`, `origin` (3,) tuple of float: direction of the axis of rotation, and a point on it;
     without effect when translational."""
-    nodes: IntArray
-    """(k, 2): each node of ``first`` and its image."""
-    mismatch: float
-    """Largest distance between an image and its partner, in the mesh's length unit."""
+    nodes: IntArray  # (k, 2): each node of first and its image
+    mismatch: float  # largest distance between an image and its partner, in the mesh's length unit
 
     @property
     def period(self) -> float:
@@ -241,7 +236,13 @@ def _paired(
                 reasons.append(problem)
                 continue
             if model is not None and not agree(model, pair):
-                reasons.append(_differ(mesh, model, pair))
+                names = (f"{p.first!r}, {p.second!r} ({p.describe()})" for p in (model, pair))
+                reasons.append(
+                    MeshError(
+                        f"{mesh.name}: the periodic pairs {' and '.join(names)} differ; only one "
+                        "period is possible, so give the others another role"
+                    )
+                )
                 continue
             others = pairs_of([name for name in rest[1:] if name != second], model or pair)
             if others is not None:
@@ -309,15 +310,6 @@ def agree(one: Pair, other: Pair) -> bool:
         return abs(one.period - other.period) <= TOLERANCE * one.period
     gaps = [np.linalg.norm(one.vector - sign * other.vector) for sign in (1, -1)]
     return bool(min(gaps) <= TOLERANCE * one.period)
-
-
-def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
-    """Return the error that says that two pairs have different transformations."""
-    return MeshError(
-        f"{mesh.name}: the periodic pairs {one.first!r}, {one.second!r} ({one.describe()}) and "
-        f"{other.first!r}, {other.second!r} ({other.describe()}) differ; only one period is "
-        "possible, so give the others another role"
-    )
 
 
 def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tuple[Pair, ...]:

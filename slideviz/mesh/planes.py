@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 
-LEAF = 4
-"""Most boxes in a leaf of `BoxTree`."""
+LEAF = 4  # most boxes in a leaf of `BoxTree`
 
 ANGLE = 1e-6
 """Largest angle, in radians, between a simplex and a direction that counts as lying in it."""
@@ -35,8 +34,7 @@ ANGLE = 1e-6
 class FacetSimplices:
     """The lines (2D) or triangles (3D) that facets are divided into, in the order of the facets."""
 
-    nodes: IntArray
-    """(s, d): the mesh nodes of each simplex: two in 2D, three in 3D."""
+    nodes: IntArray  # (s, d): the mesh nodes of each simplex: two in 2D, three in 3D
     facet: IntArray
     """(s,): index of the facet that each is part of: a quadrilateral is two triangles."""
 
@@ -100,8 +98,7 @@ class FacetSimplices:
 class BoxTree:
     """A complete binary tree over axis-parallel boxes, the *items*."""
 
-    order: IntArray
-    """(s,): indices of the items in the order of the leaves, filled up with -1."""
+    order: IntArray  # (s,): indices of the items in the order of the leaves, filled up with -1
     levels: tuple[tuple[FloatArray, FloatArray], ...]
     """tuple of ((k, d), (k, d)): low and high corners of the boxes of each level, from the root (k
     = 1) to the items (k = s)."""
@@ -135,17 +132,11 @@ class BoxTree:
         """Return indices (p,), (p,) of queries and items: the pairs that may touch.
 
         Their bounding boxes touch, and the item's box touches the planes that the query lies in.
-
-        Parameters
-        ----------
-        corners : (q, k, d)
-            Points whose convex hull is the query.
-        axes : (q, c, d)
-            Unit normals of the planes that a query lies in, through its first corner. A box off
-            such a plane is not near, which shortens the search for large queries that are oblique
-            to the coordinate axes.
-        margin : float
-            Length up to which what lies apart counts as touching.
+        ``corners`` (q, k, d): points whose convex hull is the query.
+        ``axes`` (q, c, d): unit normals of the planes that a query lies in, through its first
+        corner. A box off such a plane is not near, which shortens the search for large queries that
+        are oblique to the coordinate axes.
+        ``margin``: length up to which what lies apart counts as touching.
         """
         low, high = boxes(corners)
         low, high = low - margin, high + margin
@@ -170,18 +161,15 @@ class BoxTree:
 class Planes:
     """The planes of a surface's simplices at given points of its nodes, with a search tree."""
 
-    corners: FloatArray
-    """(s, d, d): the corners of the simplices."""
+    corners: FloatArray  # (s, d, d): the corners of the simplices
     normals: FloatArray
     """(s, d): unit normals; NaN where a simplex is degenerate, so that all comparisons with it
     fail."""
     inwards: FloatArray
     """(s, d, d): for each corner a unit vector in the plane of the simplex, pointing inward: in 3D
     normal to the side that begins there, in 2D along the line."""
-    tree: BoxTree
-    """The boxes around the simplices."""
-    margin: float
-    """Length up to which a point off the surface counts as lying on it."""
+    tree: BoxTree  # the boxes around the simplices
+    margin: float  # length up to which a point off the surface counts as lying on it
 
     @classmethod
     def of(cls, points: FloatArray, surface: FacetSimplices, margin: float) -> Planes:
@@ -218,16 +206,10 @@ class Planes:
         a path between them crosses it an odd number of times. The paths go by way of each
         of several fixed directions. If it is open (``x`` on a border), the paths give different
         answers, and the result is False.
-
-        Parameters
-        ----------
-        x : (d,)
-            A point on the surface.
-        near : (p,)
-            Simplices; all that contain ``x`` must be among them.
-        ends : (r, d)
-            Other points, of which only the directions from ``x`` count. Those along the surface are
-            on neither side, and left out.
+        ``x`` (d,): a point on the surface.
+        ``near`` (p,): simplices; all that contain ``x`` must be among them.
+        ``ends`` (r, d): other points, of which only the directions from ``x`` count. Those along
+        the surface are on neither side, and left out.
         """
         here = np.broadcast_to(x, (len(near), len(x)))
         depth = self.depths(here, near)

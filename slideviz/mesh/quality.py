@@ -49,8 +49,7 @@ __all__ = [
 ]
 
 
-PIECE = 1 << 22
-"""Values of cells that are summed up at a time, at most."""
+PIECE = 1 << 22  # values of cells that are summed up at a time, at most
 FINE = 10_000
 """Intervals of 0 to 1 in which cells are counted by quality; bars of a histogram join some."""
 
@@ -79,12 +78,10 @@ def quality_totals(
 ) -> QualityTotals:
     """Return the totals of the size-skew qualities and statuses (m,) of all cells of a mesh.
 
-    Parameters
-    ----------
-    release : callable
-        Called after each piece was read (`PIECE`): arrays in a file may not fit into memory.
-    worst : int
-        The number of worst cells wanted; with 0, they are not counted in fine intervals, either.
+    ``release``: called after each piece was read (`PIECE`): arrays in a file may not fit into
+    memory.
+    ``worst``: the number of worst cells wanted; with 0, they are not counted in fine intervals,
+    either.
     """
     least, inverted, unproven = np.inf, 0, 0
     counts = np.zeros(FINE if worst else 0, np.int64)
@@ -400,16 +397,8 @@ def checked_reference(reference: Mesh, mesh: Mesh) -> Mesh:
 def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
     """Return the corner Jacobians (k,) of one cell, in the order of its corners.
 
-    Raises MeshError if there is no such cell.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    cell : int
-        Index of the cell, from 0.
-    sign : int
-        ``Quality.signs[cell]``, so that a valid cell has positive Jacobians.
+    ``cell`` is its index from 0, ``sign`` is ``Quality.signs[cell]``, so that a valid cell has
+    positive Jacobians. Raises MeshError if there is no such cell.
     """
     if not 0 <= cell < len(mesh.cells):
         raise MeshError(f"no cell {cell}; {mesh.name} has the cells 0 to {len(mesh.cells) - 1}")

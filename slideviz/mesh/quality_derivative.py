@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
     from slideviz.mesh.quality import Quality
 
-FOLDED_AT_ONCE = 4096
-"""Inverted cells whose coefficients (up to 27 each) are in memory at a time."""
+FOLDED_AT_ONCE = 4096  # inverted cells whose coefficients (up to 27 each) are in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,26 +75,12 @@ def derivative_of(
 ) -> QualityDerivative:
     """Return the smooth minimum and the mean of a mesh's quality, with their derivatives.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The deformed mesh.
-    found : Quality
-        Its quality.
-    sums : (m,) or None
-        Sums of the corner Jacobians of the undeformed cells. None if there is no undeformed mesh:
-        there is no factor of size then, and Jacobians of inverted cells are not divided by a mean.
-    p : float
-        The exponent of the smooth minimum.
-    going_on : callable
-        Called every few thousand cells; what it raises ends the work.
-
-    Raises
-    ------
-    MeshError
-        A point is no number, or an undeformed cell has no positive volume to compare with.
-    CaseError
-        The exponent is below 1 or no number.
+    ``found`` is the quality of the deformed mesh, ``p`` the exponent of the smooth minimum.
+    ``sums`` (m,): those of the corner Jacobians of the undeformed cells. None if there is no
+    undeformed mesh: there is no factor of size then, and Jacobians of inverted cells are not
+    divided by a mean. ``going_on`` is called every few thousand cells; what it raises ends the
+    work. Raises MeshError if a point is no number, or an undeformed cell has no positive volume to
+    compare with, and CaseError if the exponent is below 1 or no number.
     """
     _check_exponent(p)
     _check(mesh, found, sums)
@@ -314,11 +299,9 @@ class SmoothMargin:
     never above the smallest margin.
     """
 
-    p: float
-    """The exponent."""
+    p: float  # the exponent
     value: float
-    of_points: FloatArray
-    """(n, d): the derivative by the points, per unit of length."""
+    of_points: FloatArray  # (n, d): the derivative by the points, per unit of length
 
 
 def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
@@ -341,19 +324,9 @@ def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
 def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
     """Return the smooth minimum of the margins of the cells, with its derivative by the points.
 
-    Parameters
-    ----------
-    mesh, reference : Mesh
-        The deformed mesh, and the undeformed one, with the same cells.
-    p : float
-        The exponent, at least 1.
-
-    Raises
-    ------
-    CaseError
-        The exponent is below 1 or no number.
-    MeshError
-        An undeformed cell has no positive volume to compare with.
+    ``mesh``, ``reference``: the deformed mesh, and the undeformed one, with the same cells. ``p``:
+    the exponent. Raises CaseError if it is below 1 or no number, and MeshError if an undeformed
+    cell has no positive volume to compare with.
     """
     _check_exponent(p)
     margins = cell_margins(mesh, reference)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import LANES, OPTIONS, add3, cross3, dot3, edge, gather
+from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather
 from slideviz.mesh.model import IntArray
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import Metric
 
 SHAPES: tuple[Metric, ...] = (

@@ -33,58 +33,28 @@ def ordered_sum(a: FloatArray) -> FloatArray:
     return reduce(np.add, a)
 
 
-def _triangle(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Knupp's (thesis Eq. 2.45), with the spread ``λ11 + λ22 - λ12``."""
-    return np.sqrt(3) * alpha[0] / spread[0]
-
-
-def _tetrahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Knupp's, with the spread ``3/2 (λ11 + λ22 + λ33) - λ12 - λ23 - λ13``."""
-    return 3 * np.cbrt(2 * alpha[0] ** 2) / spread[0]
-
-
-def _quadrilateral(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Knupp's: the harmonic mean of ``alpha / spread``, the sines of the corners."""
-    return 4 / ordered_sum(spread / alpha)
-
-
-def _hexahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Knupp's: the harmonic mean of ``(alpha / spread)^(2/3)`` over the corners."""
-    return 8 / ordered_sum(np.cbrt((spread / alpha) ** 2))
-
-
-def _hexahedron_rbf_slide(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """As `_hexahedron`, but without the exponent 2/3 of Knupp and of thesis Eq. 2.48."""
-    return 8 / ordered_sum(spread / alpha)
-
-
-def _prism(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Our own: as the hexahedron, scaled to 1 for a right prism on an equilateral triangle."""
-    return 6 / ordered_sum(np.cbrt(0.75 * (spread / alpha) ** 2))
-
-
-def _pyramid(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Our own: harmonic mean over the base corners of ``3 det(T)^(2/3) / ‖T‖²``, T = W⁻¹ A.
-
-    A has the edges e₁, e₂, e₃ at a corner as rows, W those of the pyramid with equal edges,
-    (1, 0, 0), (0, 1, 0) and (1/2, 1/2, 1/√2). So the rows of T are e₁, e₂ and
-    √2 (e₃ - (e₁ + e₂) / 2), and the spread is ``‖T‖²``. Unlike the skew of prisms and hexahedra
-    it depends on the height too: it is below 1 for a tall or a flat pyramid.
-    """
-    return 4 / ordered_sum(spread / (3 * np.cbrt(2 * alpha**2)))
-
-
 KNUPP: dict[int, Skew] = {  # by VTK identifier
-    5: _triangle,
-    9: _quadrilateral,
-    10: _tetrahedron,
-    12: _hexahedron,
-    13: _prism,
-    14: _pyramid,
+    # Knupp's (thesis Eq. 2.45), with the spread λ11 + λ22 - λ12.
+    5: lambda spread, alpha: np.sqrt(3) * alpha[0] / spread[0],
+    # Knupp's: the harmonic mean of alpha / spread, the sines of the corners.
+    9: lambda spread, alpha: 4 / ordered_sum(spread / alpha),
+    # Knupp's, with the spread 3/2 (λ11 + λ22 + λ33) - λ12 - λ23 - λ13.
+    10: lambda spread, alpha: 3 * np.cbrt(2 * alpha[0] ** 2) / spread[0],
+    # Knupp's: the harmonic mean of (alpha / spread)^(2/3) over the corners.
+    12: lambda spread, alpha: 8 / ordered_sum(np.cbrt((spread / alpha) ** 2)),
+    # Our own: as the hexahedron, scaled to 1 for a right prism on an equilateral triangle.
+    13: lambda spread, alpha: 6 / ordered_sum(np.cbrt(0.75 * (spread / alpha) ** 2)),
+    # Our own: harmonic mean over the base corners of 3 det(T)^(2/3) / ‖T‖², T = W⁻¹ A. A has the
+    # edges e₁, e₂, e₃ at a corner as rows, W those of the pyramid with equal edges, (1, 0, 0),
+    # (0, 1, 0) and (1/2, 1/2, 1/√2). So the rows of T are e₁, e₂ and √2 (e₃ - (e₁ + e₂) / 2), and
+    # the spread is ‖T‖². Unlike the skew of prisms and hexahedra it depends on the height too: it
+    # is below 1 for a tall or a flat pyramid.
+    14: lambda spread, alpha: 4 / ordered_sum(spread / (3 * np.cbrt(2 * alpha**2))),
 }
 SKEW_METRICS: Mapping[SkewMetric, Mapping[int, Skew]] = {
     "knupp": KNUPP,
-    "rbf-slide": {**KNUPP, 12: _hexahedron_rbf_slide},
+    # Without the exponent 2/3 of Knupp and of thesis Eq. 2.48.
+    "rbf-slide": {**KNUPP, 12: lambda spread, alpha: 8 / ordered_sum(spread / alpha)},
 }
 """Function of the skew, by metric and VTK identifier."""
 

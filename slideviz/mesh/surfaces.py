@@ -12,8 +12,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.nearest import row_groups
 
-LEAST = 30_000
-"""Facets of all boundaries together, below which there are no coarse surfaces."""
+LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
 CUBES = 120
 """Cubes along the longest side of the box around all boundaries; each is some pixels wide."""
 
@@ -21,21 +20,12 @@ CUBES = 120
 def coarse_surfaces(
     surfaces: Sequence[Surface], points: FloatArray, cubes: int | None = None
 ) -> tuple[Surface, ...]:
-    """Return the boundaries of a 3D mesh with fewer facets.
+    """Return the boundaries of a 3D mesh with fewer facets, in the order of ``surfaces``.
 
-    Parameters
-    ----------
-    surfaces : sequence of Surface
-    points : (n, 3) float64
-        Of the mesh. The nodes of coarse surfaces are nodes of the mesh too, and move with them.
-    cubes : int, optional
-        Cubes along the longest side; None: `CUBES`.
-
-    Returns
-    -------
-    tuple of Surface
-        In the order of ``surfaces``; a facet has the owner of one of the facets it replaces. Empty
-        for a 2D mesh, and where all have fewer than `LEAST` facets together.
+    A facet has the owner of one of the facets it replaces. Empty for a 2D mesh, and where all have
+    fewer than `LEAST` facets together. ``points`` (n, 3) are those of the mesh: the nodes of coarse
+    surfaces are nodes of the mesh too, and move with them. ``cubes``: along the longest side;
+    None: `CUBES`.
     """
     if sum(len(one.facets) for one in surfaces) < LEAST or any(one.flat for one in surfaces):
         return ()
@@ -132,13 +122,8 @@ def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:
 def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
     """Return the names of boundaries of a 3D mesh that lie inside the others, as a wing in air.
 
-    Inside are those whose bounding box touches no side of the box around all.
-
-    Parameters
-    ----------
-    surfaces : sequence of Surface
-    points : (n, d) float64
-        Of the mesh.
+    Inside are those whose bounding box touches no side of the box around all. ``points`` (n, d) are
+    those of the mesh.
     """
     boxes = {
         one.name: (points[one.nodes].min(axis=0), points[one.nodes].max(axis=0))
@@ -174,17 +159,13 @@ def is_closed(surfaces: Sequence[Surface]) -> bool:
 class Surface:
     """One boundary, ready to be drawn."""
 
-    name: str
-    """The marker."""
-    nodes: IntArray
-    """(u,): the mesh nodes it uses."""
+    name: str  # the marker
+    nodes: IntArray  # (u,): the mesh nodes it uses
     facets: IntArray
     """(f, 2 or 4): its lines or faces, as indices into ``nodes``; a triangle repeats its last
     node."""
-    owner: IntArray
-    """(f,): the cell whose side each facet is."""
-    rim: IntArray
-    """(r, 2): edges that only one facet has, as indices into ``nodes``; empty in 2D."""
+    owner: IntArray  # (f,): the cell whose side each facet is
+    rim: IntArray  # (r, 2): edges that only one facet has, as indices into nodes; empty in 2D
 
     @property
     def flat(self) -> bool:

@@ -19,8 +19,7 @@ from slideviz.mesh.nearest import row_groups, sorted_in_rows
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
-TINY = float(np.finfo(float).tiny)
-"""Smallest normal float: a divisor in place of 0."""
+TINY = float(np.finfo(float).tiny)  # smallest normal float: a divisor in place of 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +28,12 @@ class Boundary:
 
     facets: IntArray
     """(f, k): node indices; k = 2 in 2D, 4 in 3D, where a triangle repeats its last node."""
-    marker: IntArray
-    """(f,): index into ``names``."""
-    names: tuple[str, ...]
-    """The markers, in file order."""
-    owner: IntArray
-    """(f,): the cell each facet is a side of."""
+    marker: IntArray  # (f,): index into names
+    names: tuple[str, ...]  # the markers, in file order
+    owner: IntArray  # (f,): the cell each facet is a side of
     joints: IntArray
     """(j, 2): pairs of facets of any markers that share a joint (node in 2D, edge in 3D)."""
-    joint_nodes: IntArray
-    """(j, dim - 1): the nodes that each pair shares."""
+    joint_nodes: IntArray  # (j, dim - 1): the nodes that each pair shares
 
     @property
     def dim(self) -> int:

@@ -45,12 +45,10 @@ from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
 from slideviz.system.weak_cache import weak_cache
 
-LAYERS = 5
-"""Layers that growth and equal layers are found from."""
+LAYERS = 5  # layers that growth and equal layers are found from
 EQUAL = 0.01
 """Largest difference of the lengths of edges, as a part of the first one's, that are equal."""
-FLAT = 2 / 3
-"""Largest height of a cell of the stack, as a part of its length."""
+FLAT = 2 / 3  # largest height of a cell of the stack, as a part of its length
 
 _EDGES = np.full((15, 12, 2), -1)
 """Local nodes of the edges of each element type, by VTK identifier."""
@@ -68,12 +66,9 @@ class Columns:
     corner: IntArray
     """(f, 2 or 4): the column at each corner of each facet. Of a facet without columns: c + g, if
     it is number g of ``bare``."""
-    depth: IntArray
-    """(f,): number of layers of the stack of each facet, at most k."""
-    bare: IntArray
-    """(g,): the facets without columns."""
-    off: IntArray
-    """(g, 2): the nodes of the cells of ``bare`` that are not on the facet (one or two)."""
+    depth: IntArray  # (f,): number of layers of the stack of each facet, at most k
+    bare: IntArray  # (g,): the facets without columns
+    off: IntArray  # (g, 2): the nodes of the cells of bare that are not on the facet (one or two)
 
     def places(self, marker: str) -> IntArray:
         """Return the places of a boundary, ascending: columns, then c + g for facets without."""
@@ -212,8 +207,7 @@ def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type
 
 VALUES = ("first_height", "growth", "equal_layers", "wall_angle")
 """The numbers of the walls of one mesh."""
-CHANGES = ("height_ratio", "angle_change")
-"""The numbers that compare the walls of two meshes."""
+CHANGES = ("height_ratio", "angle_change")  # the numbers that compare the walls of two meshes
 _REPORTED = {
     "first_height": ("first_height", "ratio", "height_ratio"),
     "growth": ("growth", "", ""),

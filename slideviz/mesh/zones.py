@@ -61,7 +61,9 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     ]
     mesh = Mesh(
         points=coords,
-        cells=_joined([_shifted(z.cells, p.start) for z, p in zip(zones, points, strict=True)]),
+        cells=Cells.joined(
+            [_shifted(zone.cells, part.start) for zone, part in zip(zones, points, strict=True)]
+        ),
         markers=tuple(
             Marker(name, _shifted(marker.cells, part.start))
             for zone, part, own in zip(zones, points, names, strict=True)
@@ -172,13 +174,6 @@ def _part(zones: Sequence[Mesh]) -> tuple[Part | None, list[int], list[int]]:
 
 def _shifted(cells: Cells, by: int) -> Cells:
     return Cells(cells.types, cells.offsets, sealed(cells.connectivity + by))
-
-
-def _joined(cells: Sequence[Cells]) -> Cells:
-    return Cells.from_types(
-        sealed(np.concatenate([some.types for some in cells])),
-        sealed(np.concatenate([some.connectivity for some in cells])),
-    )
 
 
 def _halo(mesh: Mesh) -> Halo | None:

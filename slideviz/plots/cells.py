@@ -66,7 +66,9 @@ def draw_cells(
         "edgecolors": PAPER.edge if edges else "face",
         "linewidths": widths if edges else _HAIR,
     }
-    shapes = PolyCollection(rings_of(cells), **lines | options)
+    corners = cells.points[cells.connectivity, :2]
+    rings = np.split(corners, cells.offsets[1:-1]) if len(cells) else []
+    shapes = PolyCollection(rings, **lines | options)
     if values is not None:
         shapes.set(cmap=scale.cmap, norm=scale.norm, array=values)
         shapes.update_scalarmappable()
@@ -85,17 +87,13 @@ def draw_cells(
     return axes.add_collection(shapes, autolim=False)
 
 
-def rings_of(cells: Polygons) -> list[FloatArray]:
-    """Return the corners (k, 2) of each polygon in the plane, as a list."""
-    corners = cells.points[cells.connectivity, :2]
-    return np.split(corners, cells.offsets[1:-1]) if len(cells) else []
-
-
 def _thickness(axes: Any, cells: Polygons) -> FloatArray:
     """Return the drawn thickness (q,) of each polygon in points: its area by its diagonal."""
     low, high = axes.get_xlim()
     points_per_length = 72.0 * axes.bbox.width / axes.figure.dpi / (high - low)
-    thickness: FloatArray = np.abs(_normals(cells)[:, 2]) / _sizes(cells) * points_per_length
+    box = np.subtract(*reversed(boxes_of(cells)))
+    sizes = np.maximum(np.linalg.norm(box, axis=1), 1e-300)
+    thickness: FloatArray = np.abs(_normals(cells)[:, 2]) / sizes * points_per_length
     return thickness
 
 
@@ -106,12 +104,6 @@ def _normals(cells: Polygons) -> FloatArray:
     centre = np.repeat(cells.points[cells.connectivity[cells.offsets[:-1]]], cells.sizes, axis=0)
     corner = cells.points[cells.connectivity] - centre
     return np.add.reduceat(np.cross(corner, corner[after]), cells.offsets[:-1]) / 2.0
-
-
-def _sizes(cells: Polygons) -> FloatArray:
-    """Return the diagonal (q,) of the box around each polygon in the plane, greater than 0."""
-    low, high = boxes_of(cells)
-    return np.maximum(np.linalg.norm(high - low, axis=1), 1e-300)
 
 
 def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:

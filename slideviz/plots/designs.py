@@ -39,21 +39,17 @@ in inches; largest height of a legend above the axes, relative to the figure."""
 class DesignCurve:
     """A result of the designs that differ in one column only, against that column."""
 
-    label: str
-    """The values in the other columns."""
-    design: IntArray
-    """(k,): numbers of the designs, from 1."""
+    label: str  # the values in the other columns
+    design: IntArray  # (k,): numbers of the designs, from 1
     places: FloatArray
     """(k,): ascending horizontal coordinates: values of the column, or indices into ``words``."""
     values: FloatArray
     mean: FloatArray
     """`values`, `mean` (k,): the result (of the quality the minimum), and the mean quality."""
-    inverted: np.ndarray
-    """(k,): whether the design has inverted cells."""
+    inverted: np.ndarray  # (k,): whether the design has inverted cells
     words: tuple[str, ...] = ()
     """The column's different texts if they are not all numbers, else empty."""
-    others: str = ""
-    """The names of the other columns."""
+    others: str = ""  # the names of the other columns
 
 
 def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurve]:

@@ -52,7 +52,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
         }
         axes.plot([], [], label=what, markerfacecolor=face, **dot)
     _quality_limits(axes, [v for run in runs for v in (*run.minimum, *run.mean)])
-    _whole_ticks(axes)
+    axes.locator_params(axis="x", integer=True)
     add_legend(axes, style)
 
 
@@ -154,12 +154,6 @@ def _quality_limits(axes: Axes, values: Sequence[float]) -> None:
     good = [value for value in values if np.isfinite(value)]
     top = max(good, default=1.0)
     axes.set_ylim(0.0, 1.02 if top > 0.75 else max(1.12 * top, 0.1))
-
-
-def _whole_ticks(axes: Axes) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:

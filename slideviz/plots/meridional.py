@@ -31,8 +31,7 @@ class MeridionalBins:
 
     places: FloatArray
     """(k + 1, l + 1, 2): z and r of the corners of bins, in the mesh's length unit."""
-    bin_of: IntArray
-    """(m,): the bin of each cell, row by row."""
+    bin_of: IntArray  # (m,): the bin of each cell, row by row
     walls: tuple[str, str]
     cells: slice  # those of the zone in the mesh
 

@@ -32,12 +32,9 @@ class Curve:
     ends: FloatArray
     """(q, 2): the positions between which each cell is cut, the smaller one first: along a line in
     the mesh's length unit, along a circle in degrees."""
-    values: FloatArray
-    """(q,): the value of each cell."""
-    inverted: np.ndarray
-    """(q,): whether each cell is inverted."""
-    cells: IntArray
-    """(q,): the index of each cell in the mesh."""
+    values: FloatArray  # (q,): the value of each cell
+    inverted: np.ndarray  # (q,): whether each cell is inverted
+    cells: IntArray  # (q,): the index of each cell in the mesh
 
     def cell_at(self, position: float) -> int | None:
         """Return the index of the cell at a position, or None; an inverted one before others."""

@@ -26,16 +26,12 @@ def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
 class Paint:
     """A value for every cell of a mesh, with limits and color map."""
 
-    label: Quantity
-    """The quantity."""
-    values: FloatArray
-    """(m,): its value in every cell."""
+    label: Quantity  # the quantity
+    values: FloatArray  # (m,): its value in every cell
     inverted: np.ndarray
     """(m,): whether each cell is inverted, and drawn in the color of inverted cells."""
-    limits: tuple[float, float]
-    """(float, float): the values at the ends of the color map."""
-    color_map: str = COLOR_MAP
-    """A color map of matplotlib."""
+    limits: tuple[float, float]  # (float, float): the values at the ends of the color map
+    color_map: str = COLOR_MAP  # a color map of matplotlib
 
     def within(self, low: float, high: float) -> Paint:
         """Return the paint with other limits.

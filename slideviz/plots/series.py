@@ -19,10 +19,8 @@ class QualityRun:
     """Qualities of the cells of one mesh."""
 
     label: str
-    values: FloatArray
-    """(m,): 0 to 1."""
-    inverted: NDArray[np.bool_] | None = None
-    """(m,): cells to count apart, whatever their value."""
+    values: FloatArray  # (m,): 0 to 1
+    inverted: NDArray[np.bool_] | None = None  # (m,): cells to count apart, whatever their value
     series: int | None = None
     """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
@@ -31,12 +29,10 @@ class QualityRun:
 class Distribution:
     """The number of cells of one mesh in intervals of a value."""
 
-    counts: IntArray
-    """(k,)."""
+    counts: IntArray  # (k,)
     edges: FloatArray
     """(k + 1,): limits of the intervals; values outside are counted in the first or the last."""
-    inverted: int
-    """Number of inverted cells, which are in no interval."""
+    inverted: int  # number of inverted cells, which are in no interval
 
     @classmethod
     def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
@@ -73,12 +69,9 @@ class StepRun:
     """Quality after each step of a run."""
 
     label: str
-    steps: IntArray
-    """(k,): numbers of the steps; 0 is the undeformed mesh."""
-    minimum: FloatArray
-    """(k,)."""
-    mean: FloatArray
-    """(k,)."""
+    steps: IntArray  # (k,): numbers of the steps; 0 is the undeformed mesh
+    minimum: FloatArray  # (k,)
+    mean: FloatArray  # (k,)
     series: int | None = None
     """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
@@ -88,12 +81,10 @@ class GreedyRun:
     """The convergence of a greedy selection, cycle by cycle."""
 
     label: str
-    control_nodes: IntArray
-    """(c,)."""
+    control_nodes: IntArray  # (c,)
     error: FloatArray
     """(c,): largest error of the boundary after each cycle, in the mesh's length unit."""
-    level: IntArray
-    """(c,): number of the level of each cycle."""
+    level: IntArray  # (c,): number of the level of each cycle
     tolerance: float | None = None
     series: int | None = None
     """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
@@ -103,17 +94,13 @@ class GreedyRun:
 class Outcome:
     """The outcome of one run."""
 
-    label: str
-    """The combination of methods; runs of one label are joined by a line."""
+    label: str  # the combination of methods; runs of one label are joined by a line
     steps: int
     minimum: float
     mean: float
-    inverted: int = 0
-    """Inverted cells."""
-    seconds: float = float("nan")
-    """Processor time of the deformation."""
+    inverted: int = 0  # inverted cells
+    seconds: float = float("nan")  # processor time of the deformation
     control_nodes: int = 0
-    max_error: float = float("nan")
-    """In the mesh's length unit."""
+    max_error: float = float("nan")  # in the mesh's length unit
     series: int | None = None
     """Series number of its label; by default the index of the label among all labels."""

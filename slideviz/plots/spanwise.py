@@ -27,18 +27,15 @@ MOST_LAYERS = 40  # most layers, if their number is not given
 class Profile:
     """Quality in layers from one end of the span to the other."""
 
-    label: str
-    """Name of the run."""
+    label: str  # name of the run
     coordinate: str
     """The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, ``span``, or ``s`` for another
     direction."""
-    edges: FloatArray
-    """(k + 1,): borders of the layers, in the mesh's length unit."""
+    edges: FloatArray  # (k + 1,): borders of the layers, in the mesh's length unit
     minimum: FloatArray
     mean: FloatArray
     """`minimum`, `mean` (k,): minimum and mean in each layer; NaN in a layer without cells."""
-    count: IntArray
-    """(k,): cells in each layer."""
+    count: IntArray  # (k,): cells in each layer
     series: int | None = None
     """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 

@@ -44,8 +44,7 @@ class Series:
 
     color: str
     marker: str
-    dash: Any
-    """A line style of matplotlib."""
+    dash: Any  # a line style of matplotlib
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,9 @@ class Style:
 
     scheme: ColorScheme = PAPER
     """Colors of background and letters; series have lighter colors on a dark background."""
-    size: float = SMALLEST + 0.5
-    """Size of letters in points, 8 or more at the printed size."""
-    width: float = 1.4
-    """Width of lines in points."""
-    legend: bool = True
-    """Whether axes with more than one series get a legend."""
+    size: float = SMALLEST + 0.5  # size of letters in points, 8 or more at the printed size
+    width: float = 1.4  # width of lines in points
+    legend: bool = True  # whether axes with more than one series get a legend
 
     @property
     def dark(self) -> bool:

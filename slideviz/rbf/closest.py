@@ -12,7 +12,7 @@ from numba import prange
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 LEAF = 4  # triangles in a leaf of the tree, at most
 TIE = 1e-12  # squared distances with a smaller relative difference are equal but for rounding
@@ -21,10 +21,9 @@ ON = 1e-30
 squared distance from the origin."""
 MOST, TURNS = 1e150, 2.0**30
 """Largest coordinate with which periods are counted, and the largest number of them."""
-_OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
     """Reorder keys and items ``start`` to ``stop``, so that the lowest keys are before ``half``.
 
@@ -50,13 +49,13 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
             return
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _image(item, count):  # type: ignore[no-untyped-def]
     """Return ``item // count``: 0 for a triangle, 1 or 2 for an image; faster than dividing."""
     return 0 if item < count else 1 if item < 2 * count else 2
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
     """Build a balanced tree of boxes: reorder ``order`` (q,) and fill ``bounds`` (m, 6).
 
@@ -105,7 +104,7 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
         starts[2 * k + 2], stops[2 * k + 2] = half, b
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
     """Return the squared distance from x (3,) to box k; 0 inside."""
     total = 0.0
@@ -115,7 +114,7 @@ def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
     """Write the point of segment a, b closest to x to ``out``; return the squared distance."""
     length = 0.0
@@ -131,14 +130,14 @@ def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _copy(point, out):  # type: ignore[no-untyped-def]
     """Write a point to ``out``, number by number: whole rows take long to compile."""
     for i in range(3):
         out[i] = point[i]
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance."""
     uu, uv, vv, wu, wv = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -167,13 +166,13 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _before(a, b):  # type: ignore[no-untyped-def]
     """Return whether point a comes before b along a direction that no symmetry of a mesh has."""
     return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     """Return whether a and b, both at squared distance ``gap`` from a node, are one place.
 
@@ -184,7 +183,7 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     return apart <= 4.0 * TIE * gap
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
     """Write the corners of an item, numbered as for ``_build``, to ``out`` (3, 3)."""
     image = _image(item, len(corners))
@@ -196,7 +195,7 @@ def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
                 out[corner, axis] += shifts[image, axis]
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignore[no-untyped-def]
     """Write the points of the triangles ``corners`` (n, 3, 3) closest to x (m, 3) into out (m, 3).
 

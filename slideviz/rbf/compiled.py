@@ -150,8 +150,7 @@ def near_boxes(x, low, high, reach, out):  # type: ignore[no-untyped-def]
 
 
 A2 = SHAPE * SHAPE
-BLOCK = 256
-"""Control nodes in a block of ``sum_any``, whose distances stay in the first-level cache."""
+BLOCK = 256  # control nodes in a block of sum_any, whose distances stay in the first-level cache
 TARGETS_PER_TASK = 64
 
 

@@ -34,17 +34,10 @@ class ExactFit:
     Rows are sorted by position, so that the pivot guard leaves out the same rows however nodes
     are numbered. Each system of pseudo sliding is the leading block of the next: one factor grows.
     Nodes that no support connects with one that moves have no weight, and are left out
-    (`Problem.reach`).
-
-    Attributes
-    ----------
-    short : str
-        Empty: there is no tolerance that it could miss.
-    error_estimate, refined : float
-        As of a ``Solution``.
+    (`Problem.reach`). ``error_estimate`` and ``refined`` are as of a ``Solution``.
     """
 
-    short = ""
+    short = ""  # there is no tolerance that it could miss
 
     def __init__(self, problem: Problem, timer: PhaseTimer) -> None:
         d = problem.dim
@@ -56,8 +49,7 @@ class ExactFit:
         """Of all rows added so far."""
         self.dropped: IntArray = np.empty(0, np.int64)
         """(m,): nodes of which the pivot guard left out a constraint."""
-        self.stages: tuple[Levels, ...] = ()
-        """The rows in the system after each call of ``add``."""
+        self.stages: tuple[Levels, ...] = ()  # the rows in the system after each call of add
         self.error_estimate = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:

@@ -71,15 +71,11 @@ class Correction:
     ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]:
         """Return which points (m, d) are within reach, and the sources and weights of each.
 
-        Returns
-        -------
-        hit : (h,)
-            The points within reach of a source.
-        nearest : (h,)
-            The source that is nearest to each.
-        row, source, weight : (k,)
-            One entry, k >= h, for each pair of a point, by its place in ``hit``, and a source, with
-            its weight in the mean of the sources' errors. Weights of a point add up to 1.
+        ``hit`` (h,): the points within reach of a source.
+        ``nearest`` (h,): the source that is nearest to each.
+        ``row``, ``source``, ``weight`` (k,): one entry, k >= h, for each pair of a point, by its
+        place in ``hit``, and a source, with its weight in the mean of the sources' errors. Weights
+        of a point add up to 1.
         """
         hit, distance, nearest, tied = self._nearest(points)
         single = np.ones(len(hit), bool)

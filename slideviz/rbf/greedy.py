@@ -50,11 +50,7 @@ this many times as large."""
 class GreedyFit:
     """An interpolant that meets its constraints to a tolerance with few control nodes.
 
-    Attributes
-    ----------
-    short : str
-        Why the last selection ended above the tolerance, and a remedy; empty where it did not.
-    history : tuple of Cycle
+    ``short``: why the last selection ended above it, and a remedy; empty where it did not.
     """
 
     def __init__(
@@ -74,8 +70,7 @@ class GreedyFit:
         levels (Eq. 2.38)."""
         self.dropped: IntArray = np.empty(0, np.int64)
         """(m,): nodes left out by the pivot guard although their error is above the tolerance."""
-        self.stages: tuple[Levels, ...] = ()
-        """The rows chosen after each call of ``add``."""
+        self.stages: tuple[Levels, ...] = ()  # the rows chosen after each call of add
         self.error_estimate = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._number = history[-1].level if history else 1

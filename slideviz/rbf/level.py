@@ -182,8 +182,7 @@ class LevelLimit:
     """
 
     def __init__(self, error: float, budget: float) -> None:
-        self.budget = budget
-        """How many rows all levels together may choose."""
+        self.budget = budget  # how many rows all levels together may choose
         self._lowest, self._losses, self._spent = error, 0, 0.0
 
     def ends(self, error: float, cost: float) -> bool:
@@ -247,14 +246,8 @@ class Candidates:
 class GrowingFactor:
     """The Cholesky factor L of one block of the system, L L^T = G, to which rows are appended.
 
-    Attributes
-    ----------
-    rows : (k,) int64
-        The chosen rows, as indices of the candidates' rows.
-    turn : (k,) int64
-        The place of each in the order of choice over all blocks.
-    lower : (k, k) float64
-        L.
+    ``rows``, ``turn`` (k,): the chosen rows, as indices of the candidates' rows, and the place of
+    each in the order of choice over all blocks. ``lower`` (k, k): L.
     """
 
     def __init__(self, width: int) -> None:
@@ -299,12 +292,8 @@ class GrowingFactor:
 class GreedyLevel:
     """The interpolant of one level, and the rows chosen for it so far.
 
-    Attributes
-    ----------
-    previous_levels, increment : Interpolant
-        The sum of the levels before, and what this level adds to it.
-    singular : bool
-        The system with a polynomial has no solution.
+    ``previous_levels`` and ``increment``: the sum of the levels before, and what this level adds to
+    it. ``singular``: the system with a polynomial has no solution.
     """
 
     def __init__(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import prange
@@ -12,18 +12,16 @@ from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-_OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
 BLOCK = 256  # nodes of a task; it does all designs, so that what they share stays in the cache
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _shift(start, by):  # type: ignore[no-untyped-def]
     n = by.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
@@ -35,7 +33,7 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
                     by[k, i, j] = x if u == 0.0 else x + u
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
     n = at.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
@@ -49,7 +47,7 @@ def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
                         at[k, i, j] = before[i, j]
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def place(found, nodes, out):  # type: ignore[no-untyped-def]
     """Write values (b, k d) at ``nodes`` (b,) of k designs to ``out`` (k, n, d), in one thread."""
     d = out.shape[2]
@@ -59,7 +57,7 @@ def place(found, nodes, out):  # type: ignore[no-untyped-def]
                 out[k, nodes[i], j] = found[i, k * d + j]
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _add_correction(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
     """Do what ``add_correction`` does, with the rows of the sparse matrix."""
     for k in prange(out.shape[0]):
@@ -72,7 +70,7 @@ def _add_correction(out, targets, starts, source, weight, part, lacking):  # typ
                 out[k, i, j] += part[row] * total
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
     """Write the largest squared distance in each of p parts of the nodes to ``squares`` (p, k)."""
     for part in prange(squares.shape[0]):
@@ -95,7 +93,7 @@ _S = tuple((-1.0) ** k / float(factorial(2 * k + 1)) for k in range(1, 7))
 _C = tuple((-1.0) ** k / float(factorial(2 * k)) for k in range(1, 8))
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _sine(x):  # type: ignore[no-untyped-def]
     """Return sin x for |x| <= NEAR, to the last bits."""
     t = x * x
@@ -103,18 +101,17 @@ def _sine(x):  # type: ignore[no-untyped-def]
     return x + x * (t * (_S[0] + t * (_S[1] + p)))
 
 
-@njit(inline="always", **_OPTIONS)
+@njit(inline="always", **OPTIONS)
 def _cosine(x):  # type: ignore[no-untyped-def]
     t = x * x
     p = t * (_C[2] + t * (_C[3] + t * (_C[4] + t * (_C[5] + t * _C[6]))))
     return 1.0 + t * (_C[0] + t * (_C[1] + p))
 
 
-NEAR = 0.25
-"""Largest angle, in radians, for which ``_sine`` and ``_cosine`` are exact but for rounding."""
+NEAR = 0.25  # largest angle, in radians, for which _sine and _cosine are exact but for rounding
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[no-untyped-def]
     """Do what ``to_points`` does, for k designs; ``rate`` is 1 / ``frame.radius``."""
     n, d = coords.shape[1:]

@@ -230,7 +230,9 @@ def _finish(
     )
     if problem.frozen is not None:
         return solution
-    control = _in_system(fit)
+    # Without the nodes that the pivot guard left out.
+    kept = [np.empty(0, np.int64), *(level[:, 0] for level in fit.stages[-1])]
+    control = fit.interpolant.nodes[np.isin(fit.interpolant.nodes, np.concatenate(kept))]
     return replace(
         solution,
         control_nodes=len(control),
@@ -238,12 +240,6 @@ def _finish(
         dropped_error=largest_norm(take(errors, np.flatnonzero(left_out))),
         field=replace(fit.interpolant.field(problem), correction=correction),
     )
-
-
-def _in_system(fit: Fit) -> IntArray:
-    """Return the nodes of the interpolant (c,) that the pivot guard did not leave out."""
-    rows = [np.empty(0, np.int64), *(level[:, 0] for level in fit.stages[-1])]
-    return fit.interpolant.nodes[np.isin(fit.interpolant.nodes, np.concatenate(rows))]
 
 
 def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Correction | None:

@@ -19,10 +19,8 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, sealed
 from slideviz.rbf.operations import each_of
 from slideviz.rbf.tape import Array, recorded, value
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.system.threads import in_parts
-
-OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 SWEEPS = 12  # most sweeps of Jacobi's eigenvalue algorithm; it needs up to six
 

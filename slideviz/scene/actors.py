@@ -25,8 +25,7 @@ class DrawnBoundary:
     """A boundary in the scene: its surface, data set and actor."""
 
     surface: Surface
-    shape: Any
-    """Its facets."""
+    shape: Any  # its facets
     actor: Any
 
 
@@ -77,11 +76,8 @@ def cell_shape(mesh: Mesh) -> Any:
 
 def set_order(shape: Any, mesh: Mesh, order: IntArray) -> None:
     """Put the cells of a 2D mesh into its data set in another order, indices (m,)."""
-    sizes = np.diff(mesh.cells.offsets)[order]
-    offsets = np.concatenate(([0], np.cumsum(sizes)))
-    starts = np.repeat(mesh.cells.offsets[order] - offsets[:-1], sizes)
-    corners = mesh.cells.connectivity[starts + np.arange(offsets[-1])]
-    shape.SetPolys(pv.CellArray.from_arrays(offsets, corners))  # type: ignore[arg-type]
+    cells = mesh.cells.take(order)
+    shape.SetPolys(pv.CellArray.from_arrays(cells.offsets, cells.connectivity))  # type: ignore[arg-type]
 
 
 def part_shape(mesh: Mesh, cells: IntArray) -> Any:
@@ -90,9 +86,11 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
     Its cell data `CELL` are the indices in the mesh of the cells that the polygons belong to, its
     point data `POINT` those of the nodes.
     """
-    offsets, corners, nodes = _corners_of(mesh, cells)
+    part = mesh.cells.take(cells)
+    nodes, place = part.nodes, np.empty(len(mesh.points), np.int64)
+    place[nodes] = np.arange(len(nodes))
     points = lifted(mesh.points[nodes], 0.0)
-    table = pv.CellArray.from_arrays(offsets, corners)  # type: ignore[arg-type]
+    table = pv.CellArray.from_arrays(part.offsets, place[part.connectivity])  # type: ignore[arg-type]
     if mesh.dim == 2 or not len(cells):
         shape = pv.PolyData()
         shape.points = points
@@ -101,26 +99,11 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
         return shape
     grid = pv.UnstructuredGrid()
     grid.points = points
-    grid.SetCells(numpy_to_vtk(mesh.cells.types[cells], deep=True), table)
+    grid.SetCells(numpy_to_vtk(part.types, deep=True), table)
     shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
     shape.point_data[POINT] = nodes[shape.point_data[POINT]]
     shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
     return shape
-
-
-def _corners_of(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return offsets (k + 1,) and connectivity of cells (k,) with renumbered nodes, and the nodes.
-
-    The nodes are ascending indices in the mesh, by their new number.
-    """
-    every = mesh.cells
-    sizes = every.offsets[cells + 1] - every.offsets[cells]
-    offsets = np.concatenate(([0], np.cumsum(sizes)))
-    ramp = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
-    old = every.connectivity[np.repeat(every.offsets[cells], sizes) + ramp]
-    used = np.zeros(len(mesh.points), bool)
-    used[old] = True
-    return offsets, (np.cumsum(used) - 1)[old], np.flatnonzero(used)
 
 
 def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:

@@ -44,10 +44,8 @@ class FlatScene:
         self.cuts = cuts
         self.beside: FlatScene | None = None
         """Another scene whose camera is linked: `fit` shows both sections whole."""
-        self.section: Section | None = None
-        """The section that is shown."""
-        self.polygons: Polygons | None = None
-        """The polygons that are drawn, laid flat."""
+        self.section: Section | None = None  # the section that is shown
+        self.polygons: Polygons | None = None  # the polygons that are drawn, laid flat
         self._all: Polygons | None = None
         self._shown = PolygonActor(self.stage, "flat")
         self._instances = Instances(self.stage, self._shown)
@@ -59,8 +57,7 @@ class FlatScene:
         self._period = Period()
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
-        self.session = Session()
-        """The state that is shown."""
+        self.session = Session()  # the state that is shown
         self.set_scheme(scheme)
 
     @property

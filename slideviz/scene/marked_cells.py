@@ -34,8 +34,7 @@ class MarkLayer(Layer):
     """
 
     def clear(self) -> None:
-        self.cell: int | None = None
-        """The index of the cell that is drawn."""
+        self.cell: int | None = None  # the index of the cell that is drawn
         self._drawn: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
         self._shapes: dict[str, Any] = {}

@@ -128,8 +128,7 @@ class BoundaryLayer(Layer):
     """The boundaries, an actor each, with a band around the selected ones."""
 
     def clear(self) -> None:
-        self.drawn: dict[str, DrawnBoundary] = {}
-        """The boundaries by name."""
+        self.drawn: dict[str, DrawnBoundary] = {}  # the boundaries by name
         self.bands: dict[str, Band] = {}
         """The bands by name of the boundaries that are selected, or have been."""
         self.glass: frozenset[str] = frozenset()
@@ -272,8 +271,7 @@ class ThresholdLayer(Layer):
     def clear(self) -> None:
         self.cells: IntArray | None = None
         """(k,): the cells within the threshold, in 2D the inverted ones last; None without one."""
-        self.shape: Any = None
-        """The data set of these cells."""
+        self.shape: Any = None  # the data set of these cells
         self.actor: Any = None
         self._faded = False
 
@@ -352,8 +350,7 @@ class CoarseLayer(Layer):
         self._sections, self._boundaries = sections, boundaries
 
     def clear(self) -> None:
-        self.on = False
-        """Whether they are drawn."""
+        self.on = False  # whether they are drawn
         self.drawn: dict[str, DrawnBoundary] = {}
         self._made_of: tuple[object, ...] = ()
         self._session = Session()

@@ -58,13 +58,10 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
 class Overview:
     """The default view of a deformed mesh: the cells that are drawn, and the camera's direction."""
 
-    cells: IntArray
-    """(k,): indices of the cells that are drawn."""
+    cells: IntArray  # (k,): indices of the cells that are drawn
     towards: FloatArray
-    up: FloatArray
-    """`towards`, `up` (3,): direction from the mesh to the camera, and the up vector."""
-    detail: Detail | None
-    """The part that is seen; None for everything."""
+    up: FloatArray  # `towards`, `up` (3,): direction from the mesh to the camera, and the up vector
+    detail: Detail | None  # the part that is seen; None for everything
 
     @classmethod
     def of(cls, mesh: Mesh, base: Mesh, zoom: Zoom = "auto") -> Overview:

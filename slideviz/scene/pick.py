@@ -43,34 +43,31 @@ def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary
 
 def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the name of a 3D mesh's foremost boundary at a pixel; None if there is none."""
-    picker = _cell_picker()
-    names = {}
-    for one in drawn:
-        picker.AddPickList(one.actor)
-        names[one.actor] = one.surface.name
-    picker.Pick(x, y, 0.0, plotter.renderer)
-    return names.get(picker.GetActor())
+    names = {one.actor: one.surface.name for one in drawn}
+    return names.get(_foremost(plotter, x, y, names, 0.0005)[0])
 
 
 def meets(plotter: Any, x: float, y: float, actors: Sequence[Any]) -> bool:
     """Return whether one of the given actors is visible at a pixel, or hidden by others there."""
-    if not actors:
-        return False
-    picker = _cell_picker()
-    picker.SetTolerance(0.0)
-    for actor in actors:
-        picker.AddPickList(actor)
-    picker.Pick(x, y, 0.0, plotter.renderer)
-    return picker.GetActor() is not None
+    return bool(actors) and _foremost(plotter, x, y, actors)[0] is not None
 
 
-def _cell_picker() -> Any:
+def _foremost(
+    plotter: Any, x: float, y: float, actors: Iterable[Any], tolerance: float = 0.0
+) -> tuple[Any, int]:
+    """Return the foremost of some actors at a pixel, or None, and the number of its polygon there.
+
+    ``tolerance``: distance up to which the actor is hit, relative to the view's diagonal.
+    """
     from vtkmodules.vtkRenderingCore import vtkCellPicker
 
     picker = vtkCellPicker()
-    picker.SetTolerance(0.0005)
+    picker.SetTolerance(tolerance)
     picker.PickFromListOn()
-    return picker
+    for actor in actors:
+        picker.AddPickList(actor)
+    picker.Pick(x, y, 0.0, plotter.renderer)
+    return picker.GetActor(), picker.GetCellId()
 
 
 def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
@@ -96,15 +93,6 @@ def front_cell(
     ``x`` and ``y``: pixels from the lower left. ``shown``: the actors to look at, each with the
     index of the cell that each of its polygons is of.
     """
-    from vtkmodules.vtkRenderingCore import vtkCellPicker
-
-    picker = vtkCellPicker()
-    picker.SetTolerance(0.0)
-    picker.PickFromListOn()
-    owners = {}
-    for actor, owner in shown:
-        picker.AddPickList(actor)
-        owners[actor] = owner
-    picker.Pick(x, y, 0.0, plotter.renderer)
-    cells = owners.get(picker.GetActor())
-    return int(cells[picker.GetCellId()]) if cells is not None else None
+    owners = dict(shown)
+    actor, polygon = _foremost(plotter, x, y, owners)
+    return int(owners[actor][polygon]) if actor in owners else None

@@ -38,8 +38,7 @@ class SectionDrawn:
     """A section in the scene: the actor of its polygons, and what they were made of."""
 
     shown: PolygonActor
-    made_of: tuple[object, ...] = ()
-    """Everything that the polygons depend on, to be compared."""
+    made_of: tuple[object, ...] = ()  # everything that the polygons depend on, to be compared
     frame: StepFrame | None = None
     of: Mesh | None = None
     """`frame`, `of`: the frame with the cut cells (of a mesh in its file: those read); the shown
@@ -60,8 +59,7 @@ class SectionLayer(Layer):
     """The cuts of the view's sections through the mesh and its neighbouring passages."""
 
     def __init__(self, stage: Stage) -> None:
-        self.cuts = Cuts()
-        """The cached cuts, shared with flat views."""
+        self.cuts = Cuts()  # the cached cuts, shared with flat views
         self._lines = CutLines(stage)
         super().__init__(stage)
 
@@ -284,8 +282,7 @@ class PolygonActor:
 
     def __init__(self, stage: Stage, name: str, pickable: bool = True) -> None:
         # The plotter refuses an empty data set, which a section may have.
-        self.shape = pv.PolyData(np.zeros((3, 3)), faces=[3, 0, 1, 2])
-        """The data set that is drawn."""
+        self.shape = pv.PolyData(np.zeros((3, 3)), faces=[3, 0, 1, 2])  # the data set that is drawn
         self.shape.cell_data[VALUES] = np.zeros(1)
         self.actor = stage.add(self.shape, name, lighting=False, pickable=pickable)
         self.mapper = self.actor.mapper
@@ -337,8 +334,7 @@ class Instances:
     def __init__(self, stage: Stage, base: PolygonActor) -> None:
         self.stage = stage
         self.base = base
-        self.drawn: dict[int, Any] = {}
-        """The instances by number."""
+        self.drawn: dict[int, Any] = {}  # the instances by number
 
     def show(self, matrices: Mapping[int, FloatArray]) -> None:
         """Draw an instance for each matrix (4, 4), by number; remove those of other numbers."""

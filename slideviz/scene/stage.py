@@ -48,8 +48,7 @@ class Layer:
 class KeyedLayer(Layer):
     """The base of layers that are drawn anew whenever the key of what they show differs."""
 
-    names: tuple[str, ...] = ()
-    """The names of its actors, removed before each drawing."""
+    names: tuple[str, ...] = ()  # the names of its actors, removed before each drawing
 
     def clear(self) -> None:
         self._key: tuple[object, ...] = ()
@@ -77,18 +76,15 @@ class Stage:
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
         self.plotter = plotter
-        self.scheme = scheme
-        """Colors of background, text and edges."""
-        self.font_scale = font_scale
-        """Factor of the letters' size, for pictures of many pixels."""
+        self.scheme = scheme  # Colors of background, text and edges
+        self.font_scale = font_scale  # factor of the letters' size, for pictures of many pixels
         self.table = lookup_table()
         """The colors of values, and of inverted cells (NaN); changed in place."""
         self.point_words: tuple[tuple[str, str], ...] = ()
         """tuple of (str, str): texts and colors of the legend for the nodes drawn as points."""
         self.ring_words: tuple[tuple[str, str], ...] = ()
         """tuple of (str, str): texts and colors of the legend for the rings."""
-        self.has_legend = True
-        """Whether this scene may have a legend, and leaves its strip free."""
+        self.has_legend = True  # whether this scene may have a legend, and leaves its strip free
         self.has_plate = True
         """Whether the legend has a half-transparent plate; False for a transparent background."""
         self._values: tuple[object, FloatArray] | None = None

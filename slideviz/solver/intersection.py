@@ -173,8 +173,7 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     parts = [mesh.marker(name).cells for name in names]
     if not 0 < sum(map(len, parts)) <= MOST:
         return None
-    types, corners = ([getattr(p, name) for p in parts] for name in ("types", "connectivity"))
-    body = Cells.from_types(np.concatenate(types), np.concatenate(corners))
+    body = Cells.joined(parts)
     hit = self_crossing(after, body)
     if hit is None or self_crossing(mesh.points, body) is not None:
         return None
@@ -299,22 +298,12 @@ def _place(hit: Crossing) -> str:
 def winding_number(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
     """Return the winding number (m,) of a surface around each point: 1 inside it, 0 outside.
 
-    An integer, but for rounding, for any closed surface; close to one where it has small gaps.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-    facets : (f, k) int64
-        The surface, its normals outwards: k = 2 in 2D; 4 in 3D, where a triangle repeats its last
-        node. (``Boundary.facets``)
-    at : (m, d) float64
-        Points that are not on it.
-
-    Notes
-    -----
-    The sum of the signed angles under which the point sees the facets, over the full angle. In 3D
-    the solid angles of two triangles for each quadrilateral, by Van Oosterom and Strackee (IEEE
+    An integer, but for rounding, for any closed surface; close to one where it has small gaps. It
+    is the sum of the signed angles under which the point sees the facets, over the full angle: in
+    3D the solid angles of two triangles for each quadrilateral, by Van Oosterom and Strackee (IEEE
     Trans. Biomed. Eng. 30, 1983).
+    ``facets`` (f, k): the surface, its normals outwards, as of a ``Boundary``.
+    ``at`` (m, d): points that are not on it.
     """
     if facets.shape[1] == 2:
         return np.array([_winding_2d(points[facets] - p) for p in at])

@@ -37,7 +37,6 @@ from slideviz.solver.prescribed import (
 )
 
 if TYPE_CHECKING:
-    from slideviz.baselines.idw import Weights
     from slideviz.elastic.conditions import Body
     from slideviz.elastic.relaxation import Relaxation
 
@@ -293,9 +292,10 @@ def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
 ) -> Callable[[Problem, PhaseTimer], Solution]:
     if case.method == "idw":
-        from slideviz.baselines.idw import deform_idw
+        from slideviz.baselines.idw import Weights, deform_idw
 
-        return partial(deform_idw, weights=idw_weights(case, mesh.dim))
+        weights = Weights(case.idw_power or float(mesh.dim), case.idw_fixed_weight)
+        return partial(deform_idw, weights=weights)
     if case.method == "elastic":
         from slideviz.elastic.linear import deform_elastic
 
@@ -338,13 +338,6 @@ def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
     from slideviz.elastic.stiffness import blocks
 
     return Body(blocks(without_halo(mesh)[0].cells), frame, axis)
-
-
-def idw_weights(case: Case, dim: int) -> Weights:
-    """Return the settings of inverse distance weighting; its power is ``dim`` if none is given."""
-    from slideviz.baselines.idw import Weights
-
-    return Weights(case.idw_power or float(dim), case.idw_fixed_weight)
 
 
 def _candidates(classes: Classes, known: IntArray) -> int:

@@ -35,8 +35,7 @@ RIGID = 0.99
 """Nodes that walls carry with a share above this stay where they carry them in relaxation."""
 
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
-ALIKE = 1.1
-"""A shorter step may go farther than the straight paths of a longer one by this factor."""
+ALIKE = 1.1  # a shorter step may go farther than the straight paths of a longer one by this factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,8 @@ class Stepping:
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
-            timer = PhaseTimer(self._phase_report(index + 1, total), seconds)
+            at = index + 1, total
+            timer = PhaseTimer(lambda *now, at=at: self.report(Progress(*at, *now)), seconds)
             goal = setup.coords[setup.known] + setup.target * part
             solution = one_step(setup.at_step(len(ahead) == 1), coords, goal, timer, before)
             moved = displaced_coords(setup, coords, value(solution.displacement), goal)
@@ -188,9 +188,6 @@ class Stepping:
             if self.rate is not None or not self.quality_of([step]).inverted:
                 raise
             return float(misfits(*state).max()), [f"step {step.index}: {problem}"]
-
-    def _phase_report(self, index: int, total: int) -> Callable[[str, float], None]:
-        return lambda phase, fraction: self.report(Progress(index, total, phase, fraction))
 
     def _made(
         self,

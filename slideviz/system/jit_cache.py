@@ -109,6 +109,10 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
 
 
+OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+"""Options of `njit` for loops over arrays; division by zero gives inf or NaN."""
+
+
 def njit(**options: Any) -> Callable[[Callable], Any]:
     """Return Numba's decorator ``njit`` with ``options``, and always with this module's cache."""
 

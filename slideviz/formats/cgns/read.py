@@ -102,8 +102,8 @@ def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> 
 
 def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
     """Return the cells of all zones together, with the node ``numbers`` of `Joined`."""
-    flats = [number[part.connectivity] for part, number in zip(parts, numbers, strict=True)]
-    return Cells.from_types(np.concatenate([part.types for part in parts]), np.concatenate(flats))
+    each = zip(parts, numbers, strict=True)
+    return Cells.joined([Cells.from_types(c.types, n[c.connectivity]) for c, n in each])
 
 
 def _markers(
@@ -140,7 +140,7 @@ def _markers(
         )
     if not groups:
         return smooth_parts(mesh, outer_facets(mesh)), tuple(remarks)
-    markers = [Marker(name, _together(parts)) for name, parts in groups.items()]
+    markers = [Marker(name, Cells.joined(parts)) for name, parts in groups.items()]
     return tuple(markers), tuple(remarks)
 
 
@@ -168,7 +168,7 @@ def _add_open(
     groups: dict[str, list[Cells]], remarks: list[str], zones: Sequence[CgnsZone], joined: Joined
 ) -> None:
     """Add the facets of open interfaces that are in no group yet, and remarks on these."""
-    known = _together([part for parts in groups.values() for part in parts])
+    known = Cells.joined([part for parts in groups.values() for part in parts])
     names: dict[object, str] = {}
     taken = list(groups)
     for one in joined.open:
@@ -191,15 +191,6 @@ def _free_name(one: Interface, taken: Sequence[str]) -> str:
         number += 1
         name = f"{one.node.name}_{number}"
     return name
-
-
-def _together(parts: Sequence[Cells]) -> Cells:
-    if not parts:
-        return Cells.from_blocks([])
-    return Cells.from_types(
-        np.concatenate([part.types for part in parts]),
-        np.concatenate([part.connectivity for part in parts]),
-    )
 
 
 def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:

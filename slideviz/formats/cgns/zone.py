@@ -101,10 +101,7 @@ def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
                 f"its ElementRange begins with {start}, but another section has the elements to "
                 f"{end - 1}; the ranges of sections must not overlap: export the mesh again"
             )
-    cells = Cells.from_types(
-        np.concatenate([part.types for _, part, _ in parts]),
-        np.concatenate([part.connectivity for _, part, _ in parts]),
-    )
+    cells = Cells.joined([part for _, part, _ in parts])
     numbers = [np.arange(start, start + len(part)) for start, part, _ in parts]
     section = np.repeat(np.arange(len(parts)), [len(part) for _, part, _ in parts])
     return CgnsElements(cells, np.concatenate(numbers), section), [node for *_, node in parts]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -155,15 +155,9 @@ def in_node_sets(
     for name, chosen in sorted(members.items(), key=lambda item: len(item[1])):
         inside = np.zeros(n_points, bool)
         inside[chosen] = True
-        for vtk, ids, nodes in _rows(facets):
+        for vtk, (ids, nodes) in facets.by_type.items():
             taken = free[ids] & inside[nodes].all(axis=1)
             free[ids[taken]] = False
             if taken.any():
                 sets_of[name].append((vtk, nodes[taken]))
     return sets_of
-
-
-def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:
-    """Yield VTK identifier, element indices (m,) and nodes (m, n) of each type."""
-    for vtk, (ids, nodes) in cells.by_type.items():
-        yield vtk, ids, nodes

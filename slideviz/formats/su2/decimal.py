@@ -7,15 +7,10 @@ and for words that are no plain decimal numbers, no result is returned: the call
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.system.jit_cache import njit
-
-OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
-"""Options of `njit` for the loops over text."""
+from slideviz.system.jit_cache import OPTIONS, njit
 
 _LEAST, _MOST = -342, 308  # powers of ten beyond which a number of 19 digits is zero or infinite
 _DIGITS = 19  # how many decimal digits fit into 64 bits

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.formats.su2 import KEYWORD, ROWS, TEXT
-from slideviz.formats.su2.decimal import OPTIONS, U10, U48, decimal, ends
+from slideviz.formats.su2.decimal import U10, U48, decimal, ends
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
 
 @njit(inline="always", **OPTIONS)

@@ -73,8 +73,10 @@ def _zone_text(mesh: Mesh) -> Iterator[bytes]:
     kept: list[bytes] = []
     if isinstance(document, Document):
         places = (*document.sends, *document.unknown)
-        kept = [_with_line_break(document.raw[a:b]) for a, b in places]
-    yield from _whole_zone(mesh)
+        texts = (document.raw[a:b] for a, b in places)
+        kept = [text if text.endswith(b"\n") else text + b"\n" for text in texts]
+    cells = len(mesh.cells), partial(_some, mesh.cells)
+    yield from _zone(mesh.dim, cells, (len(mesh.points), lambda i, j: mesh.points[i:j]))
     yield from _markers(mesh.markers, len(document.sends) if isinstance(document, Document) else 0)
     yield from (text for text in kept if boxes is None or not is_ffd(text))
     yield boxes or b""
@@ -245,14 +247,6 @@ def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) ->
     yield from ordered_map(partial(_point_rows, points[1]), _blocks(points[0]))
 
 
-def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
-    yield from _zone(
-        mesh.dim,
-        (len(mesh.cells), partial(_some, mesh.cells)),
-        (len(mesh.points), lambda i, j: mesh.points[i:j]),
-    )
-
-
 def _some(cells: Cells, i: int, j: int) -> Cells:
     """Return the cells ``i`` to ``j - 1``, with offsets that begin as in ``cells``, not with 0."""
     offsets = cells.offsets[i : j + 1]
@@ -292,7 +286,3 @@ def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
     index = block[0] if numbered else -1
     size = print_cells(some.types, some.offsets, some.connectivity, index, out)
     return out[:size].tobytes()
-
-
-def _with_line_break(text: bytes) -> bytes:
-    return text if text.endswith(b"\n") else text + b"\n"

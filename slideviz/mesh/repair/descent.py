@@ -10,18 +10,15 @@ from slideviz.mesh.jacobians import LANES
 from slideviz.mesh.model import FloatArray
 from slideviz.system.jit_cache import njit
 
-CORRECTIONS = 15
-"""Pairs of steps and changes of the gradient that L-BFGS remembers."""
+CORRECTIONS = 15  # pairs of steps and changes of the gradient that L-BFGS remembers
 
 ARMIJO, WOLFE = 1e-4, 0.9
 """A step must bring this part of the decrease that the slope promises, and leave at most this part
 of the slope."""
 
-TRIES = 30
-"""Most evaluations of a line search."""
+TRIES = 30  # most evaluations of a line search
 
-WINDOW = 10
-"""Iterations over which the decrease of the value is looked at."""
+WINDOW = 10  # iterations over which the decrease of the value is looked at
 
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 """Returns value and gradient (b, d) at unknowns (b, d)."""
@@ -112,19 +109,12 @@ def descend(
 ) -> FloatArray:
     """Return the unknowns (b, d) to which L-BFGS comes from ``start`` (b, d).
 
-    Parameters
-    ----------
-    function : callable
-        May return infinity for the value where a step is too long.
-    precondition : callable
-        Takes a gradient (b, d), returns about the inverse Hessian times it.
-    longest : callable
-        The longest step from unknowns along a direction, at most infinity.
-    iterations : int
-        Most of them.
-    decrease : callable
-        Called after each iteration: it ends where `WINDOW` of them lowered the value by less than
-        this part.
+    ``function``: may return infinity for the value where a step is too long.
+    ``precondition``: takes a gradient (b, d), returns about the inverse Hessian times it.
+    ``longest``: the longest step from unknowns along a direction, at most infinity.
+    ``iterations``: most of them.
+    ``decrease``: called after each iteration: it ends where `WINDOW` of them lowered the value by
+    less than this part.
     """
     x = start
     value, gradient = function(x)

@@ -22,19 +22,16 @@ from slideviz.mesh.jacobians import (
     CORNER_AT,
     CORNERS,
     LANES,
-    OPTIONS,
     coefficients,
     gather,
     write_coefficients,
 )
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.system.jit_cache import njit
+from slideviz.system.jit_cache import OPTIONS, njit
 
-LEAST_SCALE = 0.1
-"""Least coefficient of a target, over its mean one."""
+LEAST_SCALE = 0.1  # least coefficient of a target, over its mean one
 
-LEAST_LENGTH = 1e-9
-"""Least length of a target's edge, over its longest one."""
+LEAST_LENGTH = 1e-9  # least length of a target's edge, over its longest one
 
 LEAST_SINE = 0.01
 """Least Jacobian of a target's corner over the product of its edges; flatter ones are opened."""
@@ -45,26 +42,18 @@ class Targets:
     """Cells of one type, and the shapes that the energy compares them with."""
 
     vtk: int
-    nodes: IntArray
-    """(m, n)"""
-    scale: FloatArray
-    """(k, m): factors of the coefficients that make D of them."""
+    nodes: IntArray  # (m, n)
+    scale: FloatArray  # (k, m): factors of the coefficients that make D of them
     shape: FloatArray
     """(c, 1 + s, m): of each corner, the factor of its Jacobian, and the matrix G with
     ``tr(JᵀJ) = Σ G_ij e_i·e_j``: diagonal, then 01 (2D) or 01, 12, 20 (3D)."""
 
 
 def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Targets:
-    """Return the targets of cells of one type.
+    """Return the targets of cells of one type, ``nodes`` (m, n).
 
-    Parameters
-    ----------
-    nodes : (m, n)
-        Nodes of the cells.
-    at : (m, n, d)
-        Corner points of the target of each.
-    signs : (m,)
-        1, or -1 for a target that is numbered the other way round.
+    ``at`` (m, n, d): corner points of the target of each. ``signs`` (m,): 1, or -1 for a target
+    that is numbered the other way round.
     """
     (m, _, d), table = at.shape, CORNERS[vtk]
     found = coefficients(vtk, at.T) * signs

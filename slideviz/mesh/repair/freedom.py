@@ -29,12 +29,9 @@ class Freedom:
 
     place: IntArray
     """(n,): the block of each node, from 0; -1 for a node that is held (moving, fixed)."""
-    bound: IntArray
-    """(m,): the nodes of blocks, ascending, whose map is not the identity."""
-    maps: FloatArray
-    """(m, d, d): their maps T_i."""
-    curved: IntArray
-    """(s,): the nodes, ascending, that slide on a boundary that may be curved."""
+    bound: IntArray  # (m,): the nodes of blocks, ascending, whose map is not the identity
+    maps: FloatArray  # (m, d, d): their maps T_i
+    curved: IntArray  # (s,): the nodes, ascending, that slide on a boundary that may be curved
     project: Project | None = None
     """Puts them back after each outer round; None if no boundary is curved."""
 

@@ -30,12 +30,9 @@ def lift_energy(
 ) -> tuple[float, FloatArray]:
     """Return the sum over the cells of a patch, and its gradient (b, d); infinity beyond beta.
 
-    Parameters
-    ----------
-    signs, sums : (m,)
-        Of the patch's cells, in its order, as `slideviz.mesh.orientation.reference_of` has them.
-    sized : bool
-        Whether the quality compares sizes: whether there is an undeformed mesh.
+    ``signs``, ``sums`` (m,): of the patch's cells, in its order, as `reference_of` in
+    `slideviz.mesh.orientation` has them. ``sized``: whether the quality compares sizes: whether
+    there is an undeformed mesh.
     """
     points = patch.points(unknowns)
 

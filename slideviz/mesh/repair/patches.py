@@ -21,14 +21,11 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import cores
 
-CHUNK = 4 * LANES
-"""Least number of cells that a thread works on at a time."""
+CHUNK = 4 * LANES  # least number of cells that a thread works on at a time
 
-SAFE, NEAR = 4.0, 0.9
-"""Longest step that is looked at, and the part of the safe one that is taken."""
+SAFE, NEAR = 4.0, 0.9  # longest step that is looked at, and the part of the safe one that is taken
 
-FLAT = 1e-12
-"""Curvature of a block, over its largest one, below which a direction counts as held."""
+FLAT = 1e-12  # curvature of a block, over its largest one, below which a direction counts as held
 
 
 def find_patches(
@@ -86,18 +83,10 @@ class Patch:
     def __init__(
         self, points: FloatArray, freedom: Freedom, parts: list[Targets], pool: Executor
     ) -> None:
-        """Take a patch.
+        """Take a patch: the points (k, d) of its nodes, their freedom, and its cells.
 
-        Parameters
-        ----------
-        points : (k, d)
-            Of its nodes.
-        freedom : Freedom
-            Of them; each block moves.
-        parts : list
-            Its cells; their nodes count from 0.
-        pool : Executor
-            Does chunks of cells.
+        Each block of the freedom moves. The nodes of the cells count from 0. ``pool`` does chunks
+        of cells.
         """
         self.start, self.freedom, self.parts = points, freedom, parts
         self.blocks = int(freedom.place.max(initial=-1)) + 1

@@ -29,17 +29,13 @@ from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.system.threads import cores
 from slideviz.terms import SkewMetric
 
-RINGS = 3, 5, 8, 13, 21
-"""Rings of cells around bad ones; a patch that fails grows to the next."""
+RINGS = 3, 5, 8, 13, 21  # rings of cells around bad ones; a patch that fails grows to the next
 
-FEW = 5000
-"""Most cells of a patch that grows to the last two."""
+FEW = 5000  # most cells of a patch that grows to the last two
 
-POOR = 2
-"""Number of sizes that are tried for patches whose cells are all proved, but some too low."""
+POOR = 2  # number of sizes that are tried for patches whose cells are all proved, but some too low
 
-ROUNDS, VAIN = 40, 10
-"""Most outer rounds of a patch, and those in a row that may mend nothing."""
+ROUNDS, VAIN = 40, 10  # most outer rounds of a patch, and those in a row that may mend nothing
 
 ITERATIONS, DECREASE, ENOUGH, POLISH = 200, 5e-3, 0.01, 1e-4
 """Most iterations of a descent, and the least relative decrease of the energy in ten of them: while
@@ -49,8 +45,7 @@ LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
 """Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
 over the largest 1 / quality, and the least relative gain, of which two rounds may bring less."""
 
-TREND = 5
-"""Rounds of a lift after which it ends if it will not reach the limit."""
+TREND = 5  # rounds of a lift after which it ends if it will not reach the limit
 
 SHAPE = 10.0
 """Weight of the energy of shape beside that of the lift, which does not see short edges."""
@@ -59,8 +54,7 @@ FLAT_SIDE = 1e-6
 """Sine of the angle between the normals of a side's corners, up to which it is flat. In a flat side
 that folds on itself the Jacobian vanishes, wherever the other nodes are."""
 
-BELOW = 0.1
-"""Cells of a lower quality are mended, too."""
+BELOW = 0.1  # cells of a lower quality are mended, too
 
 Report = Callable[[float], object]
 """Called with the fraction that is done; what it raises ends the repair."""
@@ -71,8 +65,7 @@ class Impossible:
     """A cell that no motion of free nodes mends."""
 
     cell: int
-    nodes: IntArray
-    """(k,): its nodes that are held and make it fold, ascending."""
+    nodes: IntArray  # (k,): its nodes that are held and make it fold, ascending
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +76,7 @@ class Region:
     nodes: IntArray
     """`cells`, `nodes` (m,), (n,): the numbers of its cells and nodes in the mesh, ascending."""
     mesh: Mesh
-    reference: Mesh | None
-    """`mesh`, `reference`: the region itself, as it is now and undeformed."""
+    reference: Mesh | None  # `mesh`, `reference`: the region itself, as it is now and undeformed
     freedom: Freedom
 
 
@@ -105,20 +97,15 @@ class Regions(Protocol):
 class Repaired:
     """A mesh after repair."""
 
-    points: FloatArray
-    """(n, d)"""
+    points: FloatArray  # (n, d)
     bad_before: IntArray
     bad_after: IntArray
     """`bad_before`, `bad_after` (k,): the cells, ascending, that are not proved valid, or whose
     quality is too low."""
-    folded_after: IntArray
-    """(f,): those of `bad_after` that are not proved valid."""
-    moved: IntArray
-    """(m,): the nodes that were moved, ascending."""
-    largest_move: float
-    """The longest way of a node, in the mesh's length unit."""
-    impossible: tuple[Impossible, ...]
-    """The cells that cannot be mended; they are in ``bad_after``."""
+    folded_after: IntArray  # (f,): those of `bad_after` that are not proved valid
+    moved: IntArray  # (m,): the nodes that were moved, ascending
+    largest_move: float  # the longest way of a node, in the mesh's length unit
+    impossible: tuple[Impossible, ...]  # the cells that cannot be mended; they are in bad_after
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +120,7 @@ class _Work:
     metric: SkewMetric
     below: float
     report: Callable[[float], object]
-    hopeless: NDArray[np.bool_]
-    """(m,): cells that cannot be mended, which no energy counts."""
+    hopeless: NDArray[np.bool_]  # (m,): cells that cannot be mended, which no energy counts
     pool: ThreadPoolExecutor
 
 
@@ -150,22 +136,14 @@ def repair(
     """Return the mesh's points with bad cells mended: those not proved valid, or too low.
 
     Raises MeshError as `quality` does.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh with bad cells.
-    freedom : Freedom
-        Which of its nodes may move, and how.
-    reference : Mesh, optional
-        The undeformed mesh, whose shapes the cells shall have. Without it they shall have the
-        ideal shape of their type, in the local size.
-    below : float
-        Limit of the quality, from 0 to 1; with 0, only cells that are not proved valid are bad.
-    metric : {"knupp", "rbf-slide"}
-        Of the quality (`slideviz.mesh.quality.Quality`).
-    report : callable
-        Called with the fraction that is done; may raise, to cancel.
+    ``mesh``: the mesh with bad cells.
+    ``freedom``: which of its nodes may move, and how.
+    ``reference``: the undeformed mesh, whose shapes the cells shall have. Without it they shall
+    have the ideal shape of their type, in the local size.
+    ``below``: limit of the quality, from 0 to 1; with 0, only cells that are not proved valid are
+    bad.
+    ``metric``: of the quality (`slideviz.mesh.quality.Quality`).
+    ``report``: called with the fraction that is done; may raise, to cancel.
     """
     shapes = None if reference is None else checked_reference(reference, mesh)
     before = np.flatnonzero(is_bad(quality(mesh, shapes, metric), below))
