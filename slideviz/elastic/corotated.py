@@ -24,12 +24,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from slideviz.elastic.stiffness import (
-    POISSON,
-    ReferenceShape,
-    ShapeBlock,
-    cell_volumes,
-)
+from slideviz.elastic.stiffness import POISSON, ReferenceShape, ShapeBlock, cell_volumes
 from slideviz.mesh.jacobians import add3, cross3, dot3
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.polar import rotation, spin

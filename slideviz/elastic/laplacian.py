@@ -81,11 +81,7 @@ class LaplacianCycle:
 
     @classmethod
     def of(
-        cls,
-        body: Corotated,
-        place: IntArray,
-        held: np.ndarray,
-        axes: FloatArray,
+        cls, body: Corotated, place: IntArray, held: np.ndarray, axes: FloatArray
     ) -> LaplacianCycle:
         """Return the cycle of an elastic body.
 

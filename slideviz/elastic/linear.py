@@ -23,13 +23,7 @@ from slideviz.elastic.conditions import (
     unknowns,
 )
 from slideviz.elastic.forces import Forces
-from slideviz.elastic.multigrid import (
-    Level,
-    LinearSolution,
-    conjugate_gradients,
-    hierarchy,
-    solve,
-)
+from slideviz.elastic.multigrid import Level, LinearSolution, conjugate_gradients, hierarchy, solve
 from slideviz.elastic.stiffness import assemble
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis

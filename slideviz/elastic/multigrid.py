@@ -73,11 +73,7 @@ class Level:
 
 
 def solve(
-    matrix: bsr_array,
-    right: FloatArray,
-    modes: FloatArray,
-    start: FloatArray,
-    tick: Tick = no_tick,
+    matrix: bsr_array, right: FloatArray, modes: FloatArray, start: FloatArray, tick: Tick = no_tick
 ) -> LinearSolution:
     """Solve a symmetric positive definite system; x = 0 where the right-hand side is zero.
 

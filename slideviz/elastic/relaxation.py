@@ -281,11 +281,7 @@ def _grown(graph: csr_array, cap: FloatArray) -> FloatArray:
 
 
 def blended(
-    problem: Problem,
-    before: Array,
-    after: Array,
-    theta: FloatArray,
-    tie: Callable[[Array], Array],
+    problem: Problem, before: Array, after: Array, theta: FloatArray, tie: Callable[[Array], Array]
 ) -> Array:
     """Return the displacement that is the parts (n, 1) of the way from ``before`` to ``after``."""
     if (theta == 1.0).all() or (theta == 0.0).all():

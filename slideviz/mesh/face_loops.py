@@ -8,16 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.jacobians import (
-    LANES,
-    add3,
-    cross3,
-    dot3,
-    edge,
-    gather,
-    half_sum,
-    minus3,
-)
+from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather, half_sum, minus3
 from slideviz.system.jit_cache import OPTIONS, njit
 
 

@@ -13,7 +13,7 @@ coordinates and determinants is subtracted (`ROUNDING`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from math import floor
 from typing import TYPE_CHECKING, Any
@@ -21,13 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import (
-    CORNERS,
-    LANES,
-    LEVELS,
-    gather,
-    write_coefficients,
-)
+from slideviz.mesh.jacobians import CORNERS, LANES, LEVELS, gather, write_coefficients
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import FARTHEST
@@ -74,7 +68,6 @@ def margins(
     cells: Cells,
     cap: float,
     signs: NDArray[np.int8] | None = None,
-    going_on: Callable[[], object] = lambda: None,
 ) -> FloatArray:
     """Return the margins (m,) of cells along ``points + s * displacement``, from 0 to ``cap``.
 
@@ -83,7 +76,6 @@ def margins(
     ``points``, ``displacement`` (n, d), and cells of dimension d.
     ``cap``: largest margin that is looked for; positive, finite.
     ``signs`` (m,): 1, or -1 for a cell that is numbered the other way round; without it all are 1.
-    ``going_on``: called every few thousand cells; what it raises ends the work.
     """
     found = np.empty(len(cells))
     turns = np.ones(len(cells), np.int8) if signs is None else signs
@@ -94,7 +86,7 @@ def margins(
         _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
         found[ids] = values
 
-    cells.in_parts(of_part, going_on)
+    cells.in_parts(of_part)
     return found
 
 

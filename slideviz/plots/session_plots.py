@@ -19,7 +19,7 @@ from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
-from slideviz.plots.spanwise import Profile, along, along_radius, along_span
+from slideviz.plots.spanwise import Profile, along, in_layers
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
@@ -130,11 +130,9 @@ class Profiles:
             if coordinate == "span":
                 walls = walls_in(session)
                 span = walls.span(walls.field.meridional(mesh.points))
-                made = along_span(mesh, values, span, label=label)
-            elif coordinate == "r":
-                made = along_radius(mesh, values, case.axis, case.origin, label=label)
+                made = in_layers(mesh, values, span, coordinate, label=label)
             else:
-                made = along(mesh, values, coordinate, label=label)
+                made = along(mesh, values, coordinate, case.axis, case.origin, label=label)
             cache[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
         return cache[key]
 

@@ -28,9 +28,7 @@ class Profile:
     """Quality in layers from one end of the span to the other."""
 
     label: str  # name of the run
-    coordinate: str
-    """The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, ``span``, or ``s`` for another
-    direction."""
+    coordinate: str  # of the layers: r, x, y, z or span
     edges: FloatArray  # (k + 1,): borders of the layers, in the mesh's length unit
     minimum: FloatArray
     mean: FloatArray
@@ -50,73 +48,50 @@ class Profile:
         return (self.position - self.edges[0]) / (self.edges[-1] - self.edges[0])
 
 
-def along_radius(
-    mesh: Mesh,
-    values: FloatArray,
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
-    origin: Sequence[float] = (0.0, 0.0, 0.0),
-    layers: int | None = None,
-    label: str = "",
-) -> Profile:
-    """Return the quality in layers of equal height along the radius about an axis.
-
-    ``mesh``: the deformed mesh, or the undeformed one to keep layers of cells together. ``values``
-    (m,): one for each cell. ``axis`` and ``origin``: a direction and a point. ``layers``: at least
-    1; by default one for each layer of cells of usual height, 40 at most. Raises SlidevizError if
-    there is not a value for each cell, no layer, or the mesh has no span, and MeshError if the axis
-    has length zero.
-    """
-    local = in_axis_frame(mesh.points, axis, origin)
-    return _profile(
-        mesh, values, np.hypot(local[:, 0], local[:, 1]), coordinate="r", layers=layers, label=label
-    )
-
-
 def along(
     mesh: Mesh,
     values: FloatArray,
-    direction: Sequence[float] | Literal["x", "y", "z"] = "z",
+    coordinate: Literal["r", "x", "y", "z"],
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+    *,
     layers: int | None = None,
     label: str = "",
 ) -> Profile:
-    """Return the quality in layers of equal height along a direction; as `along_radius`.
+    """Return the quality in layers of equal height along x, y or z, or along the radius.
 
-    Raises SlidevizError if there is not a value for each cell, no layer, or the mesh has no span
-    that way.
+    ``mesh``: the deformed mesh, or the undeformed one to keep layers of cells together. ``axis``
+    and ``origin``: of the radius, a direction and a point. The rest is as of `in_layers`, as are
+    its errors; raises SlidevizError, too, if the mesh has no such direction, and MeshError if the
+    axis has length zero.
     """
-    name = direction if isinstance(direction, str) else "s"
-    axis = np.eye(3)["xyz".index(name)] if isinstance(direction, str) else np.array(direction)
-    axis = np.asarray(axis, float)[: mesh.dim]
-    length = float(np.linalg.norm(axis))
-    if not length > 0:
+    if coordinate == "r":
+        local = in_axis_frame(mesh.points, axis, origin)
+        height = np.hypot(local[:, 0], local[:, 1])
+    elif "xyz".index(coordinate) < mesh.dim:
+        height = mesh.points[:, "xyz".index(coordinate)]
+    else:
         raise SlidevizError(
-            f"direction {direction!r} has no length in this {mesh.dim}D mesh; choose another"
+            f"direction {coordinate!r} has no length in this {mesh.dim}D mesh; choose another"
         )
-    return _profile(
-        mesh, values, mesh.points @ axis / length, coordinate=name, layers=layers, label=label
-    )
+    return in_layers(mesh, values, height, coordinate, layers=layers, label=label)
 
 
-def along_span(
-    mesh: Mesh, values: FloatArray, span: FloatArray, layers: int | None = None, label: str = ""
-) -> Profile:
-    """Return the quality in layers of equal span; as `along_radius`. ``span`` (n,): of each node.
-
-    Raises SlidevizError if there is not a value for each cell, or no layer.
-    """
-    return _profile(mesh, values, span, coordinate="span", layers=layers, label=label)
-
-
-def _profile(
+def in_layers(
     mesh: Mesh,
     values: FloatArray,
     height: FloatArray,
-    *,
     coordinate: str,
-    layers: int | None,
-    label: str,
+    *,
+    layers: int | None = None,
+    label: str = "",
 ) -> Profile:
-    """Return the quality in layers of nodal coordinates ``height`` (n,); see `along_radius`."""
+    """Return the quality in layers of equal height, of nodal coordinates ``height`` (n,).
+
+    ``values`` (m,): one for each cell. ``layers``: at least 1; by default one for each layer of
+    cells of usual height, 40 at most. Raises SlidevizError if there is not a value for each cell,
+    no layer, or the mesh has no span.
+    """
     cells = mesh.cells
     if len(values) != len(cells):
         raise SlidevizError(

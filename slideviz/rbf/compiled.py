@@ -40,12 +40,7 @@ def one_at_a_time(pairs: int) -> Iterator[None]:
             set_num_threads(threads)
 
 
-OPTIONS: dict[str, Any] = {
-    "nogil": True,
-    "fastmath": True,
-    "cache": True,
-    "error_model": "numpy",
-}
+OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": True, "cache": True, "error_model": "numpy"}
 
 # (1 - cos g) / g^2 as a polynomial in t = g^2. The arguments of Eq. 2.15 stay below 2 (a full
 # turn), where nine terms are right to 4e-13; below 1 (half a turn) to the last bit.

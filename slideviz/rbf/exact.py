@@ -126,12 +126,7 @@ class ExactFit:
         return polynomial(terms[np.concatenate(kept)], along, across)
 
     def _checked(
-        self,
-        rows: ConstraintRows,
-        part: IntArray,
-        right: FloatArray,
-        found: FloatArray,
-        tick: Tick,
+        self, rows: ConstraintRows, part: IntArray, right: FloatArray, found: FloatArray, tick: Tick
     ) -> tuple[FloatArray, IntArray]:
         """Return the weights of the rows ``part``, one block, and the rows that they do not meet.
 

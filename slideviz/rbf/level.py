@@ -378,13 +378,7 @@ class GreedyLevel:
         self.increment = replace(found, levels=(row_keys(self._among.rows)[self.chosen],))
 
     def pick(
-        self,
-        rows: IntArray,
-        residual: FloatArray,
-        *,
-        count: int,
-        floor: float,
-        target: FloatArray,
+        self, rows: IntArray, residual: FloatArray, *, count: int, floor: float, target: FloatArray
     ) -> bool:
         """Run the Newton greedy on a pool's rows and append what it picks to the factors.
 

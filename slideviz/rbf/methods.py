@@ -266,11 +266,7 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
 
 
 def correct(
-    problem: Problem,
-    displacement: FloatArray,
-    nodes: IntArray,
-    correction: Correction,
-    tick: Tick,
+    problem: Problem, displacement: FloatArray, nodes: IntArray, correction: Correction, tick: Tick
 ) -> None:
     """Add the correction to ``displacement`` (n, d), except at boundary nodes ``nodes`` (b,)."""
     free = np.ones(len(displacement), bool)

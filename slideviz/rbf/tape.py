@@ -187,10 +187,7 @@ def length(x: Array) -> Array:
     v = value(x)
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     unit = v / np.where(size > 0, size, 1.0)
-    return recorded(
-        size,
-        (x, lambda t: (t * unit).sum(axis=-1, keepdims=True), lambda g: g * unit),
-    )
+    return recorded(size, (x, lambda t: (t * unit).sum(axis=-1, keepdims=True), lambda g: g * unit))
 
 
 def unit(x: Array) -> Array:
@@ -222,11 +219,7 @@ def transform(matrices: FloatArray, x: Array) -> Array:
     back = "...ed,...e->...d"
     return recorded(
         np.einsum(there, matrices, value(x)),
-        (
-            x,
-            lambda t: np.einsum(there, matrices, t),
-            lambda g: np.einsum(back, matrices, g),
-        ),
+        (x, lambda t: np.einsum(there, matrices, t), lambda g: np.einsum(back, matrices, g)),
     )
 
 

@@ -11,14 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.sections.around_axis import (
-    TURN,
-    Patch,
-    PlaceOnSection,
-    Quadric,
-    axis_shape,
-    patch_of,
-)
+from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, Quadric, axis_shape, patch_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 

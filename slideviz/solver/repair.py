@@ -216,14 +216,7 @@ def mend(
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
-    done = mend_cells(
-        domain,
-        freedom,
-        shapes,
-        below=limit,
-        metric=case.quality_metric,
-        report=tick,
-    )
+    done = mend_cells(domain, freedom, shapes, below=limit, metric=case.quality_metric, report=tick)
     points = done.points
     if now.halo is not None:
         beyond = np.flatnonzero(np.isin(now.halo.receivers, now.halo.outer))

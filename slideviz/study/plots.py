@@ -18,7 +18,7 @@ from slideviz.plots.draw import against_steps, convergence, quality_by_step
 from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.plots.histogram import histogram
 from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
-from slideviz.plots.spanwise import Profile, along, along_radius, spanwise
+from slideviz.plots.spanwise import Profile, along, spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
 from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
@@ -101,10 +101,7 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
 
     def profile(line: FacetLine) -> Profile:
         values = result_of(line).quality.values
-        if where == "r":
-            made = along_radius(mesh, values, axis, origin, label=line.label)
-        else:
-            made = along(mesh, values, where, label=line.label)
+        made = along(mesh, values, where, axis, origin, label=line.label)
         return replace(made, series=line.series)
 
     return profile

@@ -9,7 +9,7 @@ import pytest
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.plots import session_plots
-from slideviz.plots.spanwise import along, along_radius
+from slideviz.plots.spanwise import along
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
@@ -90,7 +90,7 @@ def test_the_radius_is_that_about_the_axis_of_the_case(session):
     for origin in ((0.0, 0.0, 0.0), (4.0, 4.0, 0.0)):
         moved = changes.set_case(session, origin=origin)
         (found,) = profiles.of(moved, "r")
-        wanted = along_radius(session.mesh, session.first.quality.values, origin=origin)
+        wanted = along(session.mesh, session.first.quality.values, "r", origin=origin)
         assert found.edges.tolist() == wanted.edges.tolist()
         assert found.count.tolist() == wanted.count.tolist()
 

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.plots.spanwise import along, along_radius, spanwise
+from slideviz.plots.spanwise import along, spanwise
 
 
 def strip(count=4):
@@ -40,14 +40,6 @@ def test_a_layer_for_each_layer_of_cells_unless_there_are_many(cells, layers):
     assert len(along(strip(cells), np.ones(cells), "x").count) == layers
 
 
-def test_any_direction_of_any_length():
-    there = along(strip(), np.arange(4.0), (2.0, 0.0), layers=4)
-    back = along(strip(), np.arange(4.0), (-1.0, 0.0, 7.0), layers=4)
-    assert there.minimum.tolist() == [0, 1, 2, 3]
-    assert back.minimum.tolist() == [3, 2, 1, 0]
-    assert there.coordinate == "s"
-
-
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (3.0, 0.0, 0.0), (1.0, 1.0, 0.0)])
 def test_radius_is_counted_about_any_axis(axis):
     from slideviz.mesh.axis_frame import axis_basis
@@ -59,7 +51,7 @@ def test_radius_is_counted_about_any_axis(axis):
     nodes = np.arange(24).reshape(3, 8)
     origin = np.array([5.0, -3.0, 2.0])
     mesh = Mesh(points @ np.stack([e1, e2, e3]) + origin, Cells.from_blocks([(12, nodes)]))
-    profile = along_radius(mesh, np.array([0.7, 0.2, 0.5]), axis, tuple(origin), layers=3)
+    profile = along(mesh, np.array([0.7, 0.2, 0.5]), "r", axis, tuple(origin), layers=3)
     assert profile.minimum.tolist() == [0.7, 0.2, 0.5]
     np.testing.assert_allclose(profile.edges[[0, -1]], [np.hypot(2, 0.5), np.hypot(7, 0.5)])
     assert profile.coordinate == "r"
@@ -74,7 +66,7 @@ def test_what_cannot_be_layered_is_said():
     with pytest.raises(SlidevizError, match=r"'z' has no length in this 2D mesh"):
         along(mesh, np.zeros(4), "z")
     with pytest.raises(MeshError, match=r"axis of rotation has length zero"):
-        along_radius(mesh, np.zeros(4), (0.0, 0.0, 0.0))
+        along(mesh, np.zeros(4), "r", (0.0, 0.0, 0.0))
     flat = Mesh(np.column_stack([mesh.points, np.zeros(10)]), mesh.cells)
     with pytest.raises(SlidevizError, match=r"no extent along z"):
         along(flat, np.zeros(4), "z")

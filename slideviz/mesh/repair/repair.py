@@ -291,11 +291,7 @@ class _Mending:
     """The work on one patch."""
 
     def __init__(
-        self,
-        work: _Work,
-        cells: IntArray,
-        free: NDArray[np.bool_],
-        tell: Callable[[float], object],
+        self, work: _Work, cells: IntArray, free: NDArray[np.bool_], tell: Callable[[float], object]
     ) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
         self.work, self.tell, self.round = work, tell, 0
