@@ -199,6 +199,24 @@ def passage(shape=(4, 6, 8), angle_deg: float = 30.0, kind: str = "plain") -> Me
     )
 
 
+def cut_blade(shape=(4, 6, 8), angle_deg: float = 30.0) -> Mesh:
+    """Annular sector between two blades: the periodic sides per1, per2 go on where these end."""
+    first, last = 2, shape[2] - 2
+    around = ring(shape, angle_deg=angle_deg)
+
+    def place(p: np.ndarray) -> np.ndarray:
+        along = np.clip((p[:, 2] - first) / (last - first), 0.0, 1.0)
+        thick = 0.8 * along * (1.0 - along) * (1.0 - 2.0 * p[:, 1] / shape[1])
+        return around(np.column_stack([p[:, 0], p[:, 1] + thick, p[:, 2]]))
+
+    def on_blade(p: np.ndarray) -> bool:
+        return bool(np.ptp(p[:, 1]) == 0.0 and p[:, 2].min() >= first and p[:, 2].max() <= last)
+
+    names = ("hub", "shroud", "per1", "per2", "inflow", "outflow")
+    hub, shroud, *others = _renamed(shape, names)[:-1]
+    return grid(shape, place=place, rules=[hub, shroud, ("blade", on_blade), *others])
+
+
 def stage(angles=(40.0, 30.0), lengths=(1.0, 0.75)) -> Mesh:
     """Passages of two rows of blades as the zones of one mesh, the second behind the first."""
     front, behind = (passage((4, 6, 8), angle) for angle in angles)

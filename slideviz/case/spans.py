@@ -13,6 +13,7 @@ from slideviz.case.displacement import Displacements, mean_of
 from slideviz.case.model import Case, SpanMotion, applies_to
 from slideviz.errors import CaseError, MeshError, SlidevizError, nearest
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
+from slideviz.machine.gap import bodies
 from slideviz.machine.span import SpanField, find_span
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
@@ -154,7 +155,8 @@ def _blade(
         triangles = np.searchsorted(nodes, np.concatenate([some[:, :3], quads[:, [0, 2, 3]]]))
         stack = None if point is None else np.array(point)
         try:
-            cache[key] = BladeSections(field, mesh.points[nodes], triangles, stack)
+            turns = _turns(case, mesh, nodes[triangles])[nodes]
+            cache[key] = BladeSections(field, mesh.points[nodes], triangles, stack, turns)
         except MeshError as problem:
             raise CaseError(f"motion {places[0] + 1}: {', '.join(names)}: {problem}") from problem
     reached = [
@@ -162,6 +164,21 @@ def _blade(
         for motion in motions
     ]
     return Blade(nodes, cache[key], tuple(places), tuple(motions), tuple(reached))
+
+
+def _turns(case: Case, mesh: Mesh, triangles: IntArray) -> FloatArray:
+    """Return the angles (n,) of all nodes by which parts of a blade are turned to be together.
+
+    ``triangles`` (t, 3): its facets, which periodic sides may cut.
+    """
+    out, sides = np.zeros(len(mesh.points)), case.markers_with("periodic")
+    if sides:
+        inside = without_halo(mesh)[0]
+        pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)
+        images = [pair.nodes if pair.angle > 0.0 else pair.nodes[:, ::-1] for pair in pairs]
+        for body in bodies(triangles, np.unique(np.concatenate(images), axis=0)):
+            out[triangles[body.facets]] = pairs[0].period * body.turns[:, None]
+    return out
 
 
 def prepare_span(case: Case, mesh: Mesh) -> None:

@@ -91,19 +91,27 @@ class BladeSections:
         points: FloatArray,
         triangles: IntArray,
         stack: FloatArray | None = None,
+        turns: FloatArray | None = None,
     ) -> None:
         """Lay the nodes flat, and find stacking points and chords.
 
         ``points`` (n, 3), ``triangles`` (t, 3): of the blade. ``stack`` (3,): a point through which
         the stacking line goes, normal to the curves of constant span; None: a straight line fitted
-        to the centroids of the sections' outlines, in (m', theta) over span.
+        to the centroids of the sections' outlines, in (m', theta) over span. ``turns`` (n,): angles
+        in radians by which parts of a blade that periodic sides cut are turned to be together.
 
         Raises MeshError if the blade has no span, or reaches the axis.
         """
         coords = field.meridional(points)
+        self._turns = np.zeros(len(points)) if turns is None else turns
         middle = coords.mean(axis=0) if stack is None else field.meridional(stack[None])[0]
+        period = np.abs(self._turns).max(initial=0.0)
+        if period > 0.0:  # the point may be at the other side
+            away = (coords[:, 2] + self._turns).mean() - middle[2]
+            middle[2] += period * np.round(away / period)
         self.field, self.curves = field, SpanCurves(field, middle[:2])
         plane = self.curves.plane(coords)
+        plane[:, 1] += self._turns
         self.spans = plane[:, 2]
         self._radius = coords[:, 1]
         self._start = plane[:, 0] + 1j * plane[:, 1]
@@ -146,7 +154,7 @@ class BladeSections:
             else self.curves.at_length(self._length + totals[SWEEP], self.spans)
         )
         flat = self._centre + (swept - start) + 1j * totals[LEAN] / self._radius + shape
-        plane = np.stack([flat.real, flat.imag, self.spans], axis=1)
+        plane = np.stack([flat.real, flat.imag - self._turns, self.spans], axis=1)
         coords, by_plane = self.curves.coords_and_slopes(plane)
         by = np.empty((5, len(flat)), complex)
         by[ANGLE], by[CHORD], by[CAMBER] = 1j * shape, shape, turn * self._camber

@@ -11,10 +11,11 @@ from slideviz.case.check import check_case
 from slideviz.case.motion import displacements
 from slideviz.case.spans import span_field
 from slideviz.errors import CaseError
+from slideviz.mesh.periodic import pair_up
 from slideviz.samples.stator import stator_case, stator_mesh
 from slideviz.samples.table import sample
 from slideviz.session.motions import Ghosts
-from tests.builders import passage, square
+from tests.builders import cut_blade, passage, square
 
 TWIST = sv.SpanMotion("blade", "twist", (0.0, 0.5, 1.0), (0.0, 1.0, 5.0))
 LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.0, 0.02))
@@ -152,3 +153,28 @@ def test_a_blade_of_an_impeller_is_exact_at_each_span_and_folds_no_cell():
     )
     assert np.abs(after - before).max() < 1e-12
     assert sv.quality(last.mesh, row.mesh).inverted == 0
+
+
+@pytest.mark.parametrize(("kind", "value"), [("twist", 6.0), ("lean", 0.02), ("chord", 1.2)])
+def test_a_blade_that_periodic_sides_cut_moves_as_one(kind, value):
+    mesh = cut_blade()
+    case = case_of(sv.SpanMotion("blade", kind, (0.0,), (value,)), periodic="moving", sliding="ps")
+    moved = displacements(case, mesh)
+    shift = np.zeros_like(mesh.points)
+    shift[moved.nodes] = moved.vectors
+    # What is one node of the blade stays so: leading and trailing edges are at both sides.
+    [pair] = pair_up(mesh, ("per1", "per2"), "rotational")
+    first, second = pair.nodes[np.isin(pair.nodes, moved.nodes).all(axis=1)].T
+    assert len(first) == 10
+    turned = (mesh.points + shift)[first] @ pair.matrix(1)[:3, :3].T
+    assert turned == pytest.approx((mesh.points + shift)[second], abs=1e-14)
+    if kind == "twist":  # of both edges about the middle of the chord, in the plane of m' and theta
+        mid = np.isclose(np.hypot(*mesh.points[first][:, :2].T), 0.75)
+        z, y = (mesh.points + shift)[first][mid][:, 2], (mesh.points + shift)[first][mid][:, :2]
+        theta = np.arctan2(y[:, 1], y[:, 0])
+        angle = np.degrees(np.arctan2(np.ptp(theta), np.ptp(z) / 0.75))
+        assert angle == pytest.approx(6.0, abs=1e-6)
+        assert theta.mean() == pytest.approx(0.0, abs=1e-3)
+    *_, last = sv.deform(case.change(steps=2), mesh)
+    assert sv.quality(last.mesh, mesh).inverted == 0
+    assert last.periodic_misfit < 1e-10
