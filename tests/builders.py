@@ -184,12 +184,14 @@ def sector(n: int = 8, angle_deg: float = 30.0, low: float = 0.5, start_deg: flo
     )
 
 
-def passage(shape=(4, 6, 8), angle_deg: float = 30.0, kind: str = "plain") -> Mesh:
+def passage(
+    shape=(4, 6, 8), angle_deg: float = 30.0, kind: str = "plain", blade: bool = True
+) -> Mesh:
     """Annular sector with hub, shroud, per1, per2, inflow, outflow and a blade between them."""
     j, k = shape[1] // 2, shape[2] // 2
     return grid(
         shape,
-        [(0, shape[0]), (j - 1, j + 1), (k - 1, k + 1)],
+        [(0, shape[0]), (j - 1, j + 1), (k - 1, k + 1)] if blade else None,
         kind,
         place=ring(shape, angle_deg=angle_deg),
         rules=[

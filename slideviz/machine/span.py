@@ -18,7 +18,8 @@ angles, and blade sections are designed in it.
 m grows along the axis where the hub is within the shroud, and outwards at the exit of a radial
 compressor. Distances to walls that are surfaces of revolution are those to their profile in the
 meridional plane, so the hole that a blade leaves in a wall does not matter. Other walls (contoured
-along theta) count as they are, in (z, r, rho theta), with their images one period before and after.
+along theta) count as they are, in (z, r, rho theta), with their images one period before and after;
+a hole in them is closed by triangles between the nodes of its rim.
 """
 
 from __future__ import annotations
@@ -31,19 +32,14 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.machine.wall import closed_wall, wall_profile
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.topology import unit, vertex_normals
+from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.projection import as_simplices
 from slideviz.system.weak_cache import weak_cache
 
-REVOLUTION = 0.02
-"""A wall is a surface of revolution if its normals at nodes have a smaller component along theta,
-as a root of the mean square: facets of a curved profile have some, too."""
-APART = 1e-3  # least distance of points of a profile, as a part of its extent
-STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
 NEAR = 1e-7  # part of the distance between the walls, within which a wall's own normal counts
 FACING = 0.3  # least cosine between the directions from hub to shroud at both walls
 AMID = 0.25  # curves begin at a node whose span is so near to the middle
@@ -214,11 +210,11 @@ def _span_between(
     middle = float(np.arctan2(y.sum(), x.sum()))
     radius = float(np.hypot(x, y).max())
     coords = _meridional(mesh.points, axis, origin, middle) * (1.0, 1.0, radius)
-    profiles = [_profile(coords, table) for table in facets]
+    profiles = [wall_profile(coords, table) for table in facets]
     if all(profile is not None for profile in profiles):
         walls = [ClosestPoints(profile) for profile in profiles if profile is not None]
     else:
-        walls = [_wall(coords, table, radius, period) for table in facets]
+        walls = [closed_wall(coords, table, radius, period) for table in facets]
     field = SpanField(axis, origin, middle, radius, (walls[0], walls[1]))
     if hub == shroud or not _face(field, coords[nodes] / (1.0, 1.0, radius)):
         raise MeshError(
@@ -226,43 +222,6 @@ def _span_between(
             "is no span between them; name hub and shroud in SPAN"
         )
     return field
-
-
-def _profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
-    """Return the profile of a surface of revolution, segments (k, 2, 2) in (z, r); else None.
-
-    ``coords`` (n, 3): (z, r, rho theta). The profile goes through nodes at least `APART` from each
-    other, in the order in which Prim's algorithm joins them to an end: each time the nearest one.
-    """
-    nodes, normals = vertex_normals(coords, facets)
-    size = np.linalg.norm(normals, axis=1)
-    along_theta = normals[:, 2] / np.where(size > 0.0, size, 1.0)
-    if np.sqrt(np.average(along_theta**2, weights=size)) > REVOLUTION:
-        return None
-    places = coords[nodes, :2]
-    apart = APART * float(np.linalg.norm(np.ptp(places, axis=0)))
-    _, first = np.unique(np.round(places / (0.5 * apart)), axis=0, return_index=True)
-    places = places[first]
-    last = int(np.argmax(np.sum((places - places[0]) ** 2, axis=1)))
-    away, path = np.full(len(places), np.inf), [places[last]]
-    for _ in range(len(places) - 1):
-        away = np.minimum(away, np.sum((places - places[last]) ** 2, axis=1))
-        away[last] = np.inf
-        places, away = np.delete(places, last, axis=0), np.delete(away, last)
-        last = int(np.argmin(away))
-        if np.sum((places[last] - path[-1]) ** 2) > apart**2:
-            path.append(places[last])
-    steps = unit(np.diff(path, axis=0))
-    if len(path) < 2 or (np.sum(steps[1:] * steps[:-1], axis=1) < STRAIGHT).any():
-        return None
-    return np.stack([path[:-1], path[1:]], axis=1)
-
-
-def _wall(coords: FloatArray, facets: IntArray, radius: float, period: float) -> ClosestPoints:
-    corners, turn = coords[facets], 2.0 * np.pi * radius
-    # Facets may go across the end of theta's branch.
-    corners[..., 2] -= turn * np.round((corners[..., 2] - corners[:, :1, 2]) / turn)
-    return ClosestPoints(as_simplices(corners), np.array([0.0, 0.0, radius * period]))
 
 
 def _face(field: SpanField, coords: FloatArray) -> bool:
@@ -376,8 +335,8 @@ class SpanCurves:
             z, r = place[lost[0]]
             raise MeshError(
                 f"there is no span of {span[lost[0]]:.6g} at z = {z:.6g}, r = {r:.6g}, "
-                f"theta = {np.degrees(theta[lost[0]]):.6g} degrees: the walls have a hole there, "
-                "or end; move the blade less"
+                f"theta = {np.degrees(theta[lost[0]]):.6g} degrees: the walls end before; move "
+                "the blade less"
             )
         # By m': the normal turns against the speed as the curve bends to its side.
         by = np.zeros((len(plane), 3, 2))

@@ -16,6 +16,7 @@ from slideviz.samples.stator import stator_case, stator_mesh
 from slideviz.samples.table import sample
 from slideviz.session.motions import Ghosts
 from tests.builders import cut_blade, passage, square
+from tests.machine.test_span import contoured
 
 TWIST = sv.SpanMotion("blade", "twist", (0.0, 0.5, 1.0), (0.0, 1.0, 5.0))
 LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.0, 0.02))
@@ -178,3 +179,22 @@ def test_a_blade_that_periodic_sides_cut_moves_as_one(kind, value):
     *_, last = sv.deform(case.change(steps=2), mesh)
     assert sv.quality(last.mesh, mesh).inverted == 0
     assert last.periodic_misfit < 1e-10
+
+
+@pytest.mark.parametrize(("kind", "value"), [("twist", 5.0), ("lean", 0.02), ("sweep", 0.03)])
+def test_on_contoured_walls_a_blade_moves_over_where_it_stood(kind, value):
+    mesh = contoured(passage((6, 12, 8)))
+    motion = sv.SpanMotion("blade", kind, (0.0, 1.0), (value, 1.5 * value))
+    case = case_of(motion, periodic="moving", sliding="ps", steps=2)
+    case = case.change(roles=case.roles | {"hub": "sliding", "shroud": "sliding"})
+    field, moved = span_field(case, mesh), displacements(case, mesh)
+    assert not field.revolved
+    before, after = (
+        field.span(field.meridional(points))[0]
+        for points in (mesh.points[moved.nodes], mesh.points[moved.nodes] + moved.vectors)
+    )
+    assert after == pytest.approx(before, abs=1e-12)
+    *_, last = sv.deform(case, mesh)
+    assert sv.quality(last.mesh, mesh).min > 0.8
+    hub = field.meridional(last.mesh.points[mesh.marker("hub").nodes])
+    assert np.abs(field.span(hub)[0]).max() < 1e-12

@@ -1,0 +1,113 @@
+"""Walls of machines: profiles of surfaces of revolution, and contoured walls with holes closed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.topology import unit, vertex_normals
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.projection import as_simplices
+
+REVOLUTION = 0.02
+"""A wall is a surface of revolution if its normals at nodes have a smaller component along theta,
+as a root of the mean square: facets of a curved profile have some, too."""
+APART = 1e-3  # least distance of points of a profile, as a part of its extent
+STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
+FLAT = 1e-7  # a rim that is so narrow, as a part of its length, is of a blade without thickness
+
+
+def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
+    """Return the profile of a surface of revolution, segments (k, 2, 2) in (z, r); else None.
+
+    ``coords`` (n, 3): (z, r, rho theta). The profile goes through nodes at least `APART` from each
+    other, in the order in which Prim's algorithm joins them to an end: each time the nearest one.
+    """
+    nodes, normals = vertex_normals(coords, facets)
+    size = np.linalg.norm(normals, axis=1)
+    along_theta = normals[:, 2] / np.where(size > 0.0, size, 1.0)
+    if np.sqrt(np.average(along_theta**2, weights=size)) > REVOLUTION:
+        return None
+    places = coords[nodes, :2]
+    apart = APART * float(np.linalg.norm(np.ptp(places, axis=0)))
+    _, first = np.unique(np.round(places / (0.5 * apart)), axis=0, return_index=True)
+    places = places[first]
+    last = int(np.argmax(np.sum((places - places[0]) ** 2, axis=1)))
+    away, path = np.full(len(places), np.inf), [places[last]]
+    for _ in range(len(places) - 1):
+        away = np.minimum(away, np.sum((places - places[last]) ** 2, axis=1))
+        away[last] = np.inf
+        places, away = np.delete(places, last, axis=0), np.delete(away, last)
+        last = int(np.argmin(away))
+        if np.sum((places[last] - path[-1]) ** 2) > apart**2:
+            path.append(places[last])
+    steps = unit(np.diff(path, axis=0))
+    if len(path) < 2 or (np.sum(steps[1:] * steps[:-1], axis=1) < STRAIGHT).any():
+        return None
+    return np.stack([path[:-1], path[1:]], axis=1)
+
+
+def closed_wall(
+    coords: FloatArray, facets: IntArray, radius: float, period: float
+) -> ClosestPoints:
+    """Return a wall with the holes of blades closed, and with its images a period before and after.
+
+    ``coords`` (n, 3): (z, r, radius theta); ``facets`` (f, 4). The period is an angle in radians.
+    """
+    corners, turn = coords[facets], 2.0 * np.pi * radius
+    # Facets may go across the end of theta's branch.
+    corners[..., 2] -= turn * np.round((corners[..., 2] - corners[:, :1, 2]) / turn)
+    closed = np.concatenate([as_simplices(corners), *_patches(coords, facets, turn)])
+    return ClosestPoints(closed, np.array([0.0, 0.0, radius * period]))
+
+
+def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[FloatArray]:
+    """Yield triangles (t, 3, 3) that close each hole of a wall, such as that below a blade.
+
+    They are Delaunay's, of the nodes of the hole's rim in the plane that fits these best, so they
+    mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The longest
+    rim of each connected part is that of the wall itself.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import Delaunay
+
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    graph = coo_array((np.ones(len(edges), bool), edges.T), shape=(len(coords),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    follows, rims = dict(edges[first[count == 1]].tolist()), dict[int, list[FloatArray]]()
+    while follows:
+        start, node = follows.popitem()
+        rim = [start]
+        while node in follows:
+            rim.append(node)
+            node = follows.pop(node)
+        steps = np.diff(coords[[*rim, start]], axis=0)
+        steps[:, 2] -= turn * np.round(steps[:, 2] / turn)
+        if node == start and abs(steps[:, 2].sum()) < 0.5 * turn:  # else it goes round the axis
+            places = coords[start] + np.cumsum(steps, axis=0)
+            rims.setdefault(int(part[start]), []).append(places)
+    for several in rims.values():
+        several.sort(key=lambda places: float(np.linalg.norm(np.ptp(places, axis=0))))
+        for places in several[:-1]:
+            _, size, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+            if size[1] > FLAT * size[0]:  # else the blade has no thickness
+                flat = places @ axes[:2].T
+                triangles = Delaunay(flat).simplices
+                yield places[triangles[_inside(flat, flat[triangles].mean(axis=1))]]
+
+
+def _inside(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+    """Return which points (n, 2) are inside of a polygon (k, 2), by the crossings of a ray."""
+    x, y = points.T[:, :, None]
+    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    meets = (y0 > y) != (y1 > y)
+    at = x0 + (y - y0) * (x1 - x0) / np.where(y1 != y0, y1 - y0, 1.0)
+    return np.asarray((meets & (x < at)).sum(axis=1) % 2 == 1)
