@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock
 from PIL import Image
 from qtpy.QtCore import QModelIndex, Qt
 from qtpy.QtGui import QTextDocument
@@ -43,26 +45,26 @@ SMALL = 0.45
 ask_unsaved = questions.ask_unsaved
 """That of the program: `open_window` puts one in its place that answers by itself."""
 
-UNEQUAL = ("onto", "repaired")
-"""States that differ from run to run: a temporary folder is seen, rounding decides the repair."""
+PLACE = Path(tempfile.gettempdir()) / "slideviz_golden_window"
+"""The folder of the files that are opened: its name is seen."""
 
 
 def main(folder: Path) -> None:
     """Put all that the window shows into a folder."""
     shots.STATOR_CELLS = 6_000
     desk = Desk(folder)
-    with tempfile.TemporaryDirectory() as place, shots.display():
-        write_sample("passage", Path(place) / "flat", 12)
+    with FileLock(f"{PLACE}.lock"), shots.display():
+        shutil.rmtree(PLACE, ignore_errors=True)
+        write_sample("passage", PLACE / "flat", 12)
         for state in shots.STATES:
-            if state.name in UNEQUAL:
-                continue
-            with shots.open_window(Path(place)) as window:
-                state.bring(window, Path(place))
+            with shots.open_window(PLACE) as window:
+                state.bring(window, PLACE)
                 photograph(desk, window, state.name)
-        with shots.open_window(Path(place)) as window:
+        with shots.open_window(PLACE) as window:
             bare(desk, window)
-        with shots.open_window(Path(place)) as window:
-            opened(desk, window, Path(place))
+        with shots.open_window(PLACE) as window:
+            opened(desk, window, PLACE)
+        shutil.rmtree(PLACE)
 
 
 def photograph(desk: Desk, window, name: str) -> None:
