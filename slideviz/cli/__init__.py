@@ -12,9 +12,10 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
-from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, terminal_streams
+from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, holding, terminal_streams
 from slideviz.errors import Cancelled, SlidevizError
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         with (
             protected(lambda: arguments.inputs),
             note_compilation(getattr(arguments, "quiet", False)),
+            holding() if getattr(arguments, "holds", False) else nullcontext() as arguments.begun,
         ):
             return int(arguments.command(arguments))
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2

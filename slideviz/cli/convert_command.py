@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from slideviz.cli.options import add_shared
-from slideviz.cli.terminal import holding, say
+from slideviz.cli.terminal import say
 
 
 def add_convert(calls: argparse._SubParsersAction) -> None:
@@ -20,16 +20,11 @@ def add_convert(calls: argparse._SubParsersAction) -> None:
         "stream",
         help="for meshes larger than memory: from .su2 to .su2b or back, piece by piece",
     )
-    call.set_defaults(command=convert)
+    call.set_defaults(command=convert, holds=True)
 
 
 def convert(arguments: argparse.Namespace) -> int:
     """Write a mesh in another format, with notes on what that leaves out; return the exit code."""
-    with holding():
-        return _convert(arguments)
-
-
-def _convert(arguments: argparse.Namespace) -> int:
     from functools import partial
 
     from slideviz.cli.output_paths import OutputPath, require_output_paths

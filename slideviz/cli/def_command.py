@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, changed
-from slideviz.cli.terminal import holding, say
+from slideviz.cli.terminal import say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -28,9 +28,8 @@ def add_def(calls: argparse._SubParsersAction) -> None:
     """Add the command ``def`` to the parser."""
     call = calls.add_parser("def", help="deform as a configuration of SU2 says, like SU2_DEF")
     add_config(call)
-    add_shared(call, "json", help="report as JSON; - is the terminal")
-    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
-    call.set_defaults(command=run_def, **dict.fromkeys(_OF_A_RUN))
+    add_shared(call, "json", "force")
+    call.set_defaults(command=run_def, holds=True, **dict.fromkeys(_OF_A_RUN))
 
 
 def add_config(call: argparse.ArgumentParser) -> None:
@@ -78,11 +77,6 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
 
 def run_def(arguments: argparse.Namespace) -> int:
     """Deform a mesh by a configuration of SU2, write it with its boxes; return the exit code."""
-    with holding() as arguments.begun:
-        return _run_def(arguments)
-
-
-def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, walls, write
     from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
     from slideviz.cli.report import folded_cells, run_report

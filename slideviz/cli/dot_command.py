@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.def_command import add_config, read_configuration, variable_rows
 from slideviz.cli.options import add_shared
-from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,17 +20,12 @@ def add_dot(calls: argparse._SubParsersAction) -> None:
     """Add the command ``dot`` to the parser."""
     call = calls.add_parser("dot", help="gradients for SU2's design variables, like SU2_DOT_AD")
     add_config(call)
-    add_shared(call, "json", help="report as JSON; - is the terminal")
-    call.set_defaults(command=run_dot)
+    add_shared(call, "json")
+    call.set_defaults(command=run_dot, holds=True)
 
 
 def run_dot(arguments: argparse.Namespace) -> int:
     """Write the gradients for moving nodes and for design variables; return the exit code."""
-    with holding() as arguments.begun:
-        return _run_dot(arguments)
-
-
-def _run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json

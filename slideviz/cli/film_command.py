@@ -84,8 +84,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         help="show a second run beside it with this change, such as SLIDING_MODE=none; repeat it "
         "for more changes of that run",
     )
-    add_shared(call, "zone")
-    add_shared(call, "quiet")
+    add_shared(call, "zone", "quiet")
     call.add_argument("--force", action="store_true", help="replace files that exist")
     call.set_defaults(command=film)
 

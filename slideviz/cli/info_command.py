@@ -19,9 +19,7 @@ def add_info(calls: argparse._SubParsersAction) -> None:
     """Add the command ``info`` to the parser."""
     call = calls.add_parser("info", help="what is in a mesh file")
     call.add_argument("mesh", type=Path)
-    add_shared(call, "zone")
-    add_shared(call, "json")
-    add_shared(call, "stream")
+    add_shared(call, "zone", "json", "stream")
     call.set_defaults(command=info)
 
 

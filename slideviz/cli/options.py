@@ -5,18 +5,20 @@ from __future__ import annotations
 import argparse
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from slideviz.errors import not_one_of
 from slideviz.terms import NO_REFERENCE, RATED, Quantity, field_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.scene.overview import Zoom
     from slideviz.terms import Role
+
+Read = TypeVar("Read")
 
 REMEDY = "give --reference UNDEFORMED"  # the advice after that remark
 
@@ -56,7 +58,10 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         ("-q", "--quiet"),
         {"action": "store_true", "help": "print nothing but warnings and errors"},
     ),
-    "json": (("--json",), {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"}),
+    "json": (
+        ("--json",),
+        {"type": Path, "metavar": "FILE", "help": "report as JSON; - is the terminal"},
+    ),
     "metrics": (
         ("--metrics",),
         {
@@ -66,6 +71,10 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "help": "other numbers too, also in a .vtu, .vtkhdf or .csv file: all, or names with "
             "commas, as skewness,expansion,growth",
         },
+    ),
+    "force": (
+        ("--force",),
+        {"action": "store_true", "help": "allow writing over the input mesh"},
     ),
     "stream": (
         ("--stream",),
@@ -85,10 +94,11 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 """Arguments that several commands have, by name: flags and keywords for ``add_argument``."""
 
 
-def add_shared(call: argparse.ArgumentParser, name: str, **other: Any) -> None:
-    """Add an argument of `SHARED`; ``other`` replaces some of its keywords."""
-    flags, usual = SHARED[name]
-    call.add_argument(*flags, **usual | other)
+def add_shared(call: argparse.ArgumentParser, *names: str, **other: Any) -> None:
+    """Add arguments of `SHARED`; ``other`` replaces some of their keywords."""
+    for name in names:
+        flags, usual = SHARED[name]
+        call.add_argument(*flags, **usual | other)
 
 
 def add_changes(call: argparse.ArgumentParser) -> None:
@@ -247,6 +257,20 @@ def zoom(text: str) -> Zoom:
             f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
         )
     return Detail(tuple(centre), width)
+
+
+def checked(read: Callable[[str], Read]) -> Callable[[str], Read]:
+    """Return the type of an argument that ``read`` reads: its CaseError means wrong usage."""
+
+    def argument(text: str) -> Read:
+        from slideviz.errors import CaseError
+
+        try:
+            return read(text)
+        except CaseError as problem:
+            raise argparse.ArgumentTypeError("; ".join(str(problem).splitlines())) from None
+
+    return argument
 
 
 def integer(text: str) -> int:

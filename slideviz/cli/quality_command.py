@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
+from slideviz.cli.options import add_reference, add_shared, checked, optional_case, reference_words
 from slideviz.formats.table import holds_quality, own_endings
 from slideviz.terms import METRICS, RATED, SKEW_METRICS, WALL_VALUES, field_of
 
@@ -35,15 +35,13 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
     )
     call.add_argument(
         "--limits",
-        type=limits,
+        type=checked(limits),
         default=(),
         metavar="LIMITS",
         help='limits as of the key LIMITS, as "min > 0.3, inverted = 0": exit code 4 if one is '
         "not met",
     )
-    add_shared(call, "metrics")
-    add_shared(call, "zone")
-    add_shared(call, "json")
+    add_shared(call, "metrics", "zone", "json")
     call.add_argument(
         "-o",
         "--output",
@@ -58,12 +56,8 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
 def limits(text: str) -> tuple[Limit, ...]:
     """Return the limits of a text."""
     from slideviz.case.limits import read_limits
-    from slideviz.errors import CaseError
 
-    try:
-        found = read_limits(text)
-    except CaseError as problem:
-        raise argparse.ArgumentTypeError("; ".join(str(problem).splitlines())) from None
+    found = read_limits(text)
     if not found:
         raise argparse.ArgumentTypeError(f"{text!r} has no limit; expected one, as min > 0.3")
     return found

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared
-from slideviz.cli.terminal import holding, say
+from slideviz.cli.options import add_shared, checked
+from slideviz.cli.terminal import say
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def add_repair(calls: argparse._SubParsersAction) -> None:
         call.add_argument(f"--{role}", type=_names, default=(), metavar="A,B", help=what)
     call.add_argument(
         "--below",
-        type=_below,
+        type=checked(_below),
         default=0.1,
         metavar="Q",
         help="mend valid cells of a lower quality, too (0.1); 0: only those not proved valid",
@@ -48,11 +48,8 @@ def add_repair(calls: argparse._SubParsersAction) -> None:
     call.add_argument(
         "--metric", choices=tuple(SKEW_METRICS), default="knupp", help="of the quality (knupp)"
     )
-    add_shared(call, "zone")
-    add_shared(call, "json")
-    add_shared(call, "quiet")
-    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
-    call.set_defaults(command=repair)
+    add_shared(call, "zone", "json", "quiet", "force")
+    call.set_defaults(command=repair, holds=True)
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -63,21 +60,12 @@ def _names(text: str) -> tuple[str, ...]:
 def _below(text: str) -> float:
     """Return the value of a text as of the key REPAIR_BELOW."""
     from slideviz.case.keys import KEYS
-    from slideviz.errors import CaseError
 
-    try:
-        return float(KEYS["REPAIR_BELOW"].kind.read(text))
-    except CaseError as problem:
-        raise argparse.ArgumentTypeError(str(problem)) from None
+    return float(KEYS["REPAIR_BELOW"].kind.read(text))
 
 
 def repair(arguments: argparse.Namespace) -> int:
     """Mend a mesh, write it, and print or write a report; return the exit code."""
-    with holding() as arguments.begun:
-        return _repair(arguments)
-
-
-def _repair(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read, write
     from slideviz import repair as mend
     from slideviz.cli.output_paths import OutputPath, require_output_paths

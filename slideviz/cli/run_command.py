@@ -32,7 +32,7 @@ from slideviz.cli.run_outcome import (
     save_report,
     write_qualities,
 )
-from slideviz.cli.terminal import holding, say
+from slideviz.cli.terminal import say
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 from slideviz.terms import METRICS, WALL_VALUES
 
@@ -57,8 +57,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     add_shared(call, "case")
     call.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
     add_changes(call)
-    add_shared(call, "json", help="report as JSON; - is the terminal")
-    add_shared(call, "metrics")
+    add_shared(call, "json", "metrics")
     call.add_argument(
         "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
     )
@@ -84,18 +83,12 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     call.add_argument(
         "--resume", action="store_true", help="continue an interrupted run with --stream"
     )
-    add_shared(call, "quiet")
-    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
-    call.set_defaults(command=run)
+    add_shared(call, "quiet", "force")
+    call.set_defaults(command=run, holds=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
-    with holding() as arguments.begun:
-        return _run(arguments)
-
-
-def _run(arguments: argparse.Namespace) -> int:
     from slideviz.case.zones import with_marker_names
     from slideviz.cli.output_paths import REPLACED, qualities_path
     from slideviz.cli.report import metrics_report, run_report

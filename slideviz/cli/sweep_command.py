@@ -67,9 +67,7 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
     add_shared(
         call, "stream", help="with --meshes, for meshes larger than memory (SU2): one at a time"
     )
-    add_shared(call, "zone")
-    add_shared(call, "json", help="report as JSON; - is the terminal")
-    add_shared(call, "quiet")
+    add_shared(call, "zone", "json", "quiet")
     call.set_defaults(command=sweep)
 
 
@@ -261,8 +259,11 @@ def _print_sweep(report: dict[str, Any]) -> None:
 
 def _counted(designs: Sequence[int]) -> str:
     """Return how many designs there are, with the first of them."""
-    more = ", ..." if len(designs) > _LISTED else ""
-    return f"{len(designs)}  (design {', '.join(map(str, designs[:_LISTED]))}{more})"
+    return f"{len(designs)}  (design {_first(designs)})"
+
+
+def _first(designs: Sequence[int]) -> str:
+    return ", ".join(map(str, designs[:_LISTED])) + ", ..." * (len(designs) > _LISTED)
 
 
 def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:
@@ -275,8 +276,7 @@ def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> No
         if row.problem:
             reasons.setdefault(row.problem, []).append(row.design)
     for reason, failed in list(reasons.items())[:_LISTED]:
-        named = ", ".join(map(str, failed[:_LISTED])) + (", ..." if len(failed) > _LISTED else "")
         word = "design" if len(failed) == 1 else "designs"
-        print(f"slideviz: warning: {word} {named}: {reason}", file=sys.stderr)
+        print(f"slideviz: warning: {word} {_first(failed)}: {reason}", file=sys.stderr)
     if len(reasons) > _LISTED:
         print(f"slideviz: warning: and {len(reasons) - _LISTED} more reasons", file=sys.stderr)
