@@ -139,11 +139,8 @@ class ToolBar(QToolBar):
         self.range.setEnabled(colored_by_value(now))
         self.color.show_value(session.view.color_by)
         zones = mesh.zones if mesh is not None else 1
-        if self.zone.count() != zones + 1:
-            self.zone.clear()
-            self.zone.addItem(f"all {zones}", 0)
-            for zone in range(1, zones + 1):
-                self.zone.addItem(f"{zone} of {zones}", zone)
+        one_by_one = {zone: f"{zone} of {zones}" for zone in range(1, zones + 1)}
+        self.zone.offer({0: f"all {zones}"} | one_by_one)
         self.zone.show_value((mesh.zone or 0) if mesh is not None else 0)
         for shown in (self.zone_label, self.zone_shown):
             shown.setVisible(zones > 1)

@@ -29,7 +29,7 @@ from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
 from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.runs import RunsPanel
-from slideviz.gui.panels.sections import sections_panel
+from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets.build import PanelScroll
@@ -197,7 +197,7 @@ DOCKS: tuple[DockRow, ...] = (
     ),
     DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram"),
     DockRow("runs", "Runs", RIGHT, lambda w: RunsPanel(w.store)),
-    DockRow("sections", "Sections", RIGHT, sections_panel, "runs"),
+    DockRow("sections", "Sections", RIGHT, SectionsPanel, "runs"),
     DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs"),
     DockRow("designs", "Designs", BOTTOM, DesignsPanel, shown=False),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),

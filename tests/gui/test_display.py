@@ -71,7 +71,7 @@ def test_the_range_is_typed_checked_reset_and_fits_the_values_of_the_step(shown)
     box.range.high.selectAll()
     QTest.keyClicks(box.range.high, "0.3")
     assert box.range.high.property("bad")
-    assert box.range.high.toolTip() == "0.3 must be greater than 0.4"
+    assert box.range.high.toolTip() == "0.4 must be less than 0.3"
     assert view(shown).color_range == (0.4, 1.0)
     shown.click(box.reset_range)
     assert view(shown).color_range is None

@@ -7,20 +7,22 @@ import logging
 from collections.abc import Generator
 from dataclasses import asdict, replace
 from functools import partial
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qtpy.QtCore import QObject, QSignalBlocker, Qt
+from qtpy.QtCore import QObject, Qt
 from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QFormLayout, QLabel, QWidget
 
 from slideviz.errors import SlidevizError
+from slideviz.export.flat_section import PageFormat, save_section
 from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, size_words
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
 from slideviz.formats.table import FORMATS, format_for, own_endings, usual_ending
-from slideviz.gui.dialogs.film import FilmDialog
+from slideviz.gui.dialogs.film import FilmDialog, PixelFields
 from slideviz.gui.dialogs.wheel import WheelDialog
 from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
 from slideviz.gui.responsiveness.worker import PieceRunner, reraise
@@ -47,6 +49,7 @@ from slideviz.gui.widgets.pixmaps import (
     to_image,
     wait_cursor,
 )
+from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services
 from slideviz.session import changes, jobs
 from slideviz.session.motions import shown_case, wheel_passages
@@ -72,6 +75,14 @@ class Exports(QObject):
     def _session(self) -> Session:
         return self.window.store.session
 
+    def _ask(
+        self, title: str, end: str, filters: str, parent: QWidget | None = None
+    ) -> Path | None:
+        """Ask for a file, by default that of the case or mesh with another end; or None."""
+        files = self.window.files
+        default = files.folder() / f"{files.stem()}{end}"
+        return questions.ask_save(parent or self.window, title, default, filters)
+
     def _renderer(self) -> OffscreenRenderer:
         viewing = self.window.viewing
         return OffscreenRenderer(self._session, viewing.surfaces, viewing.scene)
@@ -91,10 +102,7 @@ class Exports(QObject):
             if not accepted:
                 return
             settings.setValue("picture", choices)
-            default = self.window.files.folder() / f"{self.window.files.stem()}.png"
-            filters = picture_filters(self._session)
-            path = questions.ask_save(self.window, "Export picture", default, filters)
-            if path is not None:
+            if path := self._ask("Export picture", ".png", picture_filters(self._session)[0]):
                 self._write_picture(renderer, options, path)
 
     def _write_picture(
@@ -132,6 +140,15 @@ class Exports(QObject):
             copy_image(to_image(renderer.image(options)))
         self.window.show_status(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
+    def section(self, paper: PageFormat) -> None:
+        """Ask for a file name, and write a picture of the selected section."""
+        session, section = self._session, self._session.view.section
+        if section is None or session.frame is None or self.window.runner.busy:
+            return
+        if path := self._ask("Save picture of the section", "_section.png", PLOT_FILTERS):
+            call = save_section, path, session, section, paper
+            self.window.running.start_job(f"Drawing {path.name}", self._written, *call)
+
     # Films -----------------------------------------------------------------------------
     def make_film(self) -> None:
         """Open the dialog that makes a film of the steps; if it is open, bring it to the front.
@@ -148,23 +165,20 @@ class Exports(QObject):
         self.film = dialog
         dialog.made.connect(self._written)
         dialog.failed.connect(self.window.banner.show_error)
-        dialog.stopped.connect(
-            lambda: self.window.show_status("The film was stopped; no file is left")
-        )
+        stopped = partial(self.window.show_status, "The film was stopped; no file is left")
+        dialog.stopped.connect(stopped)
         dialog.finished.connect(self._film_closed)
         dialog.show()
 
     def _ask_film(self, kind: str) -> Path | None:
         files, parent = self.window.files, self.film or self.window
-        stem = f"{files.stem()}_steps"
         if kind:
             filters = {".mp4": "MP4 film (*.mp4)", ".gif": "GIF film (*.gif)"}[kind]
-            path = questions.ask_save(
-                parent, "Export film", files.folder() / f"{stem}{kind}", filters
-            )
+            path = self._ask("Export film", f"_steps{kind}", filters, parent)
             return path.with_suffix(kind) if path is not None else None
         folder = questions.ask_folder(parent, "Folder for the pictures", files.folder())
-        return new_folder(folder, stem.replace(".", "_")) if folder is not None else None
+        name = f"{files.stem()}_steps".replace(".", "_")
+        return new_folder(folder, name) if folder is not None else None
 
     def _film_closed(self) -> None:
         if self.film is not None:
@@ -179,15 +193,12 @@ class Exports(QObject):
     # Tables and meshes -----------------------------------------------------------------
     def quality(self) -> None:
         """Ask for a file name and write the quality of every cell of the shown step as CSV."""
-        frame, files = self._session.frame, self.window.files
+        frame = self._session.frame
         if frame is None or self.window.runner.busy:
             return
-        default = files.folder() / f"{files.stem()}_quality.csv"
-        path = questions.ask_save(self.window, "Export quality", default, "CSV table (*.csv)")
-        if path is not None:
-            self.window.running.start_job(
-                f"Saving {path.name}", self._written, jobs.save_quality, path, frame
-            )
+        if path := self._ask("Export quality", "_quality.csv", "CSV table (*.csv)"):
+            call = self._written, jobs.save_quality, path, frame
+            self.window.running.start_job(f"Saving {path.name}", *call)
 
     def steps(self) -> None:
         """Ask for a file name and write the mesh of every step: numbered files, or one .vtkhdf."""
@@ -216,23 +227,21 @@ class Exports(QObject):
 
     def wheel(self) -> None:
         """Ask for passages and a file name, and write the wheel of the shown step."""
-        session, files = self._session, self.window.files
+        session = self._session
         frame, mesh, around = session.frame, session.mesh, wheel_passages(session)
         if frame is None or mesh is None or not around or self.window.runner.busy:
             return
         with self._renderer() as renderer:
             dialog = WheelDialog(self.window, renderer, around)
             accepted = dialog.exec() == WheelDialog.DialogCode.Accepted
-            count, numbered = dialog.count, dialog.numbered.isChecked()
+            several, numbered = dialog.count, dialog.numbered.isChecked()
             dialog.deleteLater()
         if not accepted:
             return
-        default = files.folder() / f"{files.stem()}_wheel.su2"
         filters = ";;".join(questions.mesh_filter(FORMATS[end]) for end in (".su2", ".su2b"))
-        path = questions.ask_save(self.window, "Save as wheel", default, filters)
-        if path is not None:
+        if path := self._ask("Save as wheel", "_wheel.su2", filters):
             case = session.case if frame.step is None else shown_case(session)
-            values = path, case, mesh, frame, count, numbered
+            values = path, case, mesh, frame, several, numbered
             name = f"Saving {path.name}"
             self.window.running.start_job(name, self._wheel_written, jobs.save_wheel, *values)
 
@@ -250,9 +259,8 @@ class Exports(QObject):
             self.window.store.change(changes.saved_mesh)
         self._written(paths[-1])
         if not whole:
-            self.window.show_status(
-                f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}"
-            )
+            ends = f"{paths[0].name} to {paths[-1].name}"
+            self.window.show_status(f"Saved {len(paths)} meshes, {ends}")
 
     def _written(self, path: Path) -> None:
         self.window.settings.setValue("folder", str(path.parent))
@@ -260,21 +268,28 @@ class Exports(QObject):
         self.window.show_status(f"Saved {path}")
 
 
-def picture_filters(session: Session) -> str:
-    """Return the formats a picture of a session can be saved in, as filters of a file dialog."""
+def picture_filters(session: Session) -> tuple[str, str]:
+    """Return the formats a picture of a session can be saved in, as filters of a file dialog.
+
+    Also a sentence about them, and why others are not possible.
+    """
     mesh = session.mesh
-    if mesh is None or mesh.dim != 2 or len(mesh.cells) > MOST_CELLS:
-        return questions.PICTURE_FILTERS
-    return f"{questions.PICTURE_FILTERS};;SVG drawing (*.svg);;PDF drawing (*.pdf)"
+    if mesh is None or mesh.dim != 2:
+        why = "Saved as PNG; the view of a 3D mesh consists of pixels."
+        return questions.PICTURE_FILTERS, why
+    if len(mesh.cells) > MOST_CELLS:
+        why = f"Saved as PNG; SVG and PDF can have at most {MOST_CELLS:,} cells."
+        return questions.PICTURE_FILTERS, why
+    return PLOT_FILTERS, (
+        "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
+        "boundaries, without points, neighbouring passages and axes."
+    )
 
 
 def new_folder(parent: Path, name: str) -> Path:
     """Return the path of a folder that does not exist yet: ``name``, or ``name_2`` and so on."""
-    path, number = parent / name, 1
-    while path.exists():
-        number += 1
-        path = parent / f"{name}_{number}"
-    return path
+    names = chain([name], (f"{name}_{number}" for number in count(2)))
+    return next(path for each in names if not (path := parent / each).exists())
 
 
 PREVIEW = (470, 330)  # largest width and height of the preview, in pixels
@@ -308,7 +323,7 @@ OPTIONS = {
 """Text and tip of the check box for each field of `PictureOptions` that is a bool."""
 
 
-class PictureDialog(QDialog):
+class PictureDialog(PixelFields, QDialog):
     """The dialog for the options of a picture, with a preview.
 
     ``renderer``: draws the picture. ``view_size`` (int, int): width and height of the view in
@@ -325,7 +340,8 @@ class PictureDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Export picture")
         self.renderer = renderer
-        self._view_size = tuple(min(max(length, SMALLEST), LARGEST) for length in view_size)
+        lengths = (min(max(length, SMALLEST), LARGEST) for length in view_size)
+        self._view_size = "x".join(map(str, lengths))
         self._make_preview()
         self._make_size()
         self._make_options()
@@ -344,15 +360,11 @@ class PictureDialog(QDialog):
         self.preview.setObjectName("preview")
         self.words = QLabel()
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
-        self.kinds = hint_label(_kinds(self.renderer))
+        self.kinds = hint_label(picture_filters(self.renderer.session)[1])
         self.kinds.setFixedWidth(PREVIEW[0])
 
     def _make_size(self) -> None:
-        self.size_choice = Choice(SIZES)
-        self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = (
-            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
-        )
+        self._make_pixels(SIZES)
         self.width_cm, self.height_cm = (
             decimal_box(1.0, 200.0, length, self._changed, unit=" cm") for length in PAPER[:2]
         )
@@ -397,13 +409,11 @@ class PictureDialog(QDialog):
         picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
-            size = self.width_px.value(), self.height_px.value()
-            return PictureOptions(size, background, **picked, letters=text * LETTERS)
+            return PictureOptions(self.pixels, background, **picked, letters=text * LETTERS)
         dpi = float(self.dpi.value())
         wide, high = (round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
         size = wide, high
-        pixels = text * PAPER_POINTS / 72.0 * dpi
-        letters = pixels / 13.0 / font_scale(size)
+        letters = text * PAPER_POINTS / 72.0 * dpi / 13.0 / font_scale(size)
         return PictureOptions(size, background, **picked, letters=letters, dpi=dpi)
 
     @property
@@ -435,8 +445,8 @@ class PictureDialog(QDialog):
         self.width_cm.setValue(across)
         self.height_cm.setValue(high)
         self.dpi.setValue(round(dpi))
-        for name, box in self.options.items():
-            box.setChecked(bool(known.get(name, getattr(usual, name))))
+        for name, option in self.options.items():
+            option.setChecked(bool(known.get(name, getattr(usual, name))))
         # A cell that was marked in another run is of no interest here, unless it is asked for.
         if not self.renderer.session.marked_here:
             self.options["marked"].setChecked(False)
@@ -448,27 +458,15 @@ class PictureDialog(QDialog):
         self._size_chosen(self.size_choice.currentData())
 
     def _size_chosen(self, name: str) -> None:
-        if name not in ("paper", "other"):
-            size = self._view_size if name == "view" else [int(n) for n in name.split("x")]
-            for box, length in zip((self.width_px, self.height_px), size, strict=True):
-                with QSignalBlocker(box):
-                    box.setValue(length)
         self._form.setRowVisible(self._paper, name == "paper")
         self._form.setRowVisible(self._pixels, name != "paper")
-        self._changed()
-
-    def _pixels_typed(self) -> None:
-        self.size_choice.show_value("other")
-        self._changed()
+        super()._size_chosen(self._view_size if name == "view" else name)
 
     def _changed(self, _: object = None) -> None:
         options = self.picture_options
         too_large = max(options.size) > LARGEST or min(options.size) < SMALLEST
-        self.words.setText(
-            f"{size_words(options)}: width and height can be {SMALLEST} to {LARGEST} pixels"
-            if too_large
-            else size_words(options)
-        )
+        rule = f": width and height can be {SMALLEST} to {LARGEST} pixels" * too_large
+        self.words.setText(size_words(options) + rule)
         set_style(self.words, "bad", too_large)
         for button in (self.save, self.copy):
             button.setEnabled(not too_large)
@@ -499,16 +497,3 @@ class PictureDialog(QDialog):
         self._timer.stop()
         self._runner.stop()
         super().done(result)
-
-
-def _kinds(renderer: OffscreenRenderer) -> str:
-    """Return a sentence about the file formats that are possible, and why others are not."""
-    mesh = renderer.session.mesh
-    if mesh is None or mesh.dim != 2:
-        return "Saved as PNG; the view of a 3D mesh consists of pixels."
-    if len(mesh.cells) > MOST_CELLS:
-        return f"Saved as PNG; SVG and PDF can have at most {MOST_CELLS:,} cells."
-    return (
-        "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
-        "boundaries, without points, neighbouring passages and axes."
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,37 @@ SIZE_WORDS = {
 }
 
 
-class FilmForm(QWidget):
+class PixelFields:
+    """The choice of a size in pixels, with fields for width and height: a part of a form."""
+
+    def _make_pixels(self, words: Mapping[str, str]) -> None:
+        self.size_choice = Choice(words)
+        self.size_choice.chosen.connect(self._size_chosen)
+        self.width_px, self.height_px = (
+            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
+        )
+
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Return width and height."""
+        return self.width_px.value(), self.height_px.value()
+
+    def _size_chosen(self, name: str) -> None:
+        if "x" in name:
+            for box, length in zip((self.width_px, self.height_px), name.split("x"), strict=True):
+                with QSignalBlocker(box):
+                    box.setValue(int(length))
+        self._changed()
+
+    def _pixels_typed(self) -> None:
+        self.size_choice.show_value("other")
+        self._changed()
+
+    def _changed(self, _: object = None) -> None:
+        raise NotImplementedError
+
+
+class FilmForm(PixelFields, QWidget):
     """The fields for the options of a film.
 
     ``renderer``: holds the session whose steps are filmed.
@@ -67,7 +97,9 @@ class FilmForm(QWidget):
         super().__init__()
         self.renderer = renderer
         self.frames = len(renderer.session.frames)
-        self._make_size()
+        self.kind = Choice(KINDS)
+        self.kind.chosen.connect(self._kind_chosen)
+        self._make_pixels(SIZE_WORDS)
         self._make_pace()
         self.white = check_box("White background", "Without it, the background of the view.")
         self.white.setChecked(True)
@@ -81,7 +113,7 @@ class FilmForm(QWidget):
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow("Kind", self.kind)
         form.addRow("Size", self.size_choice)
-        form.addRow("", self._pixels)
+        form.addRow("", in_row(self.width_px, self.height_px))
         form.addRow("Frames per second", self.fps)
         form.addRow("Interpolated frames between steps", self.between)
         form.addRow("Last frame stays", self.hold)
@@ -90,15 +122,6 @@ class FilmForm(QWidget):
             form.addRow("", option)
         form.setRowVisible(self.mark, renderer.session.view.marked_cell is not None)
         self._kind_chosen(self.kind.currentData())
-
-    def _make_size(self) -> None:
-        self.kind, self.size_choice = Choice(KINDS), Choice(SIZE_WORDS)
-        self.kind.chosen.connect(self._kind_chosen)
-        self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = (
-            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
-        )
-        self._pixels = in_row(self.width_px, self.height_px)
 
     def _make_pace(self) -> None:
         self.fps = decimal_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
@@ -123,15 +146,13 @@ class FilmForm(QWidget):
     @property
     def film_options(self) -> FilmOptions:
         """Return size, frame rate, duration of the last image, and images between steps."""
-        size = self.width_px.value(), self.height_px.value()
-        return FilmOptions(size, self.fps.value(), self.hold.value(), self.between.value())
+        return FilmOptions(self.pixels, self.fps.value(), self.hold.value(), self.between.value())
 
     @property
     def picture_options(self) -> PictureOptions:
-        size = self.width_px.value(), self.height_px.value()
         view = self.renderer.session.view
         return PictureOptions(
-            size,
+            self.pixels,
             "white" if self.white.isChecked() else "shown",
             legend="legend" in view.drawn,
             edges="edges" in view.drawn,
@@ -151,17 +172,6 @@ class FilmForm(QWidget):
         self.fps.setEnabled(bool(kind))
         self.hold.setEnabled(bool(kind))
         self._size_chosen(self.size_choice.currentData())
-
-    def _size_chosen(self, name: str) -> None:
-        if "x" in name:
-            for box, length in zip((self.width_px, self.height_px), name.split("x"), strict=True):
-                with QSignalBlocker(box):
-                    box.setValue(int(length))
-        self._changed()
-
-    def _pixels_typed(self) -> None:
-        self.size_choice.show_value("other")
-        self._changed()
 
     def problem(self) -> str:
         """Return why no film can be made with these options; empty if one can."""

@@ -165,9 +165,7 @@ class CurvesPanel(Panel):
             self.area.plot()
 
     def _offer_coordinates(self, session: Session) -> None:
-        self.coordinate.clear()
-        for name, text in curves.coordinates(session).items():
-            self.coordinate.addItem(text, name)
+        self.coordinate.offer(curves.coordinates(session))
         self.coordinate.show_value(curves.usual_coordinate(session))
 
     def _missing(self, session: Session, kind: str) -> str:

@@ -91,10 +91,7 @@ class DesignPlot(QWidget):
 
     def show_table(self, table: DesignTable, shown: int | None) -> None:
         """Draw the results of a table; the design ``shown`` has a ring."""
-        if table.columns != self._table.columns:
-            self.across.clear()
-            for name in table.columns:
-                self.across.addItem(name, name)
+        self.across.offer({name: name for name in table.columns})
         self._table, self._shown = table, shown
         plotted = table.count_done() > 0
         self.save.setEnabled(plotted)

@@ -186,11 +186,9 @@ class DesignRows(QWidget):
         if mesh is not self._mesh:
             self.values.clear()
         self._mesh = mesh
-        self.column.clear()
-        if mesh is not None:
-            for name, value in column_choices(case, mesh.dim).items():
-                self.column.addItem(f"{name}   (now {value})", name)
-        self.column.show_value(chosen)
+        offered = {} if mesh is None else column_choices(case, mesh.dim)
+        self.column.offer({name: f"{name}   (now {value})" for name, value in offered.items()})
+        self.column.setCurrentIndex(max(self.column.findData(chosen), 0) if offered else -1)
 
     def show_table(self, table: DesignTable, editable: bool) -> None:
         if table is not self.model.table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,11 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import CommandState
-from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
+from slideviz.gui.widgets.fields import NumberBox, number_text
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
+from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
@@ -97,46 +98,21 @@ class PassagesBox(NumberBox):
         return QValidator.State.Acceptable if good else QValidator.State.Intermediate, text, at
 
 
-class RangeFields(QWidget):
+class RangeField(VectorField):
     """Two number fields for a range; the low number must stay below the high one."""
 
-    def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
-        super().__init__()
-        self._changed = changed
-        self.low = NumberField(0.0, lambda value: self._must(value < self.high.value, value, "<"))
-        self.high = NumberField(1.0, lambda value: self._must(value > self.low.value, value, ">"))
+    def __init__(self, name: str) -> None:
+        super().__init__((0.0, 1.0), _not_ascending, ("", "to"))
+        self._labels[0].hide()
+        self.low, self.high = self.fields
         for end, field in (("low", self.low), ("high", self.high)):
             field.setObjectName(f"{name}_{end}")
             field.setAccessibleName(f"{name} {end}")
-            field.changed.connect(lambda _: self._emit_changed())
-        parts = in_row(self.low, QLabel("to"), self.high, wide=[self.low, self.high], spacing=4)
-        parts.setContentsMargins(0, 0, 0, 0)
-        self.setLayout(parts)
 
-    def _emit_changed(self) -> None:
-        # The other number may have been typed before it was valid.
-        for field in (self.low, self.high):
-            field.recheck()
-        self._changed((self.low.value, self.high.value))
 
-    def _must(self, good: bool, value: float, sign: str) -> str:
-        """Return, unless ``good``, why a number must be less (``<``) or greater than the other."""
-        if good:
-            return ""
-        than, other = ("less", self.high) if sign == "<" else ("greater", self.low)
-        return f"{number_text(value)} must be {than} than {number_text(other.value)}"
-
-    def show_values(self, values: tuple[float, float]) -> None:
-        """Show two numbers; no signal is emitted."""
-        fields = list(zip((self.low, self.high), values, strict=True))
-        # Each is compared with the other one: the first must be valid with its old value.
-        for field, value in fields if values[0] < self.high.value else reversed(fields):
-            if value != field.value:
-                field.show_value(value)
-
-    def set_tip(self, text: str) -> None:
-        self.low.set_tip(text)
-        self.high.set_tip(text)
+def _not_ascending(ends: Sequence[float]) -> str:
+    low, high = ends
+    return "" if low < high else f"{number_text(low)} must be less than {number_text(high)}"
 
 
 def map_icon(name: str) -> QIcon:
@@ -175,7 +151,8 @@ class DisplayPanel(Panel):
         for index, name in enumerate(COLOR_MAPS):
             self.map.setItemIcon(index, map_icon(name))
         self.form.addRow("Colors", self.map)
-        self.range = RangeFields("range", lambda values: self._set(color_range=values))
+        self.range = RangeField("range")
+        self.range.changed.connect(lambda values: self._set(color_range=values))
         self.fit_range = self._button("fit_range", "Fit", "fit_colors")
         self.reset_range = self._button("reset_range", "Reset", "usual_colors")
         parts = (self.range, self.fit_range, self.reset_range)
@@ -183,7 +160,8 @@ class DisplayPanel(Panel):
 
     def _make_threshold(self) -> None:
         self.only = check_box("Only cells", ONLY, self._only, "only")
-        self.threshold = RangeFields("threshold", lambda values: self._set(threshold=values))
+        self.threshold = RangeField("threshold")
+        self.threshold.changed.connect(lambda values: self._set(threshold=values))
         self.form.addRow(self.only, self.threshold)
 
     def _make_rest(self) -> None:
@@ -233,7 +211,7 @@ class DisplayPanel(Panel):
         self.map.setToolTip(TIPS["map"] if valued else ROLES_ONLY)
         self.range.set_tip(TIPS["range"] if valued else ROLES_ONLY)
         self.fit_range.setToolTip(TIPS["fit"] if valued else ROLES_ONLY)
-        self.range.show_values(session.color_range)
+        self.range.show_value(session.color_range)
         self.reset_range.setEnabled(valued and view.color_range is not None)
         back = f"Back to {usual_range(session)}"
         self.reset_range.setToolTip(back if valued else ROLES_ONLY)
@@ -245,7 +223,7 @@ class DisplayPanel(Panel):
             self.only.setEnabled(False)
         self.only.setToolTip(wrapped(IN_FILE if session.in_file else ONLY))
         self.threshold.setEnabled(view.threshold is not None)
-        self.threshold.show_values(view.threshold or _worse_half(session))
+        self.threshold.show_value(view.threshold or _worse_half(session))
         self.points.show_value(view.points)
         self._sync_passages(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():

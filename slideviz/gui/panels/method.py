@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from typing import Any, cast
 
 from qtpy.QtCore import Qt, QTimer, Signal
-from qtpy.QtWidgets import QComboBox, QFormLayout, QLabel, QWidget
+from qtpy.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QWidget
 
 from slideviz.case.key import Form, Key
 from slideviz.case.keys import BY_WEIGHT, KEYS, no_pair
@@ -25,7 +25,7 @@ from slideviz.gui.widgets.build import (
     tool_button,
 )
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch, number_text
+from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
@@ -60,6 +60,14 @@ def _number_box(kind: Kind) -> NumberBox:
     field.setSpecialValueText(kind.words.get(kind.span[0], ""))
     field.setMinimumHeight(QComboBox().sizeHint().height())
     return field
+
+
+class Switch(QCheckBox):
+    """A check box for a setting, with the methods that a `KeyForm` needs."""
+
+    def show_value(self, on: bool) -> None:
+        """Show whether the setting is on."""
+        self.setChecked(on)
 
 
 Field = Choice | Switch | NumberField | NumberBox | VectorField

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QPushButton, QSizePolicy, QWidget
+from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QSizePolicy, QWidget
 
 from slideviz.case.model import (
     BoxMotion,
@@ -33,20 +34,11 @@ from slideviz.case.model import (
 )
 from slideviz.case.motion_text import VERB_OF, curve_text, read_curve
 from slideviz.case.motion_words import direction_words, target_words
-from slideviz.gui.widgets.build import as_widget, grow_fields, in_row
+from slideviz.gui.widgets.build import as_widget, grow_fields, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, not_zero
+from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
 from slideviz.gui.widgets.span_curve import SpanCurveField
-from slideviz.gui.widgets.vector_field import (
-    VectorField,
-    a_direction,
-    chord_problem,
-    control_point_problem,
-    limit_problem,
-    peak_problem,
-    scale_problem,
-    term_problem,
-)
+from slideviz.gui.widgets.vector_field import VectorField, a_direction, control_point_problem
 from slideviz.session.motions import Axis, new_motion, radial
 from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS
 
@@ -70,6 +62,10 @@ KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_
 """Labels of the kinds of motion, by class."""
 
 
+Check = Callable[[Any], str]  # returns why a value is not allowed; "" if it is
+Make = Callable[[], QWidget]  # makes a field
+
+
 def _unchanged(value: Any) -> Any:
     return value
 
@@ -79,51 +75,110 @@ def _integers(values: Sequence[float]) -> tuple[int, ...]:
 
 
 class FormRow(NamedTuple):
-    """A row of the form: its title, the attribute of a motion in it, and what its field shows."""
+    """A row of the form: its title, the attribute of a motion in it, and its field."""
 
     title: str
     attribute: str
+    make: Make
     shown: Callable[[Any], Any] = _unchanged
     """Returns what the field shows for a value of the attribute."""
     read: Callable[[Any], Any] = _unchanged
     """Returns the value of the attribute for that of the field."""
 
 
+def _number(tip: str, value: float = 0.0, allowed: Check | None = None) -> Make:
+    return lambda: NumberField(value, allowed, tip)
+
+
+def _vector(tip: str, values: Sequence[float] = (0.0,) * 3, allowed: Check | None = None,
+            names: Sequence[str] = "xyz") -> Make:  # fmt: skip
+    return lambda: VectorField(values, allowed, names, tip)
+
+
+def _choice(tip: str, words: Mapping[Any, str] = MappingProxyType({}),
+            tips: Mapping[str, str] = MappingProxyType({})) -> Make:  # fmt: skip
+    def make() -> Choice:
+        field = Choice(words, tip)
+        field.set_tips(tips)
+        return field
+
+    return make
+
+
+def _factors() -> VectorField:
+    tip = "Enlargement along each axis: 1 leaves it, 2 doubles it."
+    made = VectorField((1.0, 1.0, 1.0), tip=tip)
+    for field in made.fields:
+        field._allowed = unless(bool, "0 would flatten the boundary")
+    return made
+
+
+# fmt: off
 # Rounded: 1.03 is not 3 % to the last bit.
 ROWS: dict[str, FormRow] = {
-    "box": FormRow("Box", "box"),
-    "index": FormRow("Control point", "index", read=_integers),
-    "plane": FormRow("Plane j", "plane", read=int),
-    "vector": FormRow("By", "vector"),
-    "amount": FormRow("By", "amount"),
-    "angle": FormRow("Angle (°)", "angle_deg"),
-    "factors": FormRow("Factors", "factors", lambda one: one if len(one) > 1 else one * 3),
-    "percent": FormRow(
-        "Radius by (%)",
-        "factor",
+    "box": FormRow("Box", "box", _choice(
+        "The box whose control points move: of the mesh, or of the case.")),
+    "index": FormRow("Control point", "index", _vector(
+        "The control point, counted from 0 along each direction of the box; -1 is all.",
+        allowed=control_point_problem, names="ijk"), read=_integers),
+    "plane": FormRow("Plane j", "plane", _number(
+        "The plane of control points, counted from 0 along j; -1 is all.",
+        0.0, lambda value: control_point_problem((value,))), read=int),
+    "vector": FormRow("By", "vector", _vector(
+        "How far it moves along each axis, in the mesh's length unit.")),
+    "amount": FormRow("By", "amount", _number(
+        "How far control points move, in the mesh's length unit. With the thickness, the last "
+        "ones move forwards, and the first ones as far backwards.")),
+    "angle": FormRow("Angle (°)", "angle_deg", _number(
+        "Degrees; positive turns counter-clockwise seen against the axis.")),
+    "factors": FormRow(
+        "Factors", "factors", _factors, lambda one: one if len(one) > 1 else one * 3),
+    "percent": FormRow("Radius by (%)", "factor", _number(
+        "How much larger the radius becomes, in percent: 3 is 3 % outwards.", 0.0,
+        unless(lambda value: value > -100.0, "-100 % or less would fold the boundary")),
         lambda factor: round(100.0 * (factor - 1.0), 10),
-        lambda percent: round(1.0 + percent / 100.0, 14),
-    ),
-    "distance": FormRow("and by (length)", "distance"),
-    "change": FormRow("Changes", "kind"),
-    "curve": FormRow("Over span", "spans"),
-    "about": FormRow("About", "point"),
-    "point": FormRow("Point", "point"),
-    "axis": FormRow("Axis", "axis"),
-    "side": FormRow("Side", "side"),
-    "term": FormRow("Shape", "term", read=_integers),
-    "peak": FormRow(
-        "Peak at (%)",
-        "peak",
-        lambda peak: round(100.0 * peak, 10),
-        lambda percent: round(percent / 100.0, 14),
-    ),
-    "raised": FormRow("Raised by", "height"),
-    "chord": FormRow("Chord", "chord"),
-    "path": FormRow("File", "path"),
-    "limit": FormRow("At most away", "limit"),
+        lambda percent: round(1.0 + percent / 100.0, 14)),
+    "distance": FormRow("and by (length)", "distance", _number(
+        "How far it also moves outwards, in the mesh's length unit.")),
+    "change": FormRow("Changes", "kind", _choice(
+        "What of the blade's sections the curve changes.",
+        {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()},
+        {kind: term.tip for kind, term in SPAN_KINDS.items()})),
+    "curve": FormRow("Over span", "spans", lambda: CheckedText(
+        str, "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, "
+        "1:4; or one value for all. A smooth curve goes through them.")),
+    "about": FormRow("About", "point", _choice(
+        "What stays in place while it turns or grows.",
+        {what: ABOUT[what] for what in ("centroid", "point")})),
+    "point": FormRow("Point", "point", _vector("The point that stays in place.")),
+    "axis": FormRow("Axis", "axis", _vector(
+        "Direction of the axis; its length does not matter.", (0.0, 0.0, 1.0), a_direction)),
+    "side": FormRow("Side", "side", _choice(
+        "Which side moves.", {side: term.label for side, term in SIDES.items()},
+        {side: term.tip for side, term in SIDES.items()})),
+    "term": FormRow("Shape", "term", _vector(
+        "The term of the shape function, counted from 1 at the leading edge, and how many.",
+        (1.0, 1.0), unless(lambda kn: all(n == int(n) for n in kn) and 1 <= kn[0] <= kn[1],
+                           "expected whole numbers, and a term from 1 to how many there are"),
+        ("term", "of")), read=_integers),
+    "peak": FormRow("Peak at (%)", "peak", _number(
+        "Where the bump is highest, in percent of the chord.", 50.0,
+        unless(lambda value: 0.0 < value < 100.0,
+               "the peak lies between 0 and 100 % of the chord")),
+        lambda peak: round(100.0 * peak, 10), lambda percent: round(percent / 100.0, 14)),
+    "raised": FormRow("Raised by", "height", _number(
+        "How far it is raised, in the mesh's length unit.")),
+    "chord": FormRow("Chord", "chord", _vector(
+        "x of the leading and of the trailing edge: the airfoil lies along x.", (0.0, 1.0),
+        unless(lambda ends: ends[0] < ends[1], "the trailing edge has the larger x"),
+        ("x from", "to"))),
+    "path": FormRow("File", "path", TextField),
+    "limit": FormRow("At most away", "limit", _number(
+        "How far a node may stay away, a length; 0 is 1 % of the boundary's size.", 0.0,
+        unless(lambda value: value >= 0.0, "a distance is not below 0"))),
 }
-"""The rows of the form; each is named as its field in `MotionEditor`."""
+# fmt: on
+"""The rows of the form; each field is also an attribute of `MotionEditor`, by its name here."""
 FIELDS: dict[type, tuple[str, ...]] = {
     Translate: ("vector",),
     Rotate: ("angle",),
@@ -150,6 +205,10 @@ class MotionEditor(QWidget):
 
     ``walls``: the field for hub and shroud, which motions over the span have in common.
     """
+
+    if TYPE_CHECKING:  # the fields of `ROWS`
+
+        def __getattr__(self, name: str) -> Any: ...
 
     changed = Signal(object)  # Motion
     """The motion as edited, in place of the one that was shown."""
@@ -187,83 +246,14 @@ class MotionEditor(QWidget):
             "here.",
         )
         self.kind = Choice(KINDS)
-        self.vector = VectorField(
-            tip="How far it moves along each axis, in the mesh's length unit."
-        )
-        self.angle = NumberField(
-            tip="Degrees; positive turns counter-clockwise seen against the axis."
-        )
-        self.factors = VectorField(
-            (1.0, 1.0, 1.0), tip="Enlargement along each axis: 1 leaves it, 2 doubles it."
-        )
-        for field in self.factors.fields:
-            field._allowed = not_zero
-        self.percent = NumberField(
-            allowed=scale_problem,
-            tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
-        )
-        self.distance = NumberField(
-            tip="How far it also moves outwards, in the mesh's length unit."
-        )
-        first = {what: ABOUT[what] for what in ("centroid", "point")}
-        self.about = Choice(first, "What stays in place while it turns or grows.")
-        self.point = VectorField(tip="The point that stays in place.")
-        self.axis = VectorField(
-            (0.0, 0.0, 1.0), a_direction, tip="Direction of the axis; its length does not matter."
-        )
-        self.box = Choice({}, "The box whose control points move: of the mesh, or of the case.")
-        self.index = VectorField(
-            allowed=control_point_problem,
-            names="ijk",
-            tip="The control point, counted from 0 along each direction of the box; -1 is all.",
-        )
-        self.plane = NumberField(
-            0.0,
-            lambda value: control_point_problem((value,)),
-            tip="The plane of control points, counted from 0 along j; -1 is all.",
-        )
-        self.amount = NumberField(
-            tip="How far control points move, in the mesh's length unit. With the thickness, the "
-            "last ones move forwards, and the first ones as far backwards."
-        )
-        self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
-        self.side.set_tips({side: term.tip for side, term in SIDES.items()})
-        self.term = VectorField(
-            (1.0, 1.0),
-            term_problem,
-            names=("term", "of"),
-            tip="The term of the shape function, counted from 1 at the leading edge, and how many.",
-        )
-        self.peak = NumberField(
-            50.0, peak_problem, tip="Where the bump is highest, in percent of the chord."
-        )
-        self.raised = NumberField(tip="How far it is raised, in the mesh's length unit.")
-        self.chord = VectorField(
-            (0.0, 1.0),
-            chord_problem,
-            names=("x from", "to"),
-            tip="x of the leading and of the trailing edge: the airfoil lies along x.",
-        )
-        kinds = {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()}
-        self.change = Choice(kinds, "What of the blade's sections the curve changes.")
-        self.change.set_tips({kind: term.tip for kind, term in SPAN_KINDS.items()})
+        for name, row in ROWS.items():
+            setattr(self, name, row.make())
         self.drawn = SpanCurveField()
-        self.curve = CheckedText(
-            self.drawn.written,
-            "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, 1:4; "
-            "or one value for all. A smooth curve goes through them.",
-        )
-        self.limit = NumberField(
-            allowed=limit_problem,
-            tip="How far a node may stay away, a length; 0 is 1 % of the boundary's size.",
-        )
-        self.path = TextField()
-        self.browse = QPushButton("…")
+        self.curve.read = self.drawn.written
+        self.browse = push_button("…", "Choose the file.", self._browse)
         self.browse.setMaximumWidth(30)
-        self.browse.setToolTip("Choose the file.")
-        self.table = QPushButton("Table…")
-        self.table.setObjectName("motion_table")
-        self.table.setToolTip("Type or paste the rows, or change them, and save them as the file.")
+        tip = "Type or paste the rows, or change them, and save them as the file."
+        self.table = push_button("Table…", tip, self.table_wanted, "motion_table")
 
     def _place_fields(self) -> None:
         both = (self.kind, self.marker)
@@ -293,13 +283,12 @@ class MotionEditor(QWidget):
         self.change.chosen.connect(self.drawn.change_kind)
         for choice in (self.marker, self.box, self.side):
             choice.chosen.connect(lambda _: self._emit_changed())
-        for field in self._rows.values():
-            if isinstance(field, NumberField | VectorField | CheckedText):
-                field.changed.connect(lambda _: self._emit_changed())
+        kinds = NumberField, VectorField, CheckedText
+        self._checked = [each for each in self._rows.values() if isinstance(each, kinds)]
+        for field in self._checked:
+            field.changed.connect(lambda _: self._emit_changed())
         self.drawn.changed.connect(self.changed)
         self.path.textEdited.connect(lambda _: self._emit_changed())
-        self.browse.clicked.connect(self._browse)
-        self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
     def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
         """Show a motion, offering ``targets`` and ``dim`` components; None hides the editor."""
@@ -335,8 +324,8 @@ class MotionEditor(QWidget):
             self._sync_boxes(value)
         elif name == "curve":
             assert isinstance(self._motion, SpanMotion)
-            self.curve.show_value(curve_text(self._motion))
             self.drawn.show_motion(self._motion)
+            self.curve.show_value(curve_text(self._motion))
         elif name != "path":
             getattr(self, name).show_value(value)
         elif str(value) != self.path.text() and not self.path.hasFocus():
@@ -359,11 +348,7 @@ class MotionEditor(QWidget):
             offered.insert(-1, "axis")
         if self._radial(motion) is not None:
             offered.insert(-1, "radial")
-        words = [self._about_words(what) for what in offered]
-        if [self.about.itemText(row) for row in range(self.about.count())] != words:
-            self.about.clear()
-            for what, word in zip(offered, words, strict=True):
-                self.about.addItem(word, what)
+        self.about.offer({what: self._about_words(what) for what in offered})
         what = {"centroid": "centroid", None: "line"}.get(motion.point, "point")  # type: ignore[arg-type]
         if "axis" in offered and self._is_machine(motion) and not self._as_point:
             what = "axis"
@@ -404,21 +389,13 @@ class MotionEditor(QWidget):
         return motion.axis == axis and motion.point == origin[: self._dim]
 
     def _sync_targets(self, motion: Motion, targets: tuple[Target, ...]) -> None:
-        targets = tuple(dict.fromkeys((*targets, motion.marker)))
-        if targets != self._targets:
-            self._targets = targets
-            self.marker.clear()
-            for place, target in enumerate(targets):
-                # The item's data is an index: Qt would turn a tuple of names into a list.
-                self.marker.addItem(target_words(target), place)
+        self._targets = targets = tuple(dict.fromkeys((*targets, motion.marker)))
+        # The item's data is an index: Qt would turn a tuple of names into a list.
+        self.marker.offer({k: target_words(target) for k, target in enumerate(targets)})
         self.marker.show_value(targets.index(motion.marker))
 
     def _sync_boxes(self, chosen: str) -> None:
-        names = tuple(dict.fromkeys((*self.boxes, chosen)))
-        if [self.box.itemData(row) for row in range(self.box.count())] != list(names):
-            self.box.clear()
-            for name in names:
-                self.box.addItem(name or "(no box)", name)
+        self.box.offer({name: name or "(no box)" for name in (*self.boxes, chosen)})
         self.box.show_value(chosen)
 
     def _kind_chosen(self, kind: type) -> None:
@@ -452,9 +429,8 @@ class MotionEditor(QWidget):
     def show_another(self) -> None:
         """Reset what is not of the motion before another is shown: “a point”, invalid texts."""
         self._as_point = False
-        for field in self._rows.values():
-            if isinstance(field, NumberField | VectorField | CheckedText):
-                field.restore()
+        for field in self._checked:
+            field.restore()
 
     def focus(self) -> None:
         """Put the cursor into the first number field of the shown motion, and select its text."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
@@ -23,7 +22,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.errors import CaseError, SlidevizError
-from slideviz.export.flat_section import PageFormat, save_section
+from slideviz.export.flat_section import PageFormat
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
@@ -42,8 +41,7 @@ from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
-from slideviz.gui.widgets.services import Services, main_window
+from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
@@ -54,10 +52,6 @@ from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import can_cut, first_section
 from slideviz.session.state import IN_FILE, Session
-
-if TYPE_CHECKING:
-    from slideviz.gui.viewport.section_views import SectionViews
-
 
 STEPS = 1000  # positions of the slider
 FREE = "free"
@@ -288,18 +282,12 @@ SIZES = {
 
 
 class SectionsPanel(Panel):
-    """The panel of the sections: their list, and the editor of the selected one.
+    """The panel of the sections: their list, and the editor of the selected one."""
 
-    ``section_views``: the handles and the flat views of the selected section.
-    """
-
-    picture_wanted = Signal(object)  # PageFormat
-    """The user wants a picture of the selected section, on this paper."""
-
-    def __init__(self, section_views: SectionViews) -> None:
-        super().__init__(section_views.store)
+    def __init__(self, services: Services) -> None:
+        super().__init__(services.store)
         self.setObjectName("sections")
-        self.section_views = section_views
+        self.services = services
         self._period = Period()
         self._size = 8.5, 12.0  # cm
         self._make_list()
@@ -335,8 +323,9 @@ class SectionsPanel(Panel):
     def _make_tools(self) -> None:
         self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
         self.handle.clicked.connect(lambda on: self.store.change(changes.show_handle, on))
-        self.flat.clicked.connect(self.section_views.want_flat)
-        self.look = tool_button("", self.section_views.look_along, image="along")
+        views = self.services.section_views
+        self.flat.clicked.connect(views.want_flat)
+        self.look = tool_button("", views.look_along, image="along")
         self.sizes = QMenu()
         self.picture = tool_button(
             "Save a picture of this section (PNG, SVG, PDF)…", image="picture", menu=self.sizes
@@ -441,11 +430,11 @@ class SectionsPanel(Panel):
         try:
             with_walls(section, session.mesh, session.case, session.pairs)
         except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
-            main_window(self).banner.show_message(with_field_labels(str(error)))
+            self.services.banner.show_message(with_field_labels(str(error)))
 
     def _want_picture(self, paper: PageFormat) -> None:
         title, axes = self.titled.isChecked(), self.with_axes.isChecked()
-        self.picture_wanted.emit(replace(paper, title=title, axes=axes))
+        self.services.exports.section(replace(paper, title=title, axes=axes))
 
     def _want_other_size(self) -> None:
         size = questions.ask_paper(self, *self._size)
@@ -478,32 +467,3 @@ class SectionsPanel(Panel):
 def _shown(session: Session) -> object:
     view = session.view
     return session.mesh, view.sections, view.section_index, view.handle
-
-
-def sections_panel(window: Services) -> SectionsPanel:
-    """Return a new sections panel, connected with a window."""
-    panel = SectionsPanel(window.section_views)
-    panel.picture_wanted.connect(lambda paper: save_picture(window, paper))
-    return panel
-
-
-def save_picture(window: Services, paper: PageFormat) -> None:
-    """Ask for a file name and start the job that writes a picture of the selected section."""
-    session, section = window.store.session, window.store.session.view.section
-    if section is None or session.frame is None or window.runner.busy:
-        return
-    stem = session.path.stem if session.path is not None else "mesh"
-    default = window.files.folder() / f"{stem}_section.png"
-    path = questions.ask_save(window, "Save picture of the section", default, PLOT_FILTERS)
-    if path is None:
-        return
-    window.settings.setValue("folder", str(path.parent))
-    window.running.start_job(
-        f"Drawing {path.name}",
-        lambda done: window.show_status(f"Saved {done}"),
-        save_section,
-        path,
-        session,
-        section,
-        paper,
-    )

@@ -25,10 +25,17 @@ class Choice(QComboBox):
         super().__init__()
         self.setToolTip(wrapped(tip))
         self.setObjectName(name)
-        for value, text in words.items():
-            self.addItem(text, value)
+        self.offer(words)
         self.setMinimumContentsLength(8)
         self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
+
+    def offer(self, words: Mapping[Value, str]) -> None:
+        """Offer other values, each shown by a text; none is chosen anew where they are the same."""
+        rows = range(self.count())
+        if [(self.itemData(row), self.itemText(row)) for row in rows] != list(words.items()):
+            self.clear()
+            for value, text in words.items():
+                self.addItem(text, value)
 
     def show_value(self, value: object) -> None:
         """Select the entry of a value, if there is one; `chosen` is not emitted."""

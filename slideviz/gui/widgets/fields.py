@@ -6,12 +6,13 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
-from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
+from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal, SignalInstance
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValidator, QWheelEvent
-from qtpy.QtWidgets import QApplication, QCheckBox, QLineEdit, QSpinBox, QWidget
+from qtpy.QtWidgets import QApplication, QLineEdit, QSpinBox, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import set_style
@@ -19,11 +20,9 @@ from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.services import main_window
 
 _ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")  # the letters that an expression may have
-_SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
+_OPERATIONS: dict[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
-}
-_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -50,12 +49,13 @@ def typed_number(text: str) -> float:
 
 def _value(node: ast.expr) -> float:
     """Return the value of a node of the parsed expression; raise ValueError for other nodes."""
-    if isinstance(node, ast.Constant):
-        return float(node.value)  # type: ignore[arg-type]  # only digits came here
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:
-        return _SIGNS[type(node.op)](_value(node.operand))
-    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
-        return _OPERATIONS[type(node.op)](_value(node.left), _value(node.right))
+    match node:
+        case ast.Constant(value):
+            return float(value)  # type: ignore[arg-type]  # only digits came here
+        case ast.UnaryOp(op, value) if type(op) in _OPERATIONS:
+            return _OPERATIONS[type(op)](_value(value))
+        case ast.BinOp(left, op, right) if type(op) in _OPERATIONS:
+            return _OPERATIONS[type(op)](_value(left), _value(right))
     raise ValueError("is not a number")
 
 
@@ -123,15 +123,10 @@ def _clear_undo(field: QLineEdit) -> None:
         field.setText(field.text())
 
 
-@contextmanager
-def _as_undo(field: QWidget) -> Iterator[None]:
+def _as_undo(field: QWidget) -> AbstractContextManager[None]:
     """Let the session take a value that it had before as its own undo, not as a new change."""
     window = main_window(field)
-    if window is None:
-        yield
-        return
-    with window.store.reverting():
-        yield
+    return nullcontext() if window is None else window.store.reverting()
 
 
 class TextField(QLineEdit):
@@ -143,18 +138,30 @@ class TextField(QLineEdit):
 
 
 class CheckedField(TextField):
-    """The base of fields whose text may be invalid: it is marked then, and Escape replaces it."""
+    """The base of fields whose text may be invalid: it is marked then, and Escape replaces it.
 
+    The value is then the one from before the editing, not a valid beginning of what was typed.
+    """
+
+    changed: SignalInstance
+    """The new value after each valid edit."""
     marked = Signal()
     """``fault`` has changed."""
 
-    def __init__(self, text: str, tip: str) -> None:
+    def __init__(self, text: str, value: Any, tip: str) -> None:
         super().__init__(text)
         self._tip = tip
+        self._value = self._before = value
         self.fault = ""  # why the field is marked as invalid; empty if it is not
+        self.together = ""  # why it is invalid together with the fields beside it, set by these
         self.setToolTip(wrapped(tip))
         self.textEdited.connect(self._edited)
         self.editingFinished.connect(self._finish)
+
+    @property
+    def value(self) -> Any:
+        """Return the last valid value."""
+        return self._value
 
     @property
     def problem(self) -> str:
@@ -163,25 +170,57 @@ class CheckedField(TextField):
 
     def restore(self) -> None:
         """Replace an invalid text by the last valid one; nothing is emitted."""
+        if self.fault:
+            self._write()
+            self.mark()
+
+    def _write(self) -> None:
+        self.setText(self._text())
+        self.setCursorPosition(0)
+
+    def _typed(self) -> Any:
+        """Return the value of a valid text."""
         raise NotImplementedError
 
+    def _text(self) -> str:
+        """Return the text of the value."""
+        return str(self._value)
+
     def _edited(self) -> None:
-        raise NotImplementedError
+        if self.problem:
+            self._revert_text()
+        else:
+            self._value = self._typed()
+            # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
+            self.changed.emit(self._value)
+        self.mark()
 
     def _finish(self) -> None:
         """Keep a valid text when the editing ends; of an invalid one, the value before it."""
-        raise NotImplementedError
+        if not self.problem:
+            self._before = self._value
+            return
+        self._revert_text()
+        _report_restored(self, self.problem, self._text())
+        self.mark()
+
+    def _revert_text(self) -> None:
+        """Take back a valid beginning of a text that is not valid."""
+        if self._value != self._before:
+            self._value = self._before
+            with _as_undo(self):
+                self.changed.emit(self._value)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and (problem := self.problem):
+        if event.key() == Qt.Key.Key_Escape and self.problem:
             self._finish()
             self.restore()
-            _report_restored(self, problem, self.text())
         else:
             super().keyPressEvent(event)
 
-    def _mark(self, problem: str) -> None:
+    def mark(self) -> None:
         """Mark the field as invalid, with the reason as tooltip, or as valid again."""
+        problem = self.problem or self.together
         self.setToolTip(wrapped(problem or self._tip))
         set_style(self, "bad", bool(problem))
         if problem != self.fault:
@@ -192,67 +231,47 @@ class CheckedField(TextField):
 
 
 class CheckedText(CheckedField):
-    """A field for a text that may be wrong: it is marked as invalid then, and emits nothing.
+    """A field for a text that may be wrong.
 
-    Its value is then the one from before the editing, not a valid beginning of what was typed.
     ``read``: returns a text as it is written, or raises a SlidevizError that says what is wrong.
     """
 
     changed = Signal(str)
-    """The new text, as it is written, after each valid edit."""
 
     def __init__(self, read: Callable[[str], str], tip: str = "") -> None:
-        super().__init__("", tip)
-        self._read, self.value, self._before = read, "", ""
+        super().__init__("", "", tip)
+        self.read = read
 
     @property
     def problem(self) -> str:
         try:
-            self._read(self.text())
+            self.read(self.text())
         except SlidevizError as problem:
             return str(problem)
         return ""
 
     def show_value(self, text: str) -> None:
         """Set the text; nothing is emitted, and what is typed of the same value stays."""
-        same = text == self.value and self.isModified()
-        self.value = text
+        same = text == self._value and self.isModified()
+        self._value = text
         if not same:
             self._before = text
-            self.restore()
+            self._write()
+            self.mark()
 
-    def restore(self) -> None:
-        self.setText(self.value)
-        self.setCursorPosition(0)
-        self._mark("")
-
-    def _edited(self) -> None:
-        problem = self.problem
-        value = self._before if problem else self._read(self.text())
-        if value != self.value:
-            self.value = value
-            self.changed.emit(value)
-        self._mark(problem)
-
-    def _finish(self) -> None:
-        if self.problem:
-            _report_restored(self, self.problem, self.value)
-        else:
-            self._before = self.value
+    def _typed(self) -> str:
+        return self.read(self.text())
 
 
 class NumberField(CheckedField):
     """A field for a number, typed as such or as an expression, which its value then replaces.
 
     It shows six digits, and all of them while it is edited. An invalid text is marked at once, and
-    stays when the field is left; its value is the one from before the editing (not a valid
-    beginning of what was typed), which Escape writes again. ``allowed``: returns why a value is not
-    allowed; empty if it is. ``words``: texts for some values; the first letters of one are enough
-    to type it.
+    stays when the field is left. ``allowed``: returns why a value is not allowed; empty if it is.
+    ``words``: texts for some values; the first letters of one are enough to type it.
     """
 
     changed = Signal(float)
-    """The new number after each valid edit."""
 
     def __init__(
         self,
@@ -262,21 +281,14 @@ class NumberField(CheckedField):
         words: Mapping[float, str] | None = None,
     ) -> None:
         self._words = words or {}
-        super().__init__(self._words.get(value, short_text(value)), tip)
+        super().__init__(self._words.get(value, short_text(value)), float(value), tip)
         self._allowed = allowed or (lambda _: "")
-        self._value = self._before = float(value)
         self._scale = 0.0
-        self.together = ""  # why it is invalid together with the fields beside it, set by these
         self._whole = False
         self._twice_ms = float("-inf")
         self.setCursorPosition(0)
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
-
-    @property
-    def value(self) -> float:
-        """Return the last valid number."""
-        return self._value
 
     @property
     def _shows_value(self) -> bool:
@@ -297,7 +309,6 @@ class NumberField(CheckedField):
         return self._allowed(value)
 
     def _typed(self) -> float:
-        """Return the value of the text; raises ValueError where it has none."""
         start = self.text().strip().lower()
         for value, word in self._words.items():
             if start and word.startswith(start):
@@ -339,16 +350,6 @@ class NumberField(CheckedField):
         if not exact:
             self.setCursorPosition(0)
 
-    def restore(self) -> None:
-        if self.problem:
-            self._write()
-            self.mark()
-
-    def recheck(self) -> None:
-        """Take the text if it was invalid and is valid now, because of another field."""
-        if not (self._shows_value or self.problem) and self._typed() != self._value:
-            self._edited()
-
     def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.problem:
             self._before = self._value
@@ -385,34 +386,6 @@ class NumberField(CheckedField):
             self.setModified(False)
             _clear_undo(self)
             self._write()
-
-    def _edited(self) -> None:
-        if self.problem:
-            self._revert_text()
-        else:
-            self._value = self._typed()
-            # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
-            self.changed.emit(self._value)
-        self.mark()
-
-    def _finish(self) -> None:
-        if not self.problem:
-            self._before = self._value
-            return
-        self._revert_text()
-        _report_restored(self, self.problem, self._text())
-        self.mark()
-
-    def _revert_text(self) -> None:
-        """Take back a valid beginning of a text that is not valid."""
-        if self._value != self._before:
-            self._value = self._before
-            with _as_undo(self):
-                self.changed.emit(self._value)
-
-    def mark(self) -> None:
-        """Mark the field as invalid, alone or together with others, or as valid again."""
-        self._mark(self.problem or self.together)
 
 
 class NumberBox(QSpinBox):
@@ -516,14 +489,6 @@ class NumberBox(QSpinBox):
             self.marked.emit()
 
 
-class Switch(QCheckBox):
-    """A check box for a setting, with the methods that a `KeyForm` needs."""
-
-    def show_value(self, on: bool) -> None:
-        """Show whether the setting is on."""
-        self.setChecked(on)
-
-
-def not_zero(value: float) -> str:
-    """Return why a factor may not be zero; empty for other values."""
-    return "" if value else "0 would flatten the boundary"
+def unless(holds: Callable[[Any], object], why: str) -> Callable[[Any], str]:
+    """Return a check of a value, which returns ``why``, or an empty text where it holds."""
+    return lambda value: "" if holds(value) else why

@@ -13,6 +13,7 @@ from slideviz.gui.widgets.banner import Banner
 from slideviz.session.store import Store
 
 if TYPE_CHECKING:
+    from slideviz.gui.dialogs.exports import Exports
     from slideviz.gui.docks import Docks
     from slideviz.gui.files import Files
     from slideviz.gui.running import Running
@@ -35,10 +36,11 @@ class Services(QMainWindow):
     """Runs the job; ``busy`` while there is one."""
     files: Files
     """Opens and saves; knows the folder and the stem of file names that dialogs offer."""
+    exports: Exports
     viewing: Viewing
     section_views: SectionViews
-    """`viewing`, `section_views`: the 3D views; the handles and flat views of the selected
-    section."""
+    """`exports`, `viewing`, `section_views`: what writes pictures, films and more; the 3D views;
+    the handles and flat views of the selected section."""
     dock_manager: Docks
     """The docks with the panels."""
 

@@ -43,9 +43,7 @@ class SpanWalls(Panel):
             with suppress(CaseError):  # names that do not say which
                 self._by_name = span_ends(session.case.change(span=None), mesh)
         for k, end in enumerate(self.ends):
-            end.clear()
-            for name in () if mesh is None else mesh.marker_names:
-                end.addItem(name, name)
+            end.offer({} if mesh is None else {name: name for name in mesh.marker_names})
             end.setCurrentIndex(-1)
             end.show_value((session.case.span or self._by_name or ("", ""))[k])
 

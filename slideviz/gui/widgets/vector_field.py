@@ -9,7 +9,7 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from slideviz.gui.widgets.build import in_row
-from slideviz.gui.widgets.fields import NumberField
+from slideviz.gui.widgets.fields import NumberField, unless
 
 
 class VectorField(QWidget):
@@ -108,39 +108,10 @@ class VectorField(QWidget):
         self._mark()
 
 
-def a_direction(values: Sequence[float]) -> str:
-    """Return why numbers are no direction (all are 0); empty if they are one."""
-    return "" if any(values) else "an axis needs a direction: not all may be 0"
-
-
-def scale_problem(value: float) -> str:
-    """Return why a radius cannot change by this many percent; empty if it can."""
-    return "" if value > -100.0 else "-100 % or less would fold the boundary"
-
-
-def control_point_problem(values: Sequence[float]) -> str:
-    """Return why numbers are no index of a control point; empty if they are."""
-    whole = all(value == int(value) and value >= -1 for value in values)
-    return "" if whole else "expected whole numbers from 0, or -1 for all"
-
-
-def term_problem(values: Sequence[float]) -> str:
-    """Return why numbers are no term of a shape function; empty if they are."""
-    k, n = values
-    whole = k == int(k) and n == int(n) and 1 <= k <= n
-    return "" if whole else "expected whole numbers, and a term from 1 to how many there are"
-
-
-def peak_problem(value: float) -> str:
-    """Return why a bump cannot have its peak at this percentage of the chord; empty if it can."""
-    return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
-
-
-def limit_problem(value: float) -> str:
-    """Return why a distance cannot be the limit of a motion onto a surface; empty if it can."""
-    return "" if value >= 0.0 else "a distance is not below 0"
-
-
-def chord_problem(values: Sequence[float]) -> str:
-    """Return why a chord cannot go from one x to another; empty if it can."""
-    return "" if values[0] < values[1] else "the trailing edge has the larger x"
+a_direction = unless(any, "an axis needs a direction: not all may be 0")
+"""The check of an axis."""
+control_point_problem = unless(
+    lambda values: all(value == int(value) and value >= -1 for value in values),
+    "expected whole numbers from 0, or -1 for all",
+)
+"""The check of the index of a control point."""
