@@ -20,6 +20,7 @@ from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
 from slideviz.design.su2.on_mesh import problems_of_markers
+from slideviz.design.su2.shapes import Displacer
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
@@ -175,17 +176,19 @@ def places_words(places: list[int]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class MovedBoxes:
-    """FFD boxes that a design deforms (a `Displacer`)."""
+class MovedBoxes(Displacer):
+    """FFD boxes that a design deforms."""
 
-    config: Su2Config
-    mesh: Mesh
-    nodes: IntArray
     boxes: tuple[Box, ...]
     """Those in which variables move nodes or that others carry, in the order of the file."""
     embedded: dict[str, Embedding]  # the nodes in each box, by their place in ``nodes``
     held: dict[str, Planes]  # planes of control points of each box that do not move
-    warnings: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what was found when nodes were looked for, and the design applied."""
+        return self.remarks
 
     @property
     def inside(self) -> dict[str, int]:
@@ -299,13 +302,13 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
         if name in names:
             warnings += [text for each in config.markers for text in off_points(box, mesh, each)]
     held, stuck = held_by_continuity(config, mesh, {box.name: box for box in boxes})
-    moved = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held, ())
+    moved = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held)
     try:
         notes = moved.at_design.notes
     except CaseError as problem:
         raise CaseError(f"{config.source}: {problem}") from problem
     notes = [*notes, *_without_effect(moved), *angle_notes(config.variables, config.relaxation)]
-    return replace(moved, warnings=(*warnings, *stuck, *notes))
+    return replace(moved, remarks=(*warnings, *stuck, *notes))
 
 
 def _without_effect(found: MovedBoxes) -> list[str]:

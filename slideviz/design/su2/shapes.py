@@ -22,6 +22,43 @@ OFF_CHORD = 0.05  # how far its ends may be from there without a warning
 
 
 @dataclass(frozen=True, eq=False)
+class Displacer:
+    """Displaces the moving nodes by the design variables of one group; without a group none."""
+
+    config: Su2Config
+    mesh: Mesh
+    nodes: IntArray
+
+    @property
+    def idle(self) -> tuple[bool, ...]:
+        """Return for each variable whether it has no effect."""
+        return (False,) * len(self.config.variables)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return sentences for the user."""
+        return ()
+
+    @property
+    def inside(self) -> dict[str, int]:
+        """Return how many moving nodes are in each FFD box that moves some."""
+        return {}
+
+    def displacement(self) -> FloatArray:
+        """Return the displacement (m, d) of the moving nodes by all variables."""
+        return np.zeros((len(self.nodes), self.mesh.dim))
+
+    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
+        """Return the derivative (m, d) with respect to a value; see `MovingSurface.slope`."""
+        del place, part, undeformed
+        return np.zeros((len(self.nodes), self.mesh.dim))
+
+    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
+        """Return the FFD boxes that the design moves, and whether their nodes are placed anew."""
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
 class MovedNodes:
     """Moving nodes of a mesh: what the formulas depend on."""
 
@@ -221,13 +258,8 @@ FORMULAS = {
 """What each kind does; kinds that are not here move nothing."""
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """Formulas that move nodes (a `Displacer`): each acts on undeformed points, as in SU2."""
-
-    config: Su2Config
-    mesh: Mesh
-    nodes: IntArray
+class Shapes(Displacer):
+    """Formulas that move nodes: each acts on undeformed points, as in SU2."""
 
     @cached_property
     def _surface(self) -> MovedNodes:
@@ -246,11 +278,6 @@ class Shapes:
             )
         kinds = {each.kind for each in variables if not each.ignored}
         return (*notes, *(self._surface.chord_notes(kinds) if len(self.nodes) else ()))
-
-    @property
-    def inside(self) -> dict[str, int]:
-        """Return that no FFD box moves nodes."""
-        return {}
 
     @property
     def idle(self) -> tuple[bool, ...]:
@@ -284,10 +311,6 @@ class Shapes:
 
     def _factor(self, formula: Formula) -> float:
         return self.config.relaxation if formula.relaxed else 1.0
-
-    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
-        """Return none: these variables do not move FFD boxes."""
-        return {}
 
 
 def _shown(point: FloatArray) -> str:

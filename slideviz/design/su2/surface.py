@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import accumulate, pairwise, starmap
+from itertools import pairwise, starmap
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from slideviz.case.zones import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.on_mesh import joined, markers_of, points_of, problems_of_markers
-from slideviz.design.su2.shapes import Shapes
+from slideviz.design.su2.shapes import Displacer, Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
 from slideviz.errors import CaseError, DeformError, Note, SlidevizError
 from slideviz.ffd.box import Box
@@ -114,13 +114,8 @@ def _count(config: Su2Config, name: str) -> int:
 POSITION = Columns("position", ("x", "y", "z"), flat=True)
 
 
-@dataclass(frozen=True, eq=False)
-class ListedPositions:
-    """New positions of nodes, as a file lists them (a `Displacer`)."""
-
-    config: Su2Config
-    mesh: Mesh
-    nodes: IntArray
+class ListedPositions(Displacer):
+    """New positions of nodes, as a file lists them: there is no value to change."""
 
     @cached_property
     def _listed(self) -> tuple[FloatArray, tuple[str, ...]]:
@@ -133,28 +128,9 @@ class ListedPositions:
         """Return what reading the file found."""
         return self._listed[1]
 
-    @property
-    def idle(self) -> tuple[bool, ...]:
-        """Return that no variable is without effect."""
-        return (False,) * len(self.config.variables)
-
-    @property
-    def inside(self) -> dict[str, int]:
-        """Return that no FFD box moves nodes."""
-        return {}
-
     def displacement(self) -> FloatArray:
         """Return the displacement (m, d) of the nodes."""
         return self._listed[0] - self.mesh.points[self.nodes]
-
-    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
-        """Return zeros (m, d): the variable has no value to change."""
-        del place, part, undeformed
-        return np.zeros((len(self.nodes), self.mesh.dim))
-
-    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
-        """Return none: FFD boxes stay."""
-        return {}
 
 
 def read_positions(
@@ -196,38 +172,10 @@ RIGID = ("TRANSLATION", "ROTATION", "SCALE")
 """Kinds of variables that move boundaries as a rigid body, or scale them."""
 
 
-class Displacer(Protocol):
-    """Displaces the moving nodes by the design variables of one group."""
-
-    @property
-    def idle(self) -> tuple[bool, ...]:
-        """For each variable, whether it has no effect."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences for the user."""
-
-    @property
-    def inside(self) -> dict[str, int]:
-        """How many moving nodes are in each FFD box that moves some."""
-
-    def displacement(self) -> FloatArray:
-        """Return the displacement (m, d) of the moving nodes by all variables."""
-
-    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
-        """Return the derivative (m, d) with respect to a value; see `MovingSurface.slope`."""
-
-    def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
-        """Return the FFD boxes that the design moves, and whether their nodes are placed anew."""
-
-
 @dataclass(frozen=True, eq=False)
-class ZoneDisplacers:
-    """The displacers of zones with a configuration each, as one (a `Displacer`)."""
+class ZoneDisplacers(Displacer):
+    """The displacers of zones with a configuration each, as one."""
 
-    config: Su2Config
-    mesh: Mesh
-    nodes: IntArray
     zones: tuple[MovingSurface, ...]
 
     @cached_property
@@ -237,24 +185,17 @@ class ZoneDisplacers:
         return list(starmap(slice, pairwise(ends)))
 
     @cached_property
-    def _first(self) -> list[int]:
-        """The place of the first variable of each zone among those of all."""
-        lists = dict.fromkeys(zone.config.variables for zone in self.zones)
-        ends = accumulate(map(len, lists), initial=0)
-        first = dict(zip(lists, ends, strict=False))
-        return [first[zone.config.variables] for zone in self.zones]
-
-    def _having(self, place: int) -> list[tuple[int, int]]:
-        """Return the zones that have a variable, and its place there."""
-        lengths = [len(zone.config.variables) for zone in self.zones]
-        each = enumerate(zip(self._first, lengths, strict=True))
-        return [(k, place - at) for k, (at, count) in each if at <= place < at + count]
+    def _owners(self) -> list[list[tuple[int, int]]]:
+        """The zones that have each variable, and its place in their lists."""
+        having: dict[tuple[DesignVariable, ...], list[int]] = {}
+        for k, zone in enumerate(self.zones):
+            having.setdefault(zone.config.variables, []).append(k)
+        return [[(k, at) for k in some] for each, some in having.items() for at in range(len(each))]
 
     @property
     def idle(self) -> tuple[bool, ...]:
         """Return for each variable whether it has no effect in any zone."""
-        places = range(len(self.config.variables))
-        return tuple(all(self.zones[k].idle[at] for k, at in self._having(p)) for p in places)
+        return tuple(all(self.zones[k].idle[at] for k, at in some) for some in self._owners)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -276,7 +217,7 @@ class ZoneDisplacers:
     def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
         """Return the derivative (m, d) with respect to a value, in all zones that have it."""
         out = np.zeros((len(self.nodes), self.mesh.dim))
-        for k, at in self._having(place):
+        for k, at in self._owners[place]:
             out[self._rows[k]] = self.zones[k].slope(at, part, undeformed)
         return out
 
