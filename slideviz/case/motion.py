@@ -298,7 +298,7 @@ def _together(
     return each, total
 
 
-def apart(case: Case, mesh: Mesh) -> Case:
+def by_zone(case: Case, mesh: Mesh) -> Case:
     """Return a case each of whose motions is of every zone alone, for `zone_cases`.
 
     A common centroid becomes a point, a file what it displaces. Raises CaseError as

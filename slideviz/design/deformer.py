@@ -30,7 +30,7 @@ from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
 from slideviz.design.zones import ZoneDesign, zone_designs
 from slideviz.errors import CaseError, DeformError, Note, not_one_of
-from slideviz.mesh.interfaces import apart_interfaces, torn_interfaces
+from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
@@ -175,11 +175,11 @@ class Deformer:
         solved with twice the digits (a note)."""
         if mesh.zone_parts:
             require_valid(case, mesh)
-            case = motion.apart(case, mesh)
+            case = motion.by_zone(case, mesh)
             make = partial(Deformer, progress=report)
             self._zones = zone_designs(case, mesh, asked.nodes, references, make)
             points = self.deform(references[0])
-            left_out = *left_out, *apart_interfaces(mesh, case.interfaces)
+            left_out = *left_out, *disjoint_interfaces(mesh, case.interfaces)
             said = [f"zone {z.number}: {text}" for z in self._zones for text in z.deformer.warnings]
             self.warnings = (*case.warnings, *left_out, *said, *torn_interfaces(mesh, points))
             return

@@ -51,7 +51,7 @@ def named_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[ZoneInterface, .
     return tuple(each)
 
 
-def apart_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
+def disjoint_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
     """Return a sentence for each pair of ``names`` whose boundaries have no nodes in common."""
     sentences = []
     joined = {frozenset((one.marker, one.other)) for one in mesh.interfaces}

@@ -18,7 +18,7 @@ import numpy as np
 from slideviz.case.check import check_case
 from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile, Onto
-from slideviz.case.motion import apart, displacements
+from slideviz.case.motion import by_zone, displacements
 from slideviz.case.spans import prepare_span
 from slideviz.case.zones import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
@@ -161,7 +161,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         if not all(path.is_file() for path in files):
             return "", ""
         found = folded = None
-        for one, zone in each_zone(apart(case, mesh), mesh):
+        for one, zone in each_zone(by_zone(case, mesh), mesh):
             if found is None and one.markers_with("moving"):
                 moved = displacements(one, zone)
                 asked = one, zone, moved.nodes, moved.vectors

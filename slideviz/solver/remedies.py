@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import apart, displacements
+from slideviz.case.motion import by_zone, displacements
 from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -100,7 +100,7 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
         return ""
     if mesh.zone_parts:
         return next(
-            filter(None, (beyond_pitch(*one) for one in each_zone(apart(case, mesh), mesh))), ""
+            filter(None, (beyond_pitch(*one) for one in each_zone(by_zone(case, mesh), mesh))), ""
         )
     try:
         moved = displacements(case, mesh)

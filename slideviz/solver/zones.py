@@ -11,12 +11,12 @@ import numpy as np
 
 from slideviz.case.check import require_valid
 from slideviz.case.model import Case, Prescribed
-from slideviz.case.motion import apart, displacements
+from slideviz.case.motion import by_zone, displacements
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,
-    apart_interfaces,
+    disjoint_interfaces,
     named_interfaces,
     torn_interfaces,
 )
@@ -44,10 +44,10 @@ class InterfaceMotion:
     def __init__(self, case: Case, mesh: Mesh) -> None:
         self.mesh, self.roles = mesh, case.roles
         self.interfaces = named_interfaces(mesh, case.interfaces)
-        alone = apart(case, mesh)
+        alone = by_zone(case, mesh)
         self.cases = list(zone_cases(alone, mesh))
         """The case of each zone."""
-        self.warnings = *alone.warnings, *apart_interfaces(mesh, case.interfaces)
+        self.warnings = *alone.warnings, *disjoint_interfaces(mesh, case.interfaces)
         """Those of the case, of files of several zones, and on pairs that do not coincide."""
         self.led = np.zeros(len(mesh.points), bool)
         """(n,) bool: the nodes that follow others."""

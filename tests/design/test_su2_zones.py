@@ -69,7 +69,7 @@ def test_each_zone_is_deformed_by_its_configuration_as_alone_to_the_bit(here, ca
     assert "no marker" not in capsys.readouterr().err
 
 
-def test_a_file_for_each_zone_is_written_as_one(here):
+def test_a_file_for_each_zone_is_written_as_one(here, capsys):
     write()
     assert run(["def", "main.cfg", "-q"]) == 0
     together = Path("out.su2").rename("together.su2")
@@ -81,6 +81,10 @@ def test_a_file_for_each_zone_is_written_as_one(here):
     assert run(["def", "main.cfg", "-q"]) == 0
     assert Path("out.su2").read_text().startswith("NZONE= 2\nIZONE= 1\n")
     assert np.array_equal(sv.read("out.su2").points, sv.read(together).points)
+    write(main.replace(", second.cfg", ""), f"MESH_FILENAME= 1.su2\nSTEPZ= 1\n{OTHER}")
+    assert run(["def", "main.cfg", "-q", "--force"]) == 0
+    assert not sv.read("out.su2").zone_parts
+    assert "first.cfg:2: STEPZ is not read" in capsys.readouterr().err
     write(main, "MESH_FILENAME= stage.su2\n", f"MESH_FILENAME= 2.su2\n{OTHER}")
     with pytest.raises(CaseError, match=r"first\.cfg: stage\.su2 has 2 zones, and with MULTIZONE"):
         read_mesh(read_config(Path("main.cfg")))
@@ -172,7 +176,13 @@ LOOPS = {
 }
 
 
-@pytest.mark.parametrize("name", LOOPS)
+SLOW = ("one configuration", "one zone stays")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in LOOPS],
+)
 def test_gradients_are_those_of_all_zones(here, name):
     *texts, values = LOOPS[name]
     mesh = sv.read("stage.su2")

@@ -269,7 +269,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         source=path,
         mesh_file=mesh if first.words["MULTIZONE_MESH"].upper() == "YES" else first.case.mesh_file,
         mesh_out=_with_ending(out, first.case),
-        warnings=(*warnings, *_perhaps_ours(path, strange, rows)),
+        warnings=(*warnings, *_perhaps_ours(path, strange, rows), *first.case.warnings),
     )
     ignored = dict.fromkeys(key for zone in zones for key in zone.ignored)
     return replace(first, case=case, zone=None, zones=tuple(zones), ignored=tuple(ignored))

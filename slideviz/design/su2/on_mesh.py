@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
 
+import numpy as np
+
 from slideviz.case.check import raise_all, unknown_markers
 from slideviz.case.zones import renamed, with_marker_names
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.design.su2.variables import NOTHING
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.files import read
-from slideviz.mesh.model import Marker, Mesh
+from slideviz.mesh.model import IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
 
 PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
@@ -66,10 +68,9 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
             f"{config.source}: CONFIG_LIST has {len(config.zones)} configurations, and {mesh.name} "
             f"{mesh.zones} zones; give one for each"
         )
+    if not mesh.zone_parts:
+        return on_mesh(replace(config, zones=()), mesh)
     zones = tuple(_without_missing(_in_zone(each, mesh), mesh) for each in config.zones)
-    if len(zones) == 1:
-        case = zones[0].case.change(source=config.source, mesh_out=config.case.mesh_out)
-        return replace(zones[0], case=case, zone=None)
     still = tuple(map(_as_still, zones))
     if {each.variables for each in still} == {NOTHING} != {each.variables for each in zones}:
         raise CaseError(_NO_MARKER.format(config.source))
@@ -95,8 +96,6 @@ def _renamed(
 def _in_zone(config: Su2Config, mesh: Mesh) -> Su2Config:
     """Return the configuration of a zone without boundaries of others, named as in the mesh."""
     assert config.zone is not None
-    if not mesh.zone_parts:
-        return config
     part = mesh.zone_parts[config.zone - 1]
     ours = {file: name for name, file in names_in(mesh, part).items()}
     ours |= {numbered(config.zone, file): name for file, name in ours.items()}
@@ -179,18 +178,13 @@ def _without_missing(config: Su2Config, mesh: Mesh) -> Su2Config:
     return replace(config, case=case, named=named, markers=markers)
 
 
-def points_of(config: Su2Config, mesh: Mesh) -> slice:
-    """Return the points of the mesh that a configuration is of: of its zone, or all."""
-    if config.zone is None or not mesh.zone_parts:
-        return slice(0, len(mesh.points))
-    return mesh.zone_parts[config.zone - 1].points
-
-
-def markers_of(config: Su2Config, mesh: Mesh) -> tuple[Marker, ...]:
-    """Return the boundaries of the zone that a configuration is of, or all."""
-    if config.zone is None or not mesh.zone_parts:
-        return mesh.markers
-    return mesh.markers[mesh.zone_parts[config.zone - 1].markers]
+def zone_of(config: Su2Config, mesh: Mesh) -> tuple[IntArray, tuple[Marker, ...]]:
+    """Return the nodes and the boundaries of the zone that a configuration is of, or all."""
+    points, markers = slice(0, len(mesh.points)), slice(None)
+    if config.zone is not None:
+        part = mesh.zone_parts[config.zone - 1]
+        points, markers = part.points, part.markers
+    return np.arange(points.start, points.stop), mesh.markers[markers]
 
 
 def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> list[str]:

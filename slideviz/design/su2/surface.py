@@ -20,7 +20,7 @@ from slideviz.case.model import Case, Prescribed
 from slideviz.case.zones import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config
-from slideviz.design.su2.on_mesh import joined, markers_of, points_of, problems_of_markers
+from slideviz.design.su2.on_mesh import joined, problems_of_markers, zone_of
 from slideviz.design.su2.shapes import Displacer, Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
 from slideviz.errors import CaseError, DeformError, Note, SlidevizError
@@ -334,7 +334,8 @@ class MovingSurface:
 
     def _case(self) -> Case:
         case = self.config.case
-        names = [marker.name for marker in markers_of(self.config, self.mesh)]
+        _, markers = zone_of(self.config, self.mesh)
+        names = [marker.name for marker in markers]
         others = set(names) - set(self.config.markers)
         moving = (each for each in self.config.variables if not each.ignored)
         if (
@@ -349,7 +350,7 @@ class MovingSurface:
             every = dict.fromkeys(names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
         if self.moves_whole_mesh:  # the mesh is moved already
-            listed = [marker.nodes for marker in markers_of(self.config, self.mesh)]
+            listed = [marker.nodes for marker in markers]
             nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
             vectors = np.zeros((len(nodes), self.mesh.dim))
             if self.config.zone is None:
@@ -381,8 +382,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     raise_all(tuple(problems))
     listed = [mesh.marker(name).nodes for name in config.markers]
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
-    at = points_of(config, mesh)
-    nodes = np.arange(at.start, at.stop) if group == "grid" else nodes
+    nodes = zone_of(config, mesh)[0] if group == "grid" else nodes
     with _overflow_as_case_error(config):
         displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
