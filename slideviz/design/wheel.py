@@ -245,12 +245,12 @@ def write_wheel(
         wheel = Wheel([copies[min(k, end)] for k in range(count)], pairs, numbered)
         with _in_zone(mesh, index):
             contents.append(wheel.content())
-            zones.append(_rated(path, wheel, [rated[min(k, end)] for k in range(count)]))
+            zones.append(_zone_wheel(path, wheel, [rated[min(k, end)] for k in range(count)]))
     _write(path, contents, progress or (lambda _: None))
     return replace(_together(zones), limits=tuple(limits))
 
 
-def _rated(path: Path, wheel: Wheel, rated: Sequence[Quality]) -> WheelQuality:
+def _zone_wheel(path: Path, wheel: Wheel, rated: Sequence[Quality]) -> WheelQuality:
     """Return the numbers of the wheel of a zone with the quality of its passages."""
     return WheelQuality(
         path=path,
