@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
 from slideviz.case.model import Case
-from slideviz.case.values import POINT, Kind, one_of
+from slideviz.case.values import POINT, Kind
 from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
 from slideviz.errors import CaseError, shown
-from slideviz.terms import FFD_BLENDINGS, FFD_SYSTEMS
 
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
@@ -63,7 +63,7 @@ def _integers(words: list[Word], least: int) -> Degrees:
 def _said_where_needed(row: Key) -> Key:
     """Return the row of a key, changed so that a file has the key only where it has an effect."""
     usual = getattr(Case(), row.field)
-    needs_boxes = row.idle_reason is without_definition
+    needs_boxes = row.idle_reason is _without_definition
 
     def get(case: Case) -> Any:
         value = getattr(case, row.field)
@@ -72,13 +72,11 @@ def _said_where_needed(row: Key) -> Key:
     return replace(row, get=get, default=row.default or NO_DEFAULT)
 
 
-def without_definition(case: Case) -> str:
-    """Return why FFD keys besides FFD_DEFINITION have no effect in a case; "" if they have."""
+def _without_definition(case: Case) -> str:
     return "" if case.ffd_boxes else "FFD_DEFINITION defines no box"
 
 
-def without_axis(case: Case) -> str:
-    """Return why FFD_AXIS has no effect in a case; "" if it has one."""
+def _without_axis(case: Case) -> str:
     return "FFD_COORD_SYSTEM= CARTESIAN has no axis" if case.ffd_system == "CARTESIAN" else ""
 
 
@@ -104,60 +102,51 @@ ORDERS = Kind(
     lambda orders: ", ".join(map(str, orders)),
 )
 
+_setting = partial(setting, MOTION)
 _ROWS = (
-    setting(
+    _setting(
         "FFD_DEFINITION",
-        MOTION,
-        DEFINITION,
-        "ffd_boxes",
         "Boxes for free-form deformation, in SU2's order of corners; boxes of the mesh override "
         "them.",
+        DEFINITION,
+        field="ffd_boxes",
         label="FFD boxes",
     ),
-    setting(
+    _setting(
         "FFD_DEGREE",
-        MOTION,
-        DEGREES,
-        "ffd_degrees",
         "The degrees of each box of FFD_DEFINITION: control points of each direction, minus one.",
+        DEGREES,
+        field="ffd_degrees",
         label="FFD degrees",
-        idle_reason=without_definition,
+        idle_reason=_without_definition,
     ),
-    setting(
+    _setting(
         "FFD_BLENDING",
-        MOTION,
-        one_of(FFD_BLENDINGS),
-        "ffd_blending",
         "How control points of these boxes move the nodes inside.",
         label="FFD blending",
-        idle_reason=without_definition,
+        idle_reason=_without_definition,
     ),
-    setting(
+    _setting(
         "FFD_BSPLINE_ORDER",
-        MOTION,
-        ORDERS,
-        "ffd_orders",
         "With FFD_BLENDING= BSPLINE_UNIFORM, the orders of the splines, 2 or more.",
+        ORDERS,
+        field="ffd_orders",
         label="FFD orders",
-        idle_reason=without_definition,
+        idle_reason=_without_definition,
     ),
-    setting(
+    _setting(
         "FFD_COORD_SYSTEM",
-        MOTION,
-        one_of(FFD_SYSTEMS),
-        "ffd_system",
         "The coordinates in which boxes are straight, also those of the mesh; their axis is along "
         "x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
+        field="ffd_system",
         label="FFD coordinates",
     ),
-    setting(
+    _setting(
         "FFD_AXIS",
-        MOTION,
-        POINT,
-        "ffd_axis",
         "A point on that axis.",
+        POINT,
         label="FFD axis",
-        idle_reason=without_axis,
+        idle_reason=_without_axis,
     ),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from slideviz.case.model import Case
-from slideviz.case.values import Kind
+from slideviz.case.values import YES_NO, Kind, one_of
 from slideviz.terms import METHODS, ROLES, Method, Role
 
 Put = Callable[[Case, Any], Case]
@@ -73,15 +73,38 @@ def other_method(case: Case, method: Method | None) -> str:
     return f"{label if label[:2].isupper() else label[0].lower() + label[1:]} does not use it"
 
 
-def _field(field: str) -> tuple[Put, Get]:
-    return lambda case, value: case.change(**{field: value}), lambda case: getattr(case, field)
+def setting(
+    group: str, name: str, meaning: str, kind: Kind | None = None, *, field: str = "", **window: Any
+) -> Key:
+    """Return the row of a key whose value is a field of ``Case``, as `field_row`."""
+    field = field or name.lower()
+    return field_row(
+        Case(),
+        group,
+        name,
+        meaning,
+        kind,
+        field=field,
+        put=lambda case, value: case.change(**{field: value}),
+        get=lambda case: getattr(case, field),
+        **window,
+    )
 
 
-def setting(name: str, group: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
-    """Return the row of a key whose value is a field of ``Case``; ``window`` has more of `Key`."""
-    value = getattr(Case(), field)
-    default = NO_DEFAULT if value is None else kind.write(value)
-    return Key(name, group, kind, meaning, *_field(field), default, field=field, **window)
+def field_row(
+    owner: Any, group: str, name: str, meaning: str, kind: Kind | None, field: str, **window: Any
+) -> Key:
+    """Return the row of a key whose value is a field of a dataclass; ``window`` has more of `Key`.
+
+    Without a ``kind`` its values are those of the field's enumeration, or YES and NO. A field of
+    the method panel has by default the key as its label. ``owner``: has the default.
+    """
+    terms, default = owner.__dataclass_fields__[field].metadata, getattr(owner, field)
+    kind = kind or (one_of(terms) if terms else YES_NO)
+    if "form" in window:
+        window = {"label": name.replace("_", " ").capitalize(), **window}
+    text = NO_DEFAULT if default is None else kind.write(default)
+    return Key(name, group, kind, meaning, default=text, field=field, **window)
 
 
 def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:

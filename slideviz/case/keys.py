@@ -7,13 +7,14 @@ many keys have modules of their own.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from slideviz.case.ffd_keys import FFD_ROWS
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, PERIODICITY, QUALITY, Key, role, setting
 from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
-from slideviz.case.model import Case, FromFile, Motion
+from slideviz.case.model import Case, FromFile
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import (
     AXIS,
@@ -23,7 +24,6 @@ from slideviz.case.values import (
     PAIRS,
     PATH,
     POINT,
-    YES_NO,
     choice,
     integer,
     one_of,
@@ -31,7 +31,7 @@ from slideviz.case.values import (
 from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
 from slideviz.formats.table import FILE_FORMATS
-from slideviz.terms import PERIODIC_DIRECTIONS, PERIODIC_MODES, PERIODIC_TYPES, SKEW_METRICS
+from slideviz.terms import PERIODIC_DIRECTIONS, PERIODIC_TYPES
 
 
 def no_pair(case: Case) -> str:
@@ -39,8 +39,7 @@ def no_pair(case: Case) -> str:
     return "" if "periodic" in case.roles.values() else "no boundary has the role “periodic”"
 
 
-def put_direction(case: Case, word: str) -> Case:
-    """Return the case with the periodic direction of a word; CaseError if it has another type."""
+def _put_direction(case: Case, word: str) -> Case:
     direction, implied = PERIODIC_DIRECTIONS[word]
     if implied is not None and case.periodic_type not in ("auto", implied):
         raise CaseError(
@@ -50,19 +49,13 @@ def put_direction(case: Case, word: str) -> Case:
     return case.change(direction=direction, periodic_type=implied or case.periodic_type)
 
 
-def get_direction(case: Case) -> str | None:
-    """Return the number of the direction as text, None if the case has none."""
-    return None if case.direction is None else str(case.direction)
-
-
+_setting = partial(setting, PERIODICITY)
 PERIODIC_ROWS = (
-    setting(
+    _setting(
         "PERIODIC_MODE",
-        PERIODICITY,
-        one_of(PERIODIC_MODES),
-        "periodic",
         "How boundaries are periodic: not at all, in the distance only, or also in the "
         "displacement with fixed or moving vertices.",
+        field="periodic",
         label="Periodicity",
         form="main",
         tip="What the periodic boundaries do: nothing special (none), only the distance is "
@@ -71,12 +64,10 @@ PERIODIC_ROWS = (
         run_label="",
         idle_reason=no_pair,
     ),
-    setting(
+    _setting(
         "PERIODIC_TYPE",
-        PERIODICITY,
-        one_of(PERIODIC_TYPES, {"0": "translational", "1": "rotational"}),
-        "periodic_type",
         "Shift (0) or rotation (1); auto finds out by matching the markers.",
+        one_of(PERIODIC_TYPES, {"0": "translational", "1": "rotational"}),
         label="Type",
         form="main",
         tip="Whether one side is the other one shifted or rotated; automatic takes the one that "
@@ -90,103 +81,87 @@ PERIODIC_ROWS = (
         choice({word: word for word in PERIODIC_DIRECTIONS}),
         "No effect, except that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
         "for x, y, z or r, theta, z) is found by matching the markers.",
-        put_direction,
-        get_direction,
+        _put_direction,
+        lambda case: None if case.direction is None else str(case.direction),
         field="direction",
         run_label="",
         no_effect="matching the periodic markers finds the direction",
     ),
-    setting(
+    _setting(
         "PERIODIC_AXIS",
-        PERIODICITY,
-        AXIS,
-        "axis",
         "Axis of rotational periodicity.",
+        AXIS,
+        field="axis",
         label="Axis",
         form="main",
         tip="The axis that the mesh repeats about, for rotational periodicity.",
         idle_reason=no_pair,
     ),
-    setting(
+    _setting(
         "PERIODIC_ORIGIN",
-        PERIODICITY,
-        POINT,
-        "origin",
         "A point on that axis.",
+        POINT,
+        field="origin",
         label="Through",
         form="main",
         run_label="axis through {}",
         idle_reason=no_pair,
     ),
-    setting(
+    _setting(
         "SPAN",
-        PERIODICITY,
-        ENDS,
-        "span",
         "Hub and shroud, between which the span of a machine goes from 0 to 1. AUTO takes the "
         "boundaries whose names contain hub, and shroud or casing.",
+        ENDS,
         label="Hub and shroud",
         run_label="span {}",
     ),
 )
 
 
-def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
-    """Return the case where those ``names`` slide that have no role (RBF-SliDe's MARKER_BDRY)."""
-    return case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles})
-
-
-def _leading_file(case: Case) -> tuple[Motion, ...]:
+def _leading_file(case: Case) -> tuple[FromFile, ...]:
+    """Return the displacement file of all moving markers, if motions begin with one."""
     return tuple(m for m in case.motions[:1] if type(m) is FromFile and not m.marker)
 
 
-def put_file(case: Case, path: Path | None) -> Case:
-    """Return the case with ``path`` as the leading displacement file, or None: without one."""
-    remaining = case.motions[len(_leading_file(case)) :]
-    return case.change(motions=remaining if path is None else (FromFile(path), *remaining))
-
-
-def get_file(case: Case) -> Path | None:
-    """Return the displacement file of all moving markers, if motions begin with one, or None."""
-    files = [motion.path for motion in _leading_file(case) if isinstance(motion, FromFile)]
-    return files[0] if files else None
-
-
-def put_motions(case: Case, motions: tuple[Motion, ...]) -> Case:
-    """Return the case with ``motions`` after its leading displacement file, if it has one."""
-    return case.change(motions=(*_leading_file(case), *motions))
-
-
-def get_motions(case: Case) -> tuple[Motion, ...] | None:
-    """Return the motions after the leading displacement file, None if there are none."""
-    return case.motions[len(_leading_file(case)) :] or None
+def _put_file(case: Case, path: Path | None) -> Case:
+    files = () if path is None else (FromFile(path),)
+    return case.change(motions=(*files, *case.motions[len(_leading_file(case)) :]))
 
 
 _FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
 
 _ROWS = (
-    setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
-    setting("MESH_OUT_FILENAME", FILES, PATH, "mesh_out", "Where the deformed mesh is written."),
     setting(
+        FILES,
+        "MESH_FILENAME",
+        "The mesh to deform.",
+        PATH,
+        field="mesh_file",
+    ),
+    setting(
+        FILES,
+        "MESH_OUT_FILENAME",
+        "Where the deformed mesh is written.",
+        PATH,
+        field="mesh_out",
+    ),
+    setting(
+        FILES,
         "MESH_FORMAT",
-        FILES,
-        _FORMAT,
-        "mesh_format",
         "SU2's text or binary format; without this key, ending and content of the file decide.",
-    ),
-    setting(
-        "MESH_OUT_FORMAT",
-        FILES,
         _FORMAT,
-        "mesh_out_format",
-        "SU2's text or binary, whatever the ending of the file.",
     ),
     setting(
-        "ZONE",
         FILES,
-        integer(1),
-        "zone",
+        "MESH_OUT_FORMAT",
+        "SU2's text or binary, whatever the ending of the file.",
+        _FORMAT,
+    ),
+    setting(
+        FILES,
+        "ZONE",
         "The zone to deform alone, from 1, of a mesh with several; without it all.",
+        integer(1),
     ),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
     role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay, as do those in no list."),
@@ -214,7 +189,7 @@ _ROWS = (
         BOUNDARIES,
         NAMES,
         "All boundaries; those in no other list slide (with SLIDING_MODE= none they stay).",
-        put_boundaries,
+        lambda case, names: case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles}),
         lambda _: None,
     ),
     Key(
@@ -222,8 +197,8 @@ _ROWS = (
         MOTION,
         PATH,
         "Displacements of the moving nodes: node, dx, dy[, dz] in each line; the others stay.",
-        put_file,
-        get_file,
+        _put_file,
+        lambda case: next((motion.path for motion in _leading_file(case)), None),
         label="a displacement file",
     ),
     Key(
@@ -231,8 +206,8 @@ _ROWS = (
         MOTION,
         MOTIONS,
         "Motions of the moving boundaries, one after the other, after DEFORMATION_FILENAME.",
-        put_motions,
-        get_motions,
+        lambda case, motions: case.change(motions=(*_leading_file(case), *motions)),
+        lambda case: case.motions[len(_leading_file(case)) :] or None,
         label="Motion",
     ),
     *FFD_ROWS,
@@ -240,18 +215,14 @@ _ROWS = (
     *METHOD_ROWS,
     *REDUCTION_ROWS,
     setting(
-        "GENERATE_QUALITY",
         QUALITY,
-        YES_NO,
-        "generate_quality",
+        "GENERATE_QUALITY",
         "Write the quality of the deformed mesh too.",
         run_label="",
     ),
     setting(
-        "QUALITY_METRIC",
         QUALITY,
-        one_of(SKEW_METRICS),
-        "quality_metric",
+        "QUALITY_METRIC",
         "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
         label="Quality",
         form="more",

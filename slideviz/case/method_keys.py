@@ -7,9 +7,10 @@ The numbers of DATA_REDUCTION= AUTO in the text below are EXACT_NODES and AUTO_T
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from slideviz.case.key import METHOD, NO_DEFAULT, REDUCTION, Key, other_method, setting
+from slideviz.case.key import METHOD, REDUCTION, Key, field_row, other_method, setting
 from slideviz.case.model import Case
 from slideviz.case.values import MAX_STEPS, YES_NO, Kind, integer, one_of, real
 from slideviz.errors import CaseError
@@ -17,21 +18,13 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.terms import (
     DATA_REDUCTIONS,
     KERNELS,
-    LAYERS,
-    LEVEL_CRITERIA,
-    METHODS,
-    POLYNOMIALS,
-    RELAXES,
-    REPAIRS,
-    SELECTIONS,
     SLIDING,
     DataReduction,
     names,
 )
 
 
-def why_no_reduction(case: Case) -> str:
-    """Return why settings of data reduction have no effect in a case; "" where they have one."""
+def _why_no_reduction(case: Case) -> str:
     off = "" if case.reduction is not None else "data reduction is off"
     return other_method(case, "rbf") or off
 
@@ -39,35 +32,32 @@ def why_no_reduction(case: Case) -> str:
 def why_no_tolerance(case: Case) -> str:
     """Return why a tolerance of data reduction has no effect in a case; "" where it has one."""
     auto = case.reduction is not None and case.reduction.auto
-    return why_no_reduction(case) or ("it is automatic" if auto else "")
+    return _why_no_reduction(case) or ("it is automatic" if auto else "")
 
 
-def why_no_levels(case: Case) -> str:
-    """Return why settings of levels have no effect in a case; "" where they have one."""
+def _why_no_levels(case: Case) -> str:
     levels = case.reduction is not None and case.reduction.multilevel
-    return why_no_reduction(case) or ("" if levels else "there are no levels")
+    return _why_no_reduction(case) or ("" if levels else "there are no levels")
 
 
 def _why_no_repair(case: Case) -> str:
-    """Return why settings of repair have no effect in a case; "" where they have one."""
     return "repair is off" if case.repair == "no" else ""
 
 
-def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
-    """Return the row of a key whose value is a field of ``Reduction``.
+def greedy(
+    name: str, meaning: str, kind: Kind | None = None, *, field: str = "", **window: Any
+) -> Key:
+    """Return the row of a key whose value is a field of ``Reduction``, as `field_row`.
 
-    Where a case has no data reduction, the value is checked and not kept. ``window`` has further
-    attributes of the row (`Key`), mostly for the window.
+    Where a case has no data reduction, the value is checked and not kept.
     """
+    field = field or name.lower()
+    usual, window = getattr(Reduction(), field), {"idle_reason": _why_no_reduction, **window}
 
     def put(case: Case, value: Any) -> Case:
         if case.reduction is None:
             return case
         return case.change(reduction=replace(case.reduction, **{field: value}))
-
-    usual = getattr(Reduction(), field)
-    default = NO_DEFAULT if usual is None else kind.write(usual)
-    window = {"idle_reason": why_no_reduction, **window}
 
     def get(case: Case) -> Any:
         reduction = case.reduction
@@ -78,11 +68,12 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
         idle = reduction.auto and window["idle_reason"] is why_no_tolerance and value == usual
         return None if idle else value
 
-    return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
+    return field_row(
+        Reduction(), REDUCTION, name, meaning, kind, field=field, put=put, get=get, **window
+    )
 
 
-def put_double_edge(case: Case, wanted: bool) -> Case:
-    """Return a case that has data reduction with two nodes in a cycle, or one (DOUBLE_EDGE)."""
+def _put_double_edge(case: Case, wanted: bool) -> Case:
     if case.reduction is None:
         return case
     return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
@@ -122,9 +113,9 @@ REDUCTION_ROWS = (
     ),
     greedy(
         "DATA_RED_TOLERANCE",
-        real(0.0),
-        "tolerance",
         "Largest error left before the boundary is corrected, over all steps, in the mesh's unit.",
+        real(0.0),
+        field="tolerance",
         label="Tolerance",
         form="main",
         tip="The largest error at the boundary that the control nodes may leave to the "
@@ -134,17 +125,15 @@ REDUCTION_ROWS = (
     ),
     greedy(
         "DATA_RED_RELATIVE",
-        real(0.0),
-        "relative",
         "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
+        real(0.0),
+        field="relative",
         label="a relative tolerance of a case file,",
         run_label="",
         idle_reason=why_no_tolerance,
     ),
     greedy(
         "MULTILEVEL",
-        YES_NO,
-        "multilevel",
         "Select the control nodes in levels.",
         label="Levels",
         form="more",
@@ -154,29 +143,28 @@ REDUCTION_ROWS = (
     ),
     greedy(
         "MULTI_CRIT",
-        one_of(LEVEL_CRITERIA),
-        "criterion",
         "What ends a level: its number of nodes, or the decrease of its error.",
+        field="criterion",
         run_label="levels by {}",
-        idle_reason=why_no_levels,
+        idle_reason=_why_no_levels,
     ),
     greedy(
         "LVL_TOL_CRIT",
-        real(0.0, 1.0),
-        "level_tolerance",
         "Decrease of the error that ends a level.",
+        real(0.0, 1.0),
+        field="level_tolerance",
         run_label="a level ends at {}",
-        idle_reason=why_no_levels,
+        idle_reason=_why_no_levels,
     ),
     greedy(
         "LVL_SIZE",
-        integer(1),
-        "level_size",
         "Number of control nodes of a level.",
+        integer(1),
+        field="level_size",
         label="A level ends at",
         form="more",
         tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        idle_reason=why_no_levels,
+        idle_reason=_why_no_levels,
     ),
     Key(
         "DOUBLE_EDGE",
@@ -184,31 +172,27 @@ REDUCTION_ROWS = (
         YES_NO,
         "Select two nodes at a time, with opposite errors (YES), or one (NO); prefer the key "
         "SELECTION.",
-        put_double_edge,
+        _put_double_edge,
         lambda _: None,
     ),
     greedy(
         "SELECTION",
-        one_of(SELECTIONS),
-        "selection",
         "Nodes added in a cycle: a growing block (fastest), two with opposite errors, or one.",
-        label="Selection",
         form="more",
         tip="How many control nodes data reduction adds in a cycle: a growing block (fastest), "
         "two with opposite errors, or the one with the largest error.",
     ),
     greedy(
         "MAX_CONTROL_NODES",
-        integer(1),
-        "max_nodes",
         "Stop at this number of control nodes in any case.",
+        integer(1),
+        field="max_nodes",
         run_label="",
     ),
     greedy(
         "GAMMA",
-        real(0.0),
-        "gamma",
         "Radius of the correction, divided by the largest error.",
+        real(0.0),
         label="Correction radius ×",
         form="more",
         tip="How far the last correction of the boundary reaches, as a multiple of the largest "
@@ -253,33 +237,24 @@ def automatic_radius(case: Case) -> bool:
     return case.method == "rbf" and case.support_radius is None and not case.influence_factor
 
 
-def put_factor(case: Case, factor: float) -> Case:
-    """Return the case with a support radius that is a multiple of the extent; 0: automatic."""
-    return case.change(influence_factor=factor, support_radius=None)
-
+_setting = partial(setting, METHOD)
 
 METHOD_ROWS = (
-    setting(
+    _setting(
         "METHOD",
-        METHOD,
-        one_of(METHODS),
-        "method",
         "Radial basis functions, or for comparison inverse distance weighting, or linear "
         "elasticity with stiffer small cells (as in SU2 by default). With these two, ps and ds do "
         "the same, and kernel, radius and data reduction have no effect.",
-        label="Method",
         form="main",
         tip="How the inner nodes follow: by radial basis functions, or for comparison by inverse "
         "distance weighting, or as an elastic body whose small cells are stiffer (as in SU2 by "
         "default).",
         run_label="",
     ),
-    setting(
+    _setting(
         "SLIDING_MODE",
-        METHOD,
-        one_of(SLIDING),
-        "sliding",
         f"How nodes slide: not at all, {_WAYS}.",
+        field="sliding",
         label="Sliding",
         form="main",
         tip="Whether the nodes of sliding boundaries stay (none), slide and are projected to the "
@@ -287,11 +262,8 @@ METHOD_ROWS = (
         run_label="",
         idle_reason=nothing_slides,
     ),
-    setting(
+    _setting(
         "RELAX",
-        METHOD,
-        one_of(RELAXES),
-        "relax",
         "Relax the mesh after the last step: a few iterations of an elastic body whose cells go "
         "back to their undeformed shapes, turned as they are. Cells are better in the mean, and "
         "boundary layers keep their heights and angles. AUTO does so up to a million cells in "
@@ -304,38 +276,31 @@ METHOD_ROWS = (
         run_label="relaxation {}",
         method="rbf",
     ),
-    setting(
+    _setting(
         "STEPS",
-        METHOD,
-        replace(or_auto(integer(1), "auto"), span=(0, MAX_STEPS)),
-        "steps",
         "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
         "halves steps that fold a cell, and takes the fewest that are enough.",
-        label="Steps",
+        replace(or_auto(integer(1), "auto"), span=(0, MAX_STEPS)),
         form="main",
         tip="Into how many equal parts the motion is divided: more keep large motions valid and "
         "take longer; automatic (0) takes as few as give no inverted cell.",
         run_label="",
     ),
-    setting(
+    _setting(
         "STEPS_GAIN",
-        METHOD,
-        real(0.0, 1.0),
-        "steps_gain",
         "With STEPS= auto, steps are enough if more of them raise the minimum quality by less "
         "than this part.",
+        real(0.0, 1.0),
         run_label="gain {}",
     ),
     replace(
-        setting(
+        _setting(
             "INFLUENCE_FACTOR",
-            METHOD,
-            or_auto(real(*FACTORS), "AUTO"),
-            "influence_factor",
             "Support radius of the radial function, divided by the largest extent of the mesh. "
             "AUTO: 15 "
             "times the largest extent of a connected moving body, or 20 times the largest "
             "displacement if that is more, and at most 2.5 extents of the mesh.",
+            or_auto(real(*FACTORS), "AUTO"),
             label="Radius × extent",
             form="more",
             tip="Support radius: how far a boundary node reaches into the mesh, as a multiple of "
@@ -343,29 +308,26 @@ METHOD_ROWS = (
             run_label="radius × {}",
             method="rbf",
         ),
-        put=put_factor,
+        put=lambda case, factor: case.change(influence_factor=factor, support_radius=None),
     ),
-    setting(
+    _setting(
         "SUPPORT_RADIUS",
-        METHOD,
-        real(0.0),
-        "support_radius",
         "Support radius in the mesh's length unit, instead of INFLUENCE_FACTOR.",
+        real(0.0),
         label="Support radius as a length",
         run_label="radius {}",
         method="rbf",
     ),
-    setting(
+    _setting(
         "RBF_KERNEL",
-        METHOD,
+        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
         replace(
             one_of(KERNELS),
             allowed="one of the names below",
             details=tuple(f"{name:<22}{kernel.label}" for name, kernel in KERNELS.items()),
             words=names(KERNELS),
         ),
-        "kernel",
-        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
+        field="kernel",
         label="Kernel",
         form="more",
         tip="The radial function; a global one reaches through the whole mesh whatever the "
@@ -373,44 +335,33 @@ METHOD_ROWS = (
         run_label="{}",
         method="rbf",
     ),
-    setting(
+    _setting(
         "POLYNOMIAL",
-        METHOD,
-        one_of(POLYNOMIALS),
-        "polynomial",
         "Add a linear polynomial to the radial functions: motions that are linear in the "
         "coordinates are exact then, with any kernel, and nodes beyond all supports move too. "
         "AUTO: only where the kernel needs it (thin-plate, multiquadric, quadric).",
-        label="Polynomial",
         form="more",
         tip="Whether a linear polynomial is added to the radial functions: a motion that is linear "
         "in the coordinates is then exact with any kernel, and nodes far from the motion move too.",
         run_label="polynomial {}",
         method="rbf",
     ),
-    setting(
+    _setting(
         "LAYERS",
-        METHOD,
-        one_of(LAYERS),
-        "layers",
         "Keep boundary layers: nodes near walls go with the displacement and rotation of the wall, "
         "so that first heights and angles stay. Walls are moving and fixed boundaries: AUTO takes "
         "those with flat quadrilaterals, hexahedra or prisms, KEEP all of them.",
-        label="Layers",
         form="main",
         tip="Whether nodes near walls go with the wall's own displacement and rotation: this keeps "
         "the heights of boundary layers.",
         run_label="layers {}",
         method="rbf",
     ),
-    setting(
+    _setting(
         "LAYER_THICKNESS",
-        METHOD,
-        or_auto(real(0.0), "AUTO"),
-        "layer_thickness",
         "How far from walls LAYERS acts, in the mesh's length unit. AUTO: a fiftieth of the wall's "
         "largest extent, or the thickness of its boundary layer if that is less.",
-        label="Layer thickness",
+        or_auto(real(0.0), "AUTO"),
         form="more",
         tip="How far from walls nodes go with them, in the mesh's length unit. Automatic: a "
         "fiftieth of the wall's extent, or the thickness of its boundary layer if that is less.",
@@ -418,38 +369,28 @@ METHOD_ROWS = (
         idle_reason=lambda case: "layers are off" if case.layers == "no" else "",
         method="rbf",
     ),
-    setting(
+    _setting(
         "REPAIR",
-        METHOD,
-        one_of(REPAIRS),
-        "repair",
         "Mend cells that are inverted, not proved valid, or of a quality below REPAIR_BELOW (and "
         "lower than before): nodes near them move, never those of moving and fixed boundaries. "
         "The mesh is never worse after it. AUTO is the same as YES.",
-        label="Repair",
         form="main",
         tip="Whether inverted and poor cells are then mended, by moving the nodes near them: never "
         "those of moving and fixed boundaries.",
         run_label="repair {}",
     ),
-    setting(
+    _setting(
         "REPAIR_BELOW",
-        METHOD,
-        real(0.0, 1.0, with_low=True),
-        "repair_below",
         "The quality below which REPAIR mends valid cells, too; with 0 it mends only those that "
         "are not proved valid.",
-        label="Repair below",
+        real(0.0, 1.0, with_low=True),
         form="more",
         tip="The quality below which valid cells are mended, too.",
         run_label="repair below {}",
         idle_reason=_why_no_repair,
     ),
-    setting(
+    _setting(
         "REPAIR_STEPS",
-        METHOD,
-        YES_NO,
-        "repair_steps",
         "Whether REPAIR acts after each step (YES, not of a streamed mesh), or after the last one "
         "(NO).",
         label="Repair each step",
@@ -459,40 +400,31 @@ METHOD_ROWS = (
         run_label="repair of each step",
         idle_reason=_why_no_repair,
     ),
-    setting(
+    _setting(
         "IDW_POWER",
-        METHOD,
-        real(0.0, 20.0, closed=True),
-        "idw_power",
         "With METHOD= idw, the power of the inverse distance; by default the number of dimensions.",
+        real(0.0, 20.0, closed=True),
         run_label="power {}",
         method="idw",
     ),
-    setting(
+    _setting(
         "IDW_FIXED_WEIGHT",
-        METHOD,
-        real(1e-12, 1e12),
-        "idw_fixed_weight",
         "With METHOD= idw, the weight of a boundary node that stays, relative to one that moves.",
+        real(1e-12, 1e12),
         run_label="fixed weight {}",
         method="idw",
     ),
-    setting(
+    _setting(
         "CURVED",
-        METHOD,
-        YES_NO,
-        "curved",
         "No effect: RBF-SliDe's switch for curved boundaries, which are always found and followed.",
         run_label="",
         no_effect="curved boundaries are always found and followed",
     ),
-    setting(
+    _setting(
         "FEATURE_ANGLE",
-        METHOD,
-        real(0.0, 180.0, closed=True),
-        "feature_angle_deg",
         "Angle in degrees from which a bend within a boundary is an edge.",
-        label="Feature angle",
+        real(0.0, 180.0, closed=True),
+        field="feature_angle_deg",
         unit="°",
         form="more",
         tip="A boundary that turns by more than this angle has an edge there, which sliding nodes "
