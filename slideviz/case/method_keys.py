@@ -10,18 +10,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from slideviz import terms
 from slideviz.case.key import METHOD, REDUCTION, Key, field_row, other_method, setting
 from slideviz.case.model import Case
 from slideviz.case.values import MAX_STEPS, YES_NO, Kind, integer, one_of, real
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import (
-    DATA_REDUCTIONS,
-    KERNELS,
-    SLIDING,
-    DataReduction,
-    names,
-)
 
 
 def _why_no_reduction(case: Case) -> str:
@@ -79,13 +73,13 @@ def _put_double_edge(case: Case, wanted: bool) -> Case:
     return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
 
 
-def put_reduction(case: Case, wanted: DataReduction) -> Case:
+def put_reduction(case: Case, wanted: terms.DataReduction) -> Case:
     """Return the case with data reduction (with the settings it has), automatic, or without."""
     reduction = replace(case.reduction or Reduction(), auto=wanted == "AUTO")
     return case.change(reduction=None if wanted == "NO" else reduction)
 
 
-def get_reduction(case: Case) -> DataReduction:
+def get_reduction(case: Case) -> terms.DataReduction:
     """Return whether a case asks for data reduction: "YES", "NO" or "AUTO"."""
     if case.reduction is None:
         return "NO"
@@ -96,7 +90,7 @@ REDUCTION_ROWS = (
     Key(
         "DATA_REDUCTION",
         REDUCTION,
-        one_of(DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
+        one_of(terms.DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
         "Interpolate with only some of the boundary nodes; with NO the keys below have no effect. "
         "AUTO does so if there are more than 2000, to a thousandth of the largest displacement, "
         "or half of the first layer's height beside sliding boundaries.",
@@ -201,7 +195,9 @@ REDUCTION_ROWS = (
 )
 
 
-_WAYS = " or ".join(f"{name} ({way})" for way, name in names(SLIDING).items() if way != "none")
+_WAYS = " or ".join(
+    f"{name} ({way})" for way, name in terms.names(terms.SLIDING).items() if way != "none"
+)
 FACTORS = 1e-6, 1e6  # limits of the support radius over the extent of the mesh
 
 
@@ -322,10 +318,10 @@ METHOD_ROWS = (
         "RBF_KERNEL",
         "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
         replace(
-            one_of(KERNELS),
+            one_of(terms.KERNELS),
             allowed="one of the names below",
-            details=tuple(f"{name:<22}{kernel.label}" for name, kernel in KERNELS.items()),
-            words=names(KERNELS),
+            details=tuple(f"{name:<22}{kernel.label}" for name, kernel in terms.KERNELS.items()),
+            words=terms.names(terms.KERNELS),
         ),
         field="kernel",
         label="Kernel",

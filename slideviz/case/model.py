@@ -10,44 +10,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz import terms
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.limits import Limit, read_limits
 from slideviz.errors import CaseError, nearest, not_one_of
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, frozen_array
 from slideviz.rbf.reduction import AUTO, Reduction
-from slideviz.terms import (
-    FFD_BLENDINGS,
-    FFD_SYSTEMS,
-    KERNELS,
-    LAYERS,
-    METHODS,
-    PERIODIC_MODES,
-    PERIODIC_TYPES,
-    POLYNOMIALS,
-    RELAXES,
-    REPAIRS,
-    ROLES,
-    SIDES,
-    SKEW_METRICS,
-    SLIDING,
-    SPAN_KINDS,
-    FfdBlending,
-    FfdSystem,
-    FileFormat,
-    Layers,
-    Method,
-    PeriodicMode,
-    PeriodicType,
-    Polynomial,
-    Relax,
-    Repair,
-    Role,
-    Side,
-    SkewMetric,
-    Sliding,
-    SpanKind,
-)
 
 Point = tuple[float, ...] | Literal["centroid"]
 Target = str | tuple[str, ...]
@@ -156,7 +125,7 @@ class HicksHenne(CheckedFields):
     marker: Target
     height: float
     peak: float = 0.5
-    side: Side = field(default="upper", metadata=SIDES)
+    side: terms.Side = field(default="upper", metadata=terms.SIDES)
     chord: tuple[float, float] = (0.0, 1.0)
 
 
@@ -171,7 +140,7 @@ class Cst(CheckedFields):
     marker: Target
     height: float
     term: tuple[int, int] = (1, 1)
-    side: Side = field(default="upper", metadata=SIDES)
+    side: terms.Side = field(default="upper", metadata=terms.SIDES)
     chord: tuple[float, float] = (0.0, 1.0)
 
 
@@ -246,7 +215,7 @@ class SpanMotion(CheckedFields):
     """
 
     marker: Target
-    kind: SpanKind = field(metadata=SPAN_KINDS)
+    kind: terms.SpanKind = field(metadata=terms.SPAN_KINDS)
     spans: tuple[float, ...]
     values: tuple[float, ...]
     point: tuple[float, float, float] | None = None
@@ -370,23 +339,23 @@ class Case(CheckedFields):
 
     mesh_file: Path | None = None
     mesh_out: Path | None = None
-    mesh_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
-    mesh_out_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
+    mesh_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
+    mesh_out_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     zone: int | None = None
-    roles: Annotated[Mapping[str, Role], _ROLES] = field(default_factory=dict)
+    roles: Annotated[Mapping[str, terms.Role], _ROLES] = field(default_factory=dict)
     motions: Annotated[tuple[Motion, ...], "a tuple of motions, as Translate(...)"] = ()
     interfaces: tuple[str, ...] = ()
     zone_settings: tuple[Case, ...] = ()
     ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
     ffd_degrees: tuple[tuple[int, int, int], ...] = ()
-    ffd_blending: FfdBlending = field(default="BEZIER", metadata=FFD_BLENDINGS)
+    ffd_blending: terms.FfdBlending = field(default="BEZIER", metadata=terms.FFD_BLENDINGS)
     ffd_orders: tuple[int, int, int] = (2, 2, 2)
-    ffd_system: FfdSystem = field(default="CARTESIAN", metadata=FFD_SYSTEMS)
+    ffd_system: terms.FfdSystem = field(default="CARTESIAN", metadata=terms.FFD_SYSTEMS)
     ffd_axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    method: Method = field(default="rbf", metadata=METHODS)
-    sliding: Sliding = field(default="none", metadata=SLIDING)
-    periodic: PeriodicMode = field(default="none", metadata=PERIODIC_MODES)
-    periodic_type: PeriodicType = field(default="auto", metadata=PERIODIC_TYPES)
+    method: terms.Method = field(default="rbf", metadata=terms.METHODS)
+    sliding: terms.Sliding = field(default="none", metadata=terms.SLIDING)
+    periodic: terms.PeriodicMode = field(default="none", metadata=terms.PERIODIC_MODES)
+    periodic_type: terms.PeriodicType = field(default="auto", metadata=terms.PERIODIC_TYPES)
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     direction: int | None = None
@@ -397,18 +366,18 @@ class Case(CheckedFields):
     steps_gain: float = 0.02
     influence_factor: Annotated[float, 'a number, or "auto"'] = 0.0
     support_radius: float | None = None
-    kernel: str = field(default="wendland-c2", metadata=KERNELS)
+    kernel: str = field(default="wendland-c2", metadata=terms.KERNELS)
     reduction: Reduction | None = AUTO
-    polynomial: Polynomial = field(default="auto", metadata=POLYNOMIALS)
-    relax: Relax = field(default="no", metadata=RELAXES)
-    layers: Layers = field(default="no", metadata=LAYERS)
+    polynomial: terms.Polynomial = field(default="auto", metadata=terms.POLYNOMIALS)
+    relax: terms.Relax = field(default="no", metadata=terms.RELAXES)
+    layers: terms.Layers = field(default="no", metadata=terms.LAYERS)
     layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0
-    repair: Repair = field(default="no", metadata=REPAIRS)
+    repair: terms.Repair = field(default="no", metadata=terms.REPAIRS)
     repair_below: float = 0.1
     repair_steps: bool = False
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
-    quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)
+    quality_metric: terms.SkewMetric = field(default="knupp", metadata=terms.SKEW_METRICS)
     generate_quality: bool = True
     limits: Annotated[tuple[Limit, ...], 'limits, or a text as "min > 0.3, inverted = 0"'] = ()
     source: Path | None = None
@@ -423,8 +392,8 @@ class Case(CheckedFields):
             object.__setattr__(self, "limits", read_limits(self.limits))
         super().__post_init__()
         for marker, role in self.roles.items():
-            if role not in ROLES:
-                raise CaseError(f"roles: {marker!r}: {not_one_of(role, ROLES)}")
+            if role not in terms.ROLES:
+                raise CaseError(f"roles: {marker!r}: {not_one_of(role, terms.ROLES)}")
         for name in ("mesh_file", "mesh_out", "source"):
             if (path := getattr(self, name)) is not None:
                 object.__setattr__(self, name, Path(path))
@@ -445,7 +414,7 @@ class Case(CheckedFields):
                 raise CaseError(f"a case has no {name!r}{nearest(name, names)}")
         return replace(self, **values)
 
-    def markers_with(self, role: Role) -> tuple[str, ...]:
+    def markers_with(self, role: terms.Role) -> tuple[str, ...]:
         """Return the names of the markers with a role, in the order of ``roles``."""
         return tuple(name for name, given in self.roles.items() if given == role)
 

@@ -13,26 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from slideviz.case import model
 from slideviz.case.boxes import ffd_displacements
 from slideviz.case.check import marker_problems, motion_problems, raise_all
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import (
-    Case,
-    Cst,
-    FromFile,
-    HicksHenne,
-    Motion,
-    OnAirfoil,
-    Onto,
-    PlacedMotion,
-    Prescribed,
-    Radial,
-    Rotate,
-    Scale,
-    Translate,
-    applies_to,
-    named,
-)
+from slideviz.case.model import Case, Motion, applies_to, named
 from slideviz.case.motion_text import term_of
 from slideviz.case.onto import laid_displacements
 from slideviz.case.spans import span_displacements
@@ -108,9 +93,9 @@ def bump_displacements(
     problems = []
     for place, motion in enumerate(case.motions, start=1):
         markers = [
-            name for name in on if isinstance(motion, OnAirfoil) and applies_to(motion, name)
+            name for name in on if isinstance(motion, model.OnAirfoil) and applies_to(motion, name)
         ]
-        if not markers or not isinstance(motion, OnAirfoil):
+        if not markers or not isinstance(motion, model.OnAirfoil):
             continue
         nodes = np.unique(np.concatenate([on[name] for name in markers]))
         shape = _shape(motion, mesh, markers, nodes)
@@ -130,20 +115,20 @@ def bump_displacements(
     return displacements
 
 
-def _shape(motion: OnAirfoil, mesh: Mesh, markers: list[str], nodes: IntArray) -> FloatArray:
+def _shape(motion: model.OnAirfoil, mesh: Mesh, markers: list[str], nodes: IntArray) -> FloatArray:
     """Return the displacement (m,) of nodes along y by a height of 1."""
     low, high = motion.chord
     t = (mesh.points[nodes, 0] - low) / (high - low)
     along = (t > 0.0) & (t < 1.0)
-    if isinstance(motion, Cst):
+    if isinstance(motion, model.Cst):
         shape = np.where(along, kulfan(np.where(along, t, 0.0), *motion.term), 0.0)
     else:
         shape = np.where(along, hicks_henne(np.where(along, t, 0.0), motion.peak), 0.0)
-    if not isinstance(motion, HicksHenne | Cst):
+    if not isinstance(motion, model.HicksHenne | model.Cst):
         return shape
     sign = side_of(normals_at(mesh, markers, nodes))
     there = sign > 0.0 if motion.side == "upper" else sign < 0.0
-    outwards = sign if isinstance(motion, HicksHenne) else 1.0
+    outwards = sign if isinstance(motion, model.HicksHenne) else 1.0
     return np.where(there, outwards * shape, 0.0)
 
 
@@ -158,9 +143,9 @@ ReferenceDisplacements = Mapping[object, Displacements]
 """Displacements by the key (`key_of`) of their motion."""
 
 
-def key_of(motion: FromFile | PlacedMotion) -> object:
+def key_of(motion: model.FromFile | model.PlacedMotion) -> object:
     """Return the key of a motion; those with the same displacements share it."""
-    return (motion.path, motion.marker) if type(motion) is FromFile else motion
+    return (motion.path, motion.marker) if type(motion) is model.FromFile else motion
 
 
 def placed_displacements(
@@ -194,12 +179,12 @@ def reference_displacements(
         problems.append(str(problem))
     for motion in case.motions:
         moved = [nodes for name, nodes in on.items() if applies_to(motion, name)]
-        if isinstance(motion, Onto) and moved:
+        if isinstance(motion, model.Onto) and moved:
             try:
                 files[key_of(motion)] = laid_displacements(motion, case, mesh, on)
             except CaseError as problem:
                 problems.append(str(problem))
-        elif isinstance(motion, FromFile) and (moved or not motion.marker):
+        elif isinstance(motion, model.FromFile) and (moved or not motion.marker):
             nodes = np.unique(np.concatenate([*moved, np.empty(0, np.int64)]))
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"
@@ -324,7 +309,7 @@ def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, I
 
     ``points`` (k, d) are where the nodes ``on`` (k,) of each marker are before the motion.
     """
-    if not isinstance(motion, Rotate | Scale) or motion.point != "centroid":
+    if not isinstance(motion, model.Rotate | model.Scale) or motion.point != "centroid":
         return motion
     # Common nodes of two markers count once; sums in the order of nodes, not in that of markers.
     _, first = np.unique(np.concatenate([on[name] for name in points]), return_index=True)
@@ -373,13 +358,13 @@ def _change(
     motion: Motion, points: FloatArray, nodes: IntArray | None, files: ReferenceDisplacements | None
 ) -> FloatArray:
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
-    if isinstance(motion, Prescribed):
+    if isinstance(motion, model.Prescribed):
         out = np.zeros_like(points)
         if nodes is not None:
             _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
             out[here] = motion.vectors[given]
         return out
-    if not isinstance(motion, FromFile | PlacedMotion):
+    if not isinstance(motion, model.FromFile | model.PlacedMotion):
         return _increment(motion, points)
     key = key_of(motion)
     if not files or nodes is None or key not in files:
@@ -387,15 +372,17 @@ def _change(
     return files[key].at(nodes)
 
 
-def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:
-    if isinstance(motion, Translate):
+def _increment(
+    motion: model.Translate | model.Rotate | model.Scale | model.Radial, points: FloatArray
+) -> FloatArray:
+    if isinstance(motion, model.Translate):
         return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
-    if isinstance(motion, Radial):
+    if isinstance(motion, model.Radial):
         return _pushed(motion, points)
     at_centroid = motion.point == "centroid"
     centre = ordered_sum(points) / max(1, len(points)) if at_centroid else np.array(motion.point)
     arm = points - centre
-    if isinstance(motion, Scale):
+    if isinstance(motion, model.Scale):
         return arm * (np.array(motion.factors, np.float64) - 1.0)
     return _turned(arm, math.radians(motion.angle_deg), motion.axis)
 
@@ -419,7 +406,7 @@ def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> 
     return np.stack([sine * p + versine * q for p, q in zip(across, twice, strict=True)], axis=1)
 
 
-def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
+def _pushed(motion: model.Radial, points: FloatArray) -> FloatArray:
     arm = points - np.array(motion.point, np.float64)
     if arm.shape[1] == 3:
         unit = np.array(motion.axis, np.float64) / math.hypot(*motion.axis)

@@ -6,31 +6,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from slideviz.case.model import (
-    BoxMotion,
-    Bump,
-    Cst,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
-    Motion,
-    OnAirfoil,
-    Onto,
-    Point,
-    Prescribed,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Target,
-    Translate,
-    named,
-)
+from slideviz.case import model
+from slideviz.case.model import Motion, Point, Target, named
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, counted, is_none, name_text, number, words_of
 from slideviz.errors import CaseError, nearest, not_one_of, shown
@@ -38,20 +19,20 @@ from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS, MotionKind, SpanKind
 
 VERBS = (*(kind for kind in MOTION_KINDS if kind != "span"), *SPAN_KINDS)
 VERB_OF: dict[type, MotionKind] = {
-    Translate: "translate",
-    Rotate: "rotate",
-    Scale: "scale",
-    Radial: "radial",
-    HicksHenne: "hicks-henne",
-    Cst: "cst",
-    Bump: "bump",
-    Ffd: "ffd",
-    FfdCamber: "ffd-camber",
-    FfdThickness: "ffd-thickness",
-    FfdTwist: "ffd-twist",
-    SpanMotion: "span",
-    FromFile: "file",
-    Onto: "onto",
+    model.Translate: "translate",
+    model.Rotate: "rotate",
+    model.Scale: "scale",
+    model.Radial: "radial",
+    model.HicksHenne: "hicks-henne",
+    model.Cst: "cst",
+    model.Bump: "bump",
+    model.Ffd: "ffd",
+    model.FfdCamber: "ffd-camber",
+    model.FfdThickness: "ffd-thickness",
+    model.FfdTwist: "ffd-twist",
+    model.SpanMotion: "span",
+    model.FromFile: "file",
+    model.Onto: "onto",
 }
 """Verbs of motions, by class; those of `SpanMotion` are its kinds."""
 ALL_MOVING = "*"
@@ -116,26 +97,7 @@ def _read_motion(group: list[Word]) -> Motion:
     if verb not in VERBS:
         hint = nearest(verb, VERBS)
         raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
-    if verb == "file":
-        return _read_file(marker, remaining)
-    if verb == "onto":
-        return _read_onto(marker, remaining)
-    kind = next((kind for kind in SPAN_KINDS if kind == verb), None)
-    if kind is not None:
-        return _read_span(marker, kind, remaining)
-    if verb == "ffd":
-        return _read_ffd(marker, remaining)
-    if verb in _BUMPS:
-        return _read_bump(marker, verb, remaining)
-    if verb == "ffd-twist":
-        return _read_twist(marker, remaining)
-    if verb in ("ffd-camber", "ffd-thickness"):
-        return _read_column(FfdCamber if verb == "ffd-camber" else FfdThickness, marker, remaining)
-    if verb == "translate":
-        return Translate(marker, read_vector(_flat(remaining), "the shift"))
-    if verb == "rotate":
-        return _read_rotate(marker, remaining)
-    return _read_scale(marker, remaining) if verb == "scale" else _read_radial(marker, remaining)
+    return _READERS[verb](marker, remaining)
 
 
 def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
@@ -154,15 +116,15 @@ def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
     return names if len(names) > 1 else names[0], items[end + 1 :]
 
 
-def _read_file(marker: Target, rest: list[Word]) -> FromFile:
+def _read_file(marker: Target, rest: list[Word]) -> model.FromFile:
     if len(rest) != 1 or not rest[0].text:
         raise CaseError(
             "expected (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
         )
-    return FromFile(Path(rest[0].text.replace("\\", "/")), marker)
+    return model.FromFile(Path(rest[0].text.replace("\\", "/")), marker)
 
 
-def _read_onto(marker: Target, rest: list[Word]) -> Onto:
+def _read_onto(marker: Target, rest: list[Word]) -> model.Onto:
     if len(rest) not in (1, 2) or not rest[0].text:
         raise CaseError(
             "expected (MARKER, onto, path) or (MARKER, onto, path, limit), where the limit is the "
@@ -171,7 +133,7 @@ def _read_onto(marker: Target, rest: list[Word]) -> Onto:
     limit = number(rest[1].text) if rest[1:] else 0.0
     if limit < 0.0 or (rest[1:] and not limit):
         raise CaseError(f"the limit {limit:g} is not above 0; leave it out for 1 % of the size")
-    return Onto(_read_file(marker, rest[:1]).path, marker, limit)
+    return model.Onto(_read_file(marker, rest[:1]).path, marker, limit)
 
 
 def _flat(words: list[Word]) -> list[Word]:
@@ -182,7 +144,7 @@ def _is_centroid(word: Word) -> bool:
     return not word.quoted and word.text.lower() == "centroid"
 
 
-def _read_rotate(marker: Target, rest: list[Word]) -> Rotate:
+def _read_rotate(marker: Target, rest: list[Word]) -> model.Rotate:
     items = _flat(rest)
     if not items:
         raise CaseError("the angle is missing; write rotate, angle in degrees, centroid")
@@ -200,10 +162,10 @@ def _read_rotate(marker: Target, rest: list[Word]) -> Rotate:
         )
     axis = read_axis(items[:n_axis]) if n_axis else (0.0, 0.0, 1.0)
     point: Point = "centroid" if at_centroid else read_vector(place, "the point")
-    return Rotate(marker, angle, point, axis)
+    return model.Rotate(marker, angle, point, axis)
 
 
-def _read_scale(marker: Target, rest: list[Word]) -> Scale:
+def _read_scale(marker: Target, rest: list[Word]) -> model.Scale:
     items = _flat(rest)
     if items and _is_centroid(items[-1]):
         factors, place = items[:-1], []
@@ -224,10 +186,10 @@ def _read_scale(marker: Target, rest: list[Word]) -> Scale:
     values = tuple(number(word.text) for word in factors)
     if min(values) <= 0.0:
         raise CaseError(f"the factor {min(values):g} is not above 0: it would fold the marker")
-    return Scale(marker, values, read_vector(place, "the point") if place else "centroid")
+    return model.Scale(marker, values, read_vector(place, "the point") if place else "centroid")
 
 
-def _read_radial(marker: Target, rest: list[Word]) -> Radial:
+def _read_radial(marker: Target, rest: list[Word]) -> model.Radial:
     items = _flat(rest)
     letter = len(items) > 2 and items[2].text.lower() in ("x", "y", "z")
     n_axis = 1 if letter else 3 if len(items) > 5 else 0
@@ -241,10 +203,10 @@ def _read_radial(marker: Target, rest: list[Word]) -> Radial:
     if factor <= 0.0:
         raise CaseError(f"the factor {factor:g} is not above 0: it would fold the marker")
     axis = read_axis(items[2 : 2 + n_axis]) if n_axis else (0.0, 0.0, 1.0)
-    return Radial(marker, factor, distance, axis, read_vector(place, "the point"))
+    return model.Radial(marker, factor, distance, axis, read_vector(place, "the point"))
 
 
-def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
+def _read_ffd(marker: Target, rest: list[Word]) -> model.Ffd:
     items = _flat(rest)
     name = items[0].text if items else ""
     if len(items) not in (5, 7) or not name:
@@ -255,7 +217,7 @@ def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
     count = (len(items) - 1) // 2
     i, j, k = (*_integers(items[1 : 1 + count]), -1)[:3]
     dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
-    return Ffd(marker, name, (i, j, k), (dx, dy, dz))
+    return model.Ffd(marker, name, (i, j, k), (dx, dy, dz))
 
 
 _BUMPS = {
@@ -265,7 +227,7 @@ _BUMPS = {
 }
 
 
-def _read_bump(marker: Target, verb: str, rest: list[Word]) -> OnAirfoil:
+def _read_bump(verb: str, marker: Target, rest: list[Word]) -> model.OnAirfoil:
     words = _flat(rest)
     sided = verb != "bump"
     numbers = [number(word.text) for word in words[sided:]]
@@ -284,13 +246,13 @@ def _read_bump(marker: Target, verb: str, rest: list[Word]) -> OnAirfoil:
     if verb != "cst":
         require_peak(shape[0])
     if verb == "bump":
-        return Bump(marker, height, shape[0], (low, high))
+        return model.Bump(marker, height, shape[0], (low, high))
     side = next((one for one in SIDES if one == words[0].text.lower()), None)
     if side is None:
         raise CaseError(not_one_of(words[0].text, SIDES))
     if verb == "cst":
-        return Cst(marker, height, term_of(*shape), side, (low, high))
-    return HicksHenne(marker, height, shape[0], side, (low, high))
+        return model.Cst(marker, height, term_of(*shape), side, (low, high))
+    return model.HicksHenne(marker, height, shape[0], side, (low, high))
 
 
 def require_peak(peak: float) -> None:
@@ -309,21 +271,9 @@ def term_of(k: float, n: float) -> tuple[int, int]:
     return int(k), int(n)
 
 
-def _bump_text(head: str, motion: OnAirfoil) -> str:
-    chord = _numbers(motion.chord)
-    if isinstance(motion, Bump):
-        return f"({head}, bump, {_numbers((motion.peak, motion.height))}, {chord})"
-    tail = "" if motion.chord == (0.0, 1.0) else f", {chord}"
-    if isinstance(motion, Cst):
-        k, n = motion.term
-        return f"({head}, cst, {motion.side}, {k}, {n}, {float(motion.height)!r}{tail})"
-    numbers = _numbers((motion.peak, motion.height))
-    return f"({head}, hicks-henne, {motion.side}, {numbers}{tail})"
-
-
 def _read_column(
-    kind: type[FfdCamber | FfdThickness], marker: Target, rest: list[Word]
-) -> FfdCamber | FfdThickness:
+    kind: type[model.FfdCamber | model.FfdThickness], marker: Target, rest: list[Word]
+) -> model.FfdCamber | model.FfdThickness:
     items = _flat(rest)
     name = items[0].text if items else ""
     if len(items) not in (3, 4) or not name:
@@ -335,7 +285,7 @@ def _read_column(
     return kind(marker, name, (i, j), number(items[-1].text))
 
 
-def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
+def _read_twist(marker: Target, rest: list[Word]) -> model.FfdTwist:
     items = _flat(rest)
     letter = len(items) > 3 and items[3].text.lower() in ("x", "y", "z")
     n_axis = 1 if letter else 3
@@ -347,17 +297,17 @@ def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
         )
     (plane,) = _integers(items[1:2])
     axis, point = read_axis(items[3 : 3 + n_axis]), read_vector(items[3 + n_axis :], "the point")
-    return FfdTwist(marker, items[0].text, plane, number(items[2].text), point, axis)
+    return model.FfdTwist(marker, items[0].text, plane, number(items[2].text), point, axis)
 
 
-def _read_span(marker: Target, kind: SpanKind, rest: list[Word]) -> SpanMotion:
+def _read_span(kind: SpanKind, marker: Target, rest: list[Word]) -> model.SpanMotion:
     start = next((place for place, word in enumerate(rest) if word.is_sign("(")), len(rest))
     point = _flat(rest[start:])
     if point and len(point) != 3:
         raise CaseError("the point of the stacking line needs three coordinates: (x, y, z)")
     at = read_vector(point, "the stacking point") if point else None
     curve = read_curve(" ".join(word.text for word in rest[:start]))
-    return SpanMotion(marker, kind, *curve, at)  # type: ignore[arg-type]
+    return model.SpanMotion(marker, kind, *curve, at)  # type: ignore[arg-type]
 
 
 def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -377,7 +327,7 @@ def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(map(number, spans)), tuple(map(number, values))
 
 
-def curve_text(motion: SpanMotion) -> str:
+def curve_text(motion: model.SpanMotion) -> str:
     """Return the curve of a motion over the span as text, as `read_curve` reads it."""
     spans, values = (
         [repr(float(one)).removesuffix(".0") for one in several]
@@ -396,51 +346,71 @@ def _integers(words: list[Word]) -> list[int]:
     return [int(value) for value in at]
 
 
+_READERS: dict[str, Callable[[Target, list[Word]], Motion]] = {
+    "translate": lambda marker, rest: model.Translate(
+        marker, read_vector(_flat(rest), "the shift")
+    ),
+    "rotate": _read_rotate,
+    "scale": _read_scale,
+    "radial": _read_radial,
+    **{verb: partial(_read_bump, verb) for verb in _BUMPS},
+    "ffd": _read_ffd,
+    "ffd-camber": partial(_read_column, model.FfdCamber),
+    "ffd-thickness": partial(_read_column, model.FfdThickness),
+    "ffd-twist": _read_twist,
+    **{kind: partial(_read_span, kind) for kind in SPAN_KINDS},
+    "file": _read_file,
+    "onto": _read_onto,
+}
+
+
 def _motion_text(motion: Motion) -> str:
-    if isinstance(motion, Prescribed):
+    verb = motion.kind if isinstance(motion, model.SpanMotion) else VERB_OF.get(type(motion), "")
+    return f"({', '.join([_target_text(motion.marker), verb, *_arguments(motion)])})"
+
+
+def _arguments(motion: Motion) -> list[str]:
+    """Return the texts that follow the verb of a motion; CaseError if it has none."""
+    if isinstance(motion, model.Prescribed):
         raise CaseError(
             "displacements that a program gave cannot be written to a case file; write them to a "
             "displacement file"
         )
-    head = _target_text(motion.marker)
-    if isinstance(motion, OnAirfoil):
-        return _bump_text(head, motion)
-    if isinstance(motion, BoxMotion):
-        return f"({head}, {VERB_OF[type(motion)]}, {name_text(motion.box)}, {_of_box(motion)})"
-    if isinstance(motion, SpanMotion):
-        point = "" if motion.point is None else f", {vector_text(motion.point)}"
-        return f"({head}, {motion.kind}, {curve_text(motion)}{point})"
-    if isinstance(motion, FromFile):
+    if isinstance(motion, model.Translate):
+        return _numbers(*motion.vector)
+    if isinstance(motion, model.Bump):
+        return _numbers(motion.peak, motion.height, *motion.chord)
+    if isinstance(motion, model.OnAirfoil):
+        chord = () if motion.chord == (0.0, 1.0) else motion.chord
+        if isinstance(motion, model.Cst):
+            return [motion.side, *map(str, motion.term), *_numbers(motion.height, *chord)]
+        return [motion.side, *_numbers(motion.peak, motion.height, *chord)]
+    if isinstance(motion, model.FfdTwist):
+        turn = [*_numbers(motion.angle_deg), axis_text(motion.axis), vector_text(motion.point)]
+        return [name_text(motion.box), str(motion.plane), *turn]
+    if isinstance(motion, model.BoxMotion):
+        by = motion.vector if isinstance(motion, model.Ffd) else (motion.amount,)
+        return [name_text(motion.box), *map(str, motion.index), *_numbers(*by)]
+    if isinstance(motion, model.SpanMotion):
+        return [curve_text(motion), *([] if motion.point is None else [vector_text(motion.point)])]
+    if isinstance(motion, model.FromFile):
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
         path = f'"{path}"' if any(sign in path for sign in " ,") and path[0] != '"' else path
-        limit = motion.limit if isinstance(motion, Onto) else 0.0
-        tail = f", {float(limit)!r}" if limit else ""
-        return f"({head}, {VERB_OF[type(motion)]}, {path}{tail})"
-    if isinstance(motion, Translate):
-        return f"({head}, translate, {_numbers(motion.vector)})"
-    if isinstance(motion, Radial):
-        numbers = f"{float(motion.factor)!r}, {float(motion.distance)!r}"
-        axis = f"{axis_text(motion.axis)}, " if len(motion.point) == 3 else ""
-        return f"({head}, radial, {numbers}, {axis}{vector_text(motion.point)})"
+        return [
+            path,
+            *(_numbers(motion.limit) if isinstance(motion, model.Onto) and motion.limit else []),
+        ]
     place = "centroid" if motion.point == "centroid" else vector_text(motion.point)
-    if isinstance(motion, Scale):
-        return f"({head}, scale, {_numbers(motion.factors)}, {place})"
-    axis = axis_text(motion.axis)
-    in_plane = motion.point == "centroid" or len(motion.point) == 2
-    turn = f"rotate, {float(motion.angle_deg)!r}"
-    if axis == "z" and in_plane:
-        return f"({head}, {turn}, {place})"
-    return f"({head}, {turn}, {axis}, {place})"
-
-
-def _of_box(motion: BoxMotion) -> str:
-    """Return which control points of its box a motion moves, and how, as text."""
-    if isinstance(motion, FfdTwist):
-        at = f"{motion.plane}, {float(motion.angle_deg)!r}, {axis_text(motion.axis)}"
-        return f"{at}, {vector_text(motion.point)}"
-    by = motion.vector if isinstance(motion, Ffd) else (motion.amount,)
-    return f"{', '.join(map(str, motion.index))}, {_numbers(by)}"
+    if isinstance(motion, model.Scale):
+        return [*_numbers(*motion.factors), place]
+    axis = [axis_text(motion.axis)]
+    if isinstance(motion, model.Radial):
+        numbers = _numbers(motion.factor, motion.distance)
+        return [*numbers, *(axis if len(motion.point) == 3 else []), place]
+    if axis == ["z"] and (motion.point == "centroid" or len(motion.point) == 2):
+        axis = []
+    return [*_numbers(motion.angle_deg), *axis, place]
 
 
 def _target_text(target: Target) -> str:
@@ -452,8 +422,8 @@ def _target_text(target: Target) -> str:
     return f"({', '.join(names)})"
 
 
-def _numbers(values: tuple[float, ...]) -> str:
-    return ", ".join(repr(float(value)) for value in values)
+def _numbers(*values: float) -> list[str]:
+    return [repr(float(value)) for value in values]
 
 
 GRAMMAR = (

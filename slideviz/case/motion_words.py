@@ -5,30 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from slideviz.case.model import (
-    BoxMotion,
-    Bump,
-    Case,
-    Cst,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
-    Motion,
-    OnAirfoil,
-    Onto,
-    Point,
-    Prescribed,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Target,
-    Translate,
-    named,
-)
+from slideviz.case import model
+from slideviz.case.model import Case, Motion, Point, Target, named
 from slideviz.mesh.model import Mesh
 from slideviz.terms import AXES, SPAN_KINDS
 
@@ -54,34 +32,30 @@ def target_words(target: Target) -> str:
 
 def _in_full(motion: Motion, dim: int, extent: float) -> str:
     its = "its" if len(named(motion.marker)) == 1 else "their"
-    if isinstance(motion, Translate):
+    point = getattr(motion, "point", None)
+    place = "" if point is None else _place(point, extent, its=its)
+    if isinstance(motion, model.Translate):
         return f"translate by {vector_words(motion.vector)}"
-    if isinstance(motion, Rotate):
-        turned = f"rotate by {motion.angle_deg:.5g}°"
-        if dim == 3:
-            through = _place(motion.point, extent, its=its)
-            return f"{turned} about {direction_words(motion.axis)} through {through}"
-        return f"{turned} about {_place(motion.point, extent, its=its)}"
-    if isinstance(motion, Scale):
-        about = _place(motion.point, extent, its=its)
-        return f"scale by {_factors(motion.factors)} about {about}"
-    if isinstance(motion, Radial):
+    if isinstance(motion, model.Rotate):
+        through = f"{direction_words(motion.axis)} through " if dim == 3 else ""
+        return f"rotate by {motion.angle_deg:.5g}° about {through}{place}"
+    if isinstance(motion, model.Scale):
+        return f"scale by {_factors(motion.factors)} about {place}"
+    if isinstance(motion, model.Radial):
         return f"push radially by {_push(motion)}"
-    if isinstance(motion, Ffd):
+    if isinstance(motion, model.Ffd):
         return f"move {_control(motion)} by {vector_words(motion.vector[:dim])}"
-    if isinstance(motion, HicksHenne):
+    if isinstance(motion, model.HicksHenne):
         return f"move {_bump(motion, f'outwards by {motion.height:.4g}')}"
-    if isinstance(motion, OnAirfoil):
+    if isinstance(motion, model.OnAirfoil):
         return f"raise {_bump(motion, f'by {motion.height:.4g}')}"
-    if isinstance(motion, BoxMotion):
-        if not isinstance(motion, FfdTwist):
-            return _of_box(motion)
-        about = f"{direction_words(motion.axis)} through {_place(motion.point, extent)}"
-        return f"{_of_box(motion)} about {about}"
-    if isinstance(motion, SpanMotion):
-        about = "" if motion.point is None else f" about {_place(motion.point, extent)}"
-        return f"{_curve(motion)}{about}"
-    if isinstance(motion, Prescribed):
+    if isinstance(motion, model.FfdTwist):
+        return f"{_of_box(motion)} about {direction_words(motion.axis)} through {place}"
+    if isinstance(motion, model.BoxMotion):
+        return _of_box(motion)
+    if isinstance(motion, model.SpanMotion):
+        return f"{_curve(motion)} about {place}" if place else _curve(motion)
+    if isinstance(motion, model.Prescribed):
         return f"displace {len(motion.nodes):,} nodes as given"
     return f"{_laid(motion) or 'displace as in '}{motion.path.name or '(no file yet)'}"
 
@@ -119,69 +93,48 @@ def motion_labels(cases: Sequence[Case]) -> list[str]:
 def _label(motions: Sequence[Motion], several: bool, exact: bool) -> str:
     parts = []
     for motion in motions:
-        words = _exactly(motion) if exact else _briefly(motion)
+        words = _in_few_words(motion, exact)
         with_target = several and bool(motion.marker)
         parts.append(f"{target_words(motion.marker)}: {words}" if with_target else words)
     return " + ".join(parts) or "no motion"
 
 
-def _briefly(motion: Motion) -> str:
-    """Return a motion in few words, without its point and axis."""
-    if isinstance(motion, Translate):
+def _in_few_words(motion: Motion, exact: bool) -> str:
+    """Return a motion in words; with ``exact``, its point, axis and folder, and 15 digits."""
+    form = ".15g" if exact else ".4g"
+    if isinstance(motion, model.Translate):
         moved = [at for at, value in enumerate(motion.vector) if value]
-        if len(moved) == 1:
+        if len(moved) == 1 and not exact:
             return f"translate {'xyz'[moved[0]]} {motion.vector[moved[0]]:+.4g}"
-        return f"translate {vector_words(motion.vector)}"
-    if isinstance(motion, Rotate):
-        return f"rotate {motion.angle_deg:+.4g}°"
-    if isinstance(motion, Scale):
-        same = len(set(motion.factors)) == 1
-        return f"scale {_factors(motion.factors[:1] if same else motion.factors)}"
-    if isinstance(motion, Radial):
-        return f"radially {_push(motion)}"
-    if isinstance(motion, Ffd):
-        return f"{_control(motion)} {vector_words(motion.vector)}"
-    if isinstance(motion, OnAirfoil):
-        return _bump(motion, f"{motion.height:+.4g}")
-    if isinstance(motion, BoxMotion):
-        return _of_box(motion)
-    if isinstance(motion, SpanMotion):
-        return _curve(motion)
-    if isinstance(motion, Prescribed):
-        return f"{len(motion.nodes):,} nodes as given"
-    return f"{_laid(motion)}{motion.path.name or '(no file yet)'}"
+        words = f"translate {vector_words(motion.vector, form)}"
+    elif isinstance(motion, model.Rotate):
+        words = f"rotate {motion.angle_deg:+{form}}°"
+    elif isinstance(motion, model.Scale):
+        same = len(set(motion.factors)) == 1 and not exact
+        words = f"scale {_factors(motion.factors[:1] if same else motion.factors, form)}"
+    elif isinstance(motion, model.Radial):
+        by = f"× {motion.factor:.15g} {motion.distance:+.15g}" if exact else _push(motion)
+        words = f"radially {by}"
+    elif isinstance(motion, model.Ffd):
+        words = f"{_control(motion)} {vector_words(motion.vector, form)}"
+    elif isinstance(motion, model.OnAirfoil):
+        along = exact and motion.chord != (0.0, 1.0)
+        chord = f", chord {vector_words(motion.chord, form)}" * along
+        words = _bump(motion, f"{motion.height:+{form}}", form) + chord
+    elif isinstance(motion, model.BoxMotion):
+        words = _of_box(motion, form)
+    elif isinstance(motion, model.SpanMotion):
+        words = _curve(motion, form)
+    elif isinstance(motion, model.Prescribed):
+        words = f"{len(motion.nodes):,} nodes as given"
+    else:
+        path = str(motion.path) if exact else motion.path.name or "(no file yet)"
+        words = f"{_laid(motion)}{path}"
+    return words + _about(motion) * exact
 
 
-def _exactly(motion: Motion) -> str:
-    """Return a motion in words, with its point and axis, and numbers with 15 digits."""
-    if isinstance(motion, FromFile):
-        return f"{_laid(motion)}{motion.path}"
-    if isinstance(motion, Ffd):
-        return f"{_control(motion)} {vector_words(motion.vector, '.15g')}"
-    if isinstance(motion, OnAirfoil):
-        chord = f", chord {vector_words(motion.chord, '.15g')}" * (motion.chord != (0.0, 1.0))
-        return _bump(motion, f"{motion.height:+.15g}", ".15g") + chord
-    if isinstance(motion, FfdTwist):
-        return _of_box(motion, ".15g") + _about(motion.point) + _along(motion.axis)
-    if isinstance(motion, BoxMotion):
-        return _of_box(motion, ".15g")
-    if isinstance(motion, SpanMotion):
-        return _curve(motion, ".15g") + ("" if motion.point is None else _about(motion.point))
-    if isinstance(motion, Prescribed):
-        return _briefly(motion)
-    if isinstance(motion, Translate):
-        return f"translate {vector_words(motion.vector, '.15g')}"
-    if isinstance(motion, Scale):
-        return f"scale {_factors(motion.factors, '.15g')}" + _about(motion.point)
-    if isinstance(motion, Radial):
-        by = f"× {motion.factor:.15g} {motion.distance:+.15g}"
-        return f"radially {by}" + _about(motion.point) + _along(motion.axis)
-    turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point)
-    return turned + _along(motion.axis)
-
-
-def _laid(motion: FromFile) -> str:
-    return "lay onto " if isinstance(motion, Onto) else ""
+def _laid(motion: model.FromFile) -> str:
+    return "lay onto " if isinstance(motion, model.Onto) else ""
 
 
 def mesh_words(mesh: Mesh) -> tuple[str, str]:
@@ -218,21 +171,21 @@ def _factors(values: Sequence[float], form: str = ".4g") -> str:
     return " × ".join(format(value, form) for value in values)
 
 
-def _push(motion: Radial) -> str:
+def _push(motion: model.Radial) -> str:
     parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
     parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
     return " and ".join(parts)
 
 
-def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
+def _bump(motion: model.OnAirfoil, by: str, form: str = ".4g") -> str:
     """Return what a motion moves of an airfoil, in words, with the height as in ``by``."""
-    if isinstance(motion, Cst):
+    if isinstance(motion, model.Cst):
         return f"{motion.side} side {by} × CST {motion.term[0]} of {motion.term[1]}"
-    what = "both sides" if isinstance(motion, Bump) else f"{motion.side} side"
+    what = "both sides" if isinstance(motion, model.Bump) else f"{motion.side} side"
     return f"{what} {by} at {format(100.0 * motion.peak, form)} % chord"
 
 
-def _curve(motion: SpanMotion, form: str = ".4g") -> str:
+def _curve(motion: model.SpanMotion, form: str = ".4g") -> str:
     """Return what a motion over the span changes, in words, with its values along the span."""
     unit = "°" if SPAN_KINDS[motion.kind].unit == "°" else ""
     values = [f"{format(value, form)}{unit}" for value in motion.values]
@@ -243,21 +196,23 @@ def _curve(motion: SpanMotion, form: str = ".4g") -> str:
     return f"{motion.kind} {', '.join(pairs)} span"
 
 
-def _control(motion: Ffd | FfdCamber | FfdThickness) -> str:
+def _control(motion: model.Ffd | model.FfdCamber | model.FfdThickness) -> str:
     at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
     return f"({at}) of {_box(motion)}"
 
 
-def _box(motion: BoxMotion) -> str:
+def _box(motion: model.BoxMotion) -> str:
     return motion.box or "(no box yet)"
 
 
-def _of_box(motion: FfdCamber | FfdThickness | FfdTwist, form: str = ".4g") -> str:
+def _of_box(
+    motion: model.FfdCamber | model.FfdThickness | model.FfdTwist, form: str = ".4g"
+) -> str:
     """Return a motion of many control points of a box in words, without axis and point."""
-    if isinstance(motion, FfdTwist):
+    if isinstance(motion, model.FfdTwist):
         planes = "all planes" if motion.plane < 0 else f"plane {motion.plane}"
         return f"twist {planes} of {_box(motion)} {motion.angle_deg:+{form}}°"
-    what = "camber" if isinstance(motion, FfdCamber) else "thickness"
+    what = "camber" if isinstance(motion, model.FfdCamber) else "thickness"
     return f"{what} {_control(motion)} {motion.amount:+{form}}"
 
 
@@ -267,12 +222,11 @@ def _place(point: Point, extent: float = 0.0, form: str = ".4g", its: str = "its
     return vector_words([v if abs(v) >= NOTHING * extent else 0.0 for v in point], form)
 
 
-def _about(point: Point) -> str:
-    return f" about {_place(point, form='.15g')}"
-
-
-def _along(axis: Sequence[float]) -> str:
-    return "" if tuple(axis) == AXES["z"] else f", axis {vector_words(axis, '.15g')}"
+def _about(motion: Motion) -> str:
+    """Return words for the point and the axis of a motion, if it has them."""
+    point, axis = getattr(motion, "point", None), getattr(motion, "axis", AXES["z"])
+    about = "" if point is None else f" about {_place(point, form='.15g')}"
+    return about + ("" if tuple(axis) == AXES["z"] else f", axis {vector_words(axis, '.15g')}")
 
 
 def direction_words(direction: Sequence[float]) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from slideviz.case import model
 from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import (
     Displacements,
@@ -17,27 +18,7 @@ from slideviz.case.displacement import (
     read_displacements,
 )
 from slideviz.case.lines import read_text
-from slideviz.case.model import (
-    Bump,
-    Case,
-    Cst,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
-    Motion,
-    Onto,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Target,
-    Translate,
-    applies_to,
-    named,
-)
+from slideviz.case.model import Case, Motion, Target, applies_to, named
 from slideviz.case.motion import (
     displacements,
     key_of,
@@ -206,26 +187,26 @@ def new_motion(
     there is one; a free-form deformation moves a control point of the first of ``boxes``, a bump
     is one of an airfoil along ``chord``.
     """
-    if kind in (HicksHenne, Cst, Bump):
+    if kind in (model.HicksHenne, model.Cst, model.Bump):
         return kind(marker, 0.0, chord=chord)
     axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    if kind is Translate:
-        return Translate(marker, (0.0,) * dim)
-    if kind is Rotate:
-        return Rotate(marker, 0.0, "centroid" if machine is None else origin[:dim], axis)
-    if kind is Radial:
-        return Radial(marker, 1.0, 0.0, axis, origin[:dim])
-    if kind is Scale:
-        return Scale(marker, (1.0,) * dim)
-    if kind is Ffd:
-        return Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
-    if kind in (FfdCamber, FfdThickness):
+    if kind is model.Translate:
+        return model.Translate(marker, (0.0,) * dim)
+    if kind is model.Rotate:
+        return model.Rotate(marker, 0.0, "centroid" if machine is None else origin[:dim], axis)
+    if kind is model.Radial:
+        return model.Radial(marker, 1.0, 0.0, axis, origin[:dim])
+    if kind is model.Scale:
+        return model.Scale(marker, (1.0,) * dim)
+    if kind is model.Ffd:
+        return model.Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
+    if kind in (model.FfdCamber, model.FfdThickness):
         return kind(marker, (*boxes, "")[0], (0, 0 if dim == 3 else -1), 0.0)
-    if kind is SpanMotion:
-        return SpanMotion(marker, "twist", (0.0, 1.0), (0.0, 0.0))
-    if kind is FfdTwist:
-        return FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
-    return Onto(Path(), marker) if kind is Onto else FromFile(Path(), marker)
+    if kind is model.SpanMotion:
+        return model.SpanMotion(marker, "twist", (0.0, 1.0), (0.0, 0.0))
+    if kind is model.FfdTwist:
+        return model.FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
+    return model.Onto(Path(), marker) if kind is model.Onto else model.FromFile(Path(), marker)
 
 
 def targets(session: Session) -> tuple[Target, ...]:
@@ -373,11 +354,13 @@ class Ghosts:
         }
         files: dict[object, Displacements] = {}
         for motion in case.motions:
-            if isinstance(motion, Onto):
+            if isinstance(motion, model.Onto):
                 if wait or is_laid(case, self.mesh):
                     with suppress(SlidevizError):
                         files[key_of(motion)] = laid_displacements(motion, case, self.mesh, on)
-            elif isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
+            elif (
+                isinstance(motion, model.FromFile) and (read := self._read(motion, on)) is not None
+            ):
                 files[key_of(motion)] = read
         with suppress(SlidevizError):
             files |= placed_displacements(case, self.mesh, on)
@@ -385,7 +368,7 @@ class Ghosts:
         moved = moved_together(case.motions, points, on, files)
         return {name: points[nodes] + moved[name] for name, nodes in on.items()}
 
-    def _read(self, motion: FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
+    def _read(self, motion: model.FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
         # A file for several boundaries may list the nodes of each of them.
         names = tuple(name for name in on if applies_to(motion, name))
         if not names:
