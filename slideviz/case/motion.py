@@ -262,7 +262,8 @@ def moved_together(
 
     Markers that one motion moves are moved as one body: about their common centroid. ``points`` (n,
     d) float64: undeformed positions of all nodes. ``on``: the nodes of each moving marker.
-    ``files``: as in `displacement_of`.
+    ``files``: the displacements of files and of `PlacedMotion`, by `key_of` their motion; a motion
+    that is not among them displaces nothing.
     """
     return _together(motions, points, on, files)[1]
 
@@ -324,52 +325,30 @@ def same(vectors: FloatArray, mesh: Mesh) -> float:
     return min(AGREE * mesh.extent, ALIKE * largest) + rounding
 
 
-def moved_points(
-    motions: Iterable[Motion],
-    points: FloatArray,
-    nodes: IntArray | None = None,
-    files: ReferenceDisplacements | None = None,
-) -> FloatArray:
-    """Return the points (k, d) of one marker after its motions; parameters as `displacement_of`."""
-    return points + displacement_of(motions, points, nodes, files)
+def displacement_of(motions: Iterable[Motion], points: FloatArray) -> FloatArray:
+    """Return the displacement (k, d) of the points of one marker by its motions, in sequence.
 
-
-def displacement_of(
-    motions: Iterable[Motion],
-    points: FloatArray,
-    nodes: IntArray | None = None,
-    files: ReferenceDisplacements | None = None,
-) -> FloatArray:
-    """Return the displacement (k, d) of the nodes of one marker after all motions, in sequence.
-
-    ``motions``: the motions of this marker.
-    ``points`` (k, d) float64: undeformed positions of its nodes.
-    ``nodes`` (k,) int64: their indices; needed for displacements of files, boxes and programs only.
-    ``files``: the displacements of files and of `PlacedMotion`, by `key_of` their motion; a motion
-    that is not among them displaces nothing.
+    Files, and motions that depend on undeformed places, displace nothing here.
     """
-    total = np.zeros_like(points)
+    total, nodes = np.zeros_like(points), np.arange(len(points))
     for motion in motions:
-        total += _change(motion, points + total, nodes, files)
+        total += _change(motion, points + total, nodes, {})
     return total
 
 
 def _change(
-    motion: Motion, points: FloatArray, nodes: IntArray | None, files: ReferenceDisplacements | None
+    motion: Motion, points: FloatArray, nodes: IntArray, files: ReferenceDisplacements
 ) -> FloatArray:
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, model.Prescribed):
         out = np.zeros_like(points)
-        if nodes is not None:
-            _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
-            out[here] = motion.vectors[given]
+        _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
+        out[here] = motion.vectors[given]
         return out
     if not isinstance(motion, model.FromFile | model.PlacedMotion):
         return _increment(motion, points)
-    key = key_of(motion)
-    if not files or nodes is None or key not in files:
-        return np.zeros_like(points)
-    return files[key].at(nodes)
+    found = files.get(key_of(motion))
+    return np.zeros_like(points) if found is None else found.at(nodes)
 
 
 def _increment(

@@ -50,11 +50,6 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
     )
 
 
-def end_message(run: Run) -> str:
-    """Return the end of a run in a few words."""
-    return "".join(end_parts(run))
-
-
 def end_parts(run: Run) -> tuple[str, str]:
     """Return the end of a run in a few words, and how far its motion may go, perhaps ""."""
     step = run.last_step

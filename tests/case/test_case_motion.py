@@ -14,7 +14,7 @@ from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import (
     displacement_of,
     displacements,
-    moved_points,
+    moved_together,
     reference_displacements,
 )
 from slideviz.errors import CaseError
@@ -25,6 +25,10 @@ clouds = st.sampled_from([2, 3]).flatmap(
 )
 angles = st.floats(-720, 720)
 axes = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: math.hypot(*axis) > 1e-3)
+
+
+def moved_points(motions, points):
+    return points + displacement_of(motions, points)
 
 
 def turn(points, angle_deg, point="centroid", axis=(0.0, 0.0, 1.0)):
@@ -239,8 +243,8 @@ class TestDisplacements:
         assert found.vectors[:, 0].tolist() == [-0.5, 0.5, 1.5, 2.5]
         nodes = square.marker("UPPER").nodes
         files = reference_displacements(one, square, {"UPPER": nodes})
-        seen = moved_points(one.motions, square.points[nodes], nodes, files)
-        assert (seen == square.points[nodes] + found.vectors).all()
+        seen = moved_together(one.motions, square.points, {"UPPER": nodes}, files)["UPPER"]
+        assert (seen == found.vectors).all()
         (tmp_path / "d.txt").write_text("3 1 0\n")
         with pytest.raises(CaseError, match=r"d\.txt:1: node 3 is not on marker 'UPPER'"):
             displacements(one, square)

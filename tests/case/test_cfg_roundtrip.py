@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
 from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, SpanMotion, Translate
-from slideviz.case.motion import moved_points
+from slideviz.case.motion import displacement_of
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
@@ -152,7 +152,8 @@ def test_a_saved_motion_moves_points_to_the_same_bits(tmp_path):
     case.write(tmp_path / "a.cfg")
     points = np.random.default_rng(7).random((50, 2))
     again = Case.read(tmp_path / "a.cfg").motions
-    assert moved_points(again, points).tobytes() == moved_points(motions, points).tobytes()
+    found = displacement_of(again, points)
+    assert found.tobytes() == displacement_of(motions, points).tobytes()
 
 
 def test_paths_are_written_relative_and_survive_a_move(tmp_path):

@@ -22,7 +22,7 @@ from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
-from slideviz.session.run_messages import end_message
+from slideviz.session.run_messages import end_parts
 from slideviz.session.runs_words import describe_run
 
 DONE = "he motion could go "
@@ -772,7 +772,7 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert "more steps" in panel.text.toolTip()
     assert banner.property("calm") is False
     assert "38 inverted cells. What may help: " in banner.text.text()
-    assert "inverted" in end_message(run_)
+    assert "inverted" in "".join(end_parts(run_))
     # From step 0, and from an order of one's own, too.
     session, table = ready.session, ready.window.dock_manager.panels["worst"].table
     table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)

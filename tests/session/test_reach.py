@@ -11,7 +11,7 @@ from slideviz.session import changes, jobs
 from slideviz.session.motion_scale import factor_of, scaled
 from slideviz.session.opening import open_mesh
 from slideviz.session.reach import reach_of, reach_run, typed_words
-from slideviz.session.run_messages import end_message
+from slideviz.session.run_messages import end_parts
 from slideviz.session.state import StepFrame
 
 MOTIONS = (
@@ -76,7 +76,7 @@ def test_the_curve_ends_where_the_first_cell_folds(session):
     assert found.lowest[found.fractions == found.safe.fraction] < 1e-3
     for frame in run.frames:
         assert found.lowest[found.fractions == frame.step.part] == frame.quality.min
-    assert f"he motion {reach_words(found.safe.fraction)}." in end_message(run)
+    assert f"he motion {reach_words(found.safe.fraction)}." in "".join(end_parts(run))
 
 
 def test_after_a_repair_the_path_ends_at_the_repaired_mesh(session):

@@ -12,7 +12,7 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import Reduction
 from slideviz.session.motions import largest_prescribed
 from slideviz.session.run_messages import (
-    end_message,
+    end_parts,
     exact_cost,
     inverted_words,
     remedy_for,
@@ -23,6 +23,10 @@ from slideviz.solver import deform as solver
 from slideviz.solver.deform import deform
 from slideviz.solver.remedies import beyond_pitch
 from tests.builders import sector
+
+
+def end_message(run):
+    return "".join(end_parts(run))
 
 
 @pytest.fixture(scope="module")
