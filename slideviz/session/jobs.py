@@ -7,16 +7,17 @@ any thread, with progress and results, and raises `slideviz.errors.Cancelled` so
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from slideviz.case.check import check_case
-from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
+from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile, Onto
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.spans import prepare_span
@@ -28,10 +29,11 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.mesh.walls import Walls, walls
 from slideviz.sections.span import find_walls
+from slideviz.session.inspect import WORST
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -40,14 +42,15 @@ from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.state import Session, StepFrame
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
-from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import private_folder
+from slideviz.system.csv_table import write_csv
 from slideviz.system.file_checks import require_regular_file
+from slideviz.system.threads import Tick
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
     from slideviz.design.wheel import WheelQuality
-    from slideviz.solver.steps import Progress
+    from slideviz.solver.steps import Progress, Step
 
 _ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
 
@@ -57,39 +60,24 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
 
     Raises SlidevizError if the file cannot be written.
     """
-    mesh, found = frame.mesh, frame.quality
-    middles = centroids(mesh)
-    axes = ",".join("xyz"[: mesh.dim])
-    names = {vtk: ELEMENTS[vtk].name for vtk in mesh.cells.by_type}
-    with atomic_write(path, SlidevizError) as file:
-        file.write(f"cell,type,size,skew,size_skew,status,{axes}\n".encode())
+    mesh, found, cells = frame.mesh, frame.quality, frame.mesh.cells
+    totals = np.add.reduceat(mesh.points[cells.connectivity], cells.offsets[:-1], axis=0)
+    middles = totals / np.diff(cells.offsets)[:, None]
+    names = {vtk: ELEMENTS[vtk].name for vtk in cells.by_type}
+    tick = _tick(f"Writing {path.name}", report, stopped)
+
+    def rows() -> Iterator[Sequence[object]]:
+        yield "cell", "type", "size", "skew", "size_skew", "status", *"xyz"[: mesh.dim]
         for start in range(0, len(found), _ROWS):
-            raise_if_cancelled(stopped)
-            report(JobProgress(f"Writing {path.name}", start / len(found)))
+            tick(start / len(found))
             part = slice(start, start + _ROWS)
-            rows = zip(
-                mesh.cells.types[part].tolist(),
-                found.size[part].tolist(),
-                found.skew[part].tolist(),
-                found.values[part].tolist(),
-                found.status[part].tolist(),
-                middles[part].tolist(),
-                strict=True,
-            )
-            lines = [
-                f"{cell},{names[kind]},{size!r},{skew!r},{value!r},{CELL_STATES[status]},"
-                + ",".join(map(repr, middle))
-                for cell, (kind, size, skew, value, status, middle) in enumerate(rows, start)
-            ]
-            file.write(("\n".join(lines) + "\n").encode())
+            columns = cells.types, found.size, found.skew, found.values, found.status, middles
+            lists = zip(*(column[part].tolist() for column in columns), strict=True)
+            for cell, (kind, *measured, status, middle) in enumerate(lists, start):
+                yield cell, names[kind], *measured, CELL_STATES[status], *middle
+
+    write_csv(path, rows(), SlidevizError)
     return path
-
-
-def centroids(mesh: Mesh) -> FloatArray:
-    """Return the mean of the nodes of each cell, (m, d)."""
-    offsets = mesh.cells.offsets
-    total = np.add.reduceat(mesh.points[mesh.cells.connectivity], offsets[:-1], axis=0)
-    return np.asarray(total / np.diff(offsets)[:, None])
 
 
 def step_paths(path: Path, count: int) -> list[Path]:
@@ -118,22 +106,21 @@ def save_steps(
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:
-        _save_series(path, [*([first] if first else []), *frames], report, stopped)
+        tick = _tick(f"Writing {path.name}", report, stopped)
+        _save_series(path, [*([first] if first else []), *frames], tick)
         return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
-        raise_if_cancelled(stopped)
-        report(JobProgress(f"Writing {target.name}", k / len(frames)))
+        _tick(f"Writing {target.name}", report, stopped)(k / len(frames))
         save_mesh(target, frame, False, lambda _: None, stopped)
     return paths
 
 
-def _save_series(path: Path, frames: Sequence[StepFrame], report: Report, stopped: Stopped) -> None:
+def _save_series(path: Path, frames: Sequence[StepFrame], tick: Tick) -> None:
     """Write all frames into one VTKHDF file, with quality, and displacement from the first one."""
     start = frames[0].mesh
     with format_for(path).function("series")(path, start) as series:
         for k, frame in enumerate(frames):
-            raise_if_cancelled(stopped)
-            report(JobProgress(f"Writing {path.name}", k / len(frames)))
+            tick(k / len(frames))
             moved = {"displacement": frame.mesh.points - start.points}
             series.add(frame.mesh.points, cell_values(frame), moved)
 
@@ -265,15 +252,12 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
         mesh_path, zone = case.mesh_file, case.zone if zone is None else zone
     report(JobProgress(f"Reading {mesh_path.name}"))
-
-    def reading(fraction: float) -> None:
-        raise_if_cancelled(stopped)
-        report(JobProgress(f"Reading {mesh_path.name}", fraction))
-
+    reading = _tick(f"Reading {mesh_path.name}", report, stopped)
     kind = case.mesh_format if case is not None else None
     if kind != "su2" and is_large(mesh_path, zone):
-        return prepare(read_boundary(mesh_path, zone, reading), mesh_path, case, report, stopped)
-    mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
+        mesh = read_boundary(mesh_path, zone, reading)
+    else:
+        mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
     return prepare(mesh, mesh_path, case, report, stopped)
 
 
@@ -282,30 +266,22 @@ def prepare(
 ) -> Opened:
     """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
     case = None if case is None else with_marker_names(case, mesh)
-    raise_if_cancelled(stopped)
+    going_on = partial(raise_if_cancelled, stopped)
+    going_on()
     report(JobProgress("Finding the boundaries"))
     surfaces = find_surfaces(mesh)
-    raise_if_cancelled(stopped)
+    going_on()
     report(JobProgress("Looking for periodic boundaries"))
-
-    def going_on() -> None:
-        raise_if_cancelled(stopped)
-
     pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
     report(JobProgress("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
-
-    def measuring(fraction: float) -> None:
-        going_on()
-        report(JobProgress("Measuring the cells", fraction))
-
     if mesh.part is None:
         measured = quality(mesh, metric=metric, going_on=going_on)
         periodic = {name for pair in pairs for name in (pair.first, pair.second)}
         names = [name for name in mesh.marker_names if name not in periodic]
         first = StepFrame(mesh, measured, walls=_walls(mesh, mesh, names))
     else:
-        first = first_frame(mesh, metric, measuring)
+        first = first_frame(mesh, metric, _tick("Measuring the cells", report, stopped))
     going_on()
     _precompute(first)
     session = open_mesh(first, path, pairs, case)
@@ -356,7 +332,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
             report(JobProgress(f"Trying {tried}: step {now.step}, {phase}"))
 
-    unfinished, names = True, case.walls(mesh.marker_names)
+    unfinished = True
 
     def going_on() -> None:
         # The last step is not dropped, even if the job is asked to stop.
@@ -367,8 +343,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         unfinished = step.index < step.total
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
-        report(_complete(frame, None if unfinished else case, mesh))
+        report(_frame_of(step, measured, case, mesh, () if unfinished else case.limits))
         going_on()
 
 
@@ -383,12 +358,8 @@ def repair(
     from slideviz.solver.repair import mended_frame
 
     *earlier, last = frames
-
-    def progress(now: object) -> None:
-        raise_if_cancelled(stopped)
-        report(JobProgress(f"Repair: {PHASES['repair']}", getattr(now, "fraction", 0.0)))
-
-    step = mended_frame(case, mesh, last.step, progress)
+    tick = _tick(f"Repair: {PHASES['repair']}", report, stopped)
+    step = mended_frame(case, mesh, last.step, lambda now: tick(now.fraction))
     if step.safe is not None:  # the last straight way now ends at the mended mesh
         before, done = mesh, 0.0
         if earlier and earlier[-1].step is not None:
@@ -399,17 +370,18 @@ def repair(
         report(frame)
     undeformed = mesh if last.step is not None else None
     measured = quality(step.mesh, undeformed, case.quality_metric)
-    names = case.walls(mesh.marker_names)
-    frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
-    report(_complete(frame, case, mesh))
+    report(_frame_of(step, measured, case, mesh, case.limits))
 
 
-def _complete(frame: StepFrame, case: Case | None, mesh: Mesh) -> StepFrame:
-    """Return a frame with what views ask for computed, and the limits of a case checked."""
-    if case is not None and case.limits:
+def _frame_of(
+    step: Step, measured: Quality, case: Case, mesh: Mesh, limits: tuple[Limit, ...]
+) -> StepFrame:
+    """Return the frame of a step, with what views ask for computed, and limits checked."""
+    layers = _walls(step.mesh, mesh, case.walls(mesh.marker_names))
+    frame = StepFrame(step.mesh, measured, step, walls=layers)
+    if limits:
         with suppress(SlidevizError):  # the panel of limits says what is wrong
-            limits = check_case_limits(case, frame.quality, frame.mesh, mesh)
-            frame = replace(frame, limits=limits)
+            frame = replace(frame, limits=check_case_limits(case, measured, step.mesh, mesh))
     _precompute(frame)
     return frame
 
@@ -422,15 +394,13 @@ def compute_in_file(
     ``first`` is the undeformed frame, of the boundary. Raises Cancelled if it was stopped; a file
     that was at ``output`` is as before.
     """
-    from slideviz.session.inspect import WORST
     from slideviz.streaming.run import stream
 
     phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
 
     def progress(now: Progress) -> None:
-        raise_if_cancelled(stopped)
         phase = phases.get(now.phase, now.phase) + now.of_zone
-        report(JobProgress(f"From file to file: {phase}", overall(now)))
+        _tick(f"From file to file: {phase}", report, stopped)(overall(now))
 
     skin = first.mesh
     assert skin.source is not None
@@ -445,14 +415,12 @@ def compute_in_file(
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
 
 
-def overall(now: object) -> float:
-    """Return roughly the fraction of a run that is done, from its `Progress`."""
-    step, total = getattr(now, "step", 1), getattr(now, "total", 1)
-    phase, fraction = getattr(now, "phase", ""), getattr(now, "fraction", 0.0)
-    start = _STARTS.get(phase, 0.9)
+def overall(now: Progress) -> float:
+    """Return roughly the fraction of a run that is done."""
+    start = _STARTS.get(now.phase, 0.9)
     later = [value for value in _STARTS.values() if value > start]
-    inside = start + fraction * (min(later, default=0.95) - start)
-    return float((step - 1 + inside) / total)
+    inside = start + now.fraction * (min(later, default=0.95) - start)
+    return float((now.step - 1 + inside) / now.total)
 
 
 def save_mesh(
@@ -492,12 +460,10 @@ def save_wheel(
     """
     from slideviz.design.wheel import write_wheel
 
-    def progress(now: Progress) -> None:
-        raise_if_cancelled(stopped)
-        report(JobProgress(f"Writing {path.name}", now.fraction))
-
-    moved = [frame.mesh.points]
-    return write_wheel(path, [case], mesh, moved, passages, numbered, progress)
+    tick, moved = _tick(f"Writing {path.name}", report, stopped), [frame.mesh.points]
+    return write_wheel(
+        path, [case], mesh, moved, passages, numbered, lambda now: tick(now.fraction)
+    )
 
 
 def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
@@ -510,6 +476,16 @@ def raise_if_cancelled(stopped: Stopped) -> None:
     """Raise Cancelled if ``stopped()`` returns True: the job was asked to stop."""
     if stopped():
         raise Cancelled("stopped, as you asked")
+
+
+def _tick(text: str, report: Report, stopped: Stopped) -> Callable[[float], None]:
+    """Return a tick that reports the fraction done, or raises Cancelled if it is to stop."""
+
+    def tick(done: float) -> None:
+        raise_if_cancelled(stopped)
+        report(JobProgress(text, done))
+
+    return tick
 
 
 SIZES = {"turbine-row": 20_000, "stator": 20_000}

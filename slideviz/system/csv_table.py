@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
-from io import StringIO
+from io import StringIO, TextIOWrapper
 from pathlib import Path
+from typing import TextIO
 
 from slideviz.errors import SlidevizError
 from slideviz.system.atomic import atomic_write
@@ -14,17 +15,22 @@ from slideviz.system.atomic import atomic_write
 def csv_text(rows: Iterable[Sequence[object]], delimiter: str = ",") -> str:
     """Return rows of cells as CSV: numbers with all digits, None and NaN as empty cells."""
     out = StringIO()
-    writer = csv.writer(out, delimiter=delimiter, lineterminator="\n")
-    # NaN alone does not equal itself.
-    writer.writerows(["" if c is None or c != c else c for c in row] for row in rows)
+    _write(out, rows, delimiter)
     return out.getvalue()
 
 
 def write_csv(path: Path, rows: Iterable[Sequence[object]], error: type[SlidevizError]) -> None:
     """Write rows of cells to a CSV file, whole or not at all, or raise an ``error``."""
-    text = csv_text(rows)
     with atomic_write(path, error) as file:
-        file.write(text.encode())
+        text = TextIOWrapper(file, "utf-8", newline="", write_through=True)
+        _write(text, rows, ",")
+        text.detach()
+
+
+def _write(file: TextIO, rows: Iterable[Sequence[object]], delimiter: str) -> None:
+    writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
+    # NaN alone does not equal itself.
+    writer.writerows(["" if c is None or c != c else c for c in row] for row in rows)
 
 
 def csv_rows(text: str, delimiter: str = ",") -> list[list[str]]:
