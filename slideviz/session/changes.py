@@ -377,19 +377,18 @@ def start_run(session: Session, case: Case | None = None, name: str = "") -> Ses
 def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
     """Return the session with further steps of the newest run, the last shown if that run is."""
     newest = session.runs[-1]
-    grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
-    session = replace(session, runs=(*session.runs[:-1], grown))
-    if session.shown != grown.number:
+    grown = (*newest.frames, *frames)
+    session = _with_run(session, newest.number, frames=grown, saved=False)
+    if session.shown != newest.number:
         return session  # the user looks at another run meanwhile
-    return show_frame(session, len(grown.frames))
+    return show_frame(session, len(grown))
 
 
 def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
     """Return the session with ``end`` as the end of the newest run, if that had none."""
     if not session.runs or session.runs[-1].end:
         return session
-    ended = replace(session.runs[-1], end=end)
-    return replace(session, runs=(*session.runs[:-1], ended))
+    return _with_run(session, session.runs[-1].number, end=end)
 
 
 def show_run(session: Session, number: int) -> Session:
@@ -404,10 +403,7 @@ def show_run(session: Session, number: int) -> Session:
 
 def show_design(session: Session, number: int) -> Session:
     """Show the last step of a design's run, and remember the panels' settings for it."""
-    asked = (
-        replace(one, panels=session.case) if one.number == number else one for one in session.runs
-    )
-    return show_run(replace(session, runs=tuple(asked)), number)
+    return show_run(_with_run(session, number, panels=session.case), number)
 
 
 def show_beside(session: Session, number: int | None) -> Session:
@@ -457,8 +453,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
     run = session.run(number)
     if run is None or run.name == name:
         return session
-    runs = tuple(replace(one, name=name) if one is run else one for one in session.runs)
-    return replace(session, runs=runs)
+    return _with_run(session, number, name=name)
 
 
 @undoable("settings of a run")
@@ -491,7 +486,10 @@ def second_view(session: Session) -> Session:
 
 def saved_mesh(session: Session) -> Session:
     """Return the session after the deformed mesh of the run that is shown was written to disk."""
-    runs = tuple(
-        replace(run, saved=True) if run.number == session.shown else run for run in session.runs
-    )
-    return replace(session, runs=runs)
+    return _with_run(session, session.shown, saved=True)
+
+
+def _with_run(session: Session, number: int | None, **values: Any) -> Session:
+    """Return the session with other values of fields of a run."""
+    runs = (replace(run, **values) if run.number == number else run for run in session.runs)
+    return replace(session, runs=tuple(runs))

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from slideviz.errors import SlidevizError
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
@@ -21,7 +19,6 @@ from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
 from slideviz.session.state import Session, StepFrame
-from slideviz.system.csv_table import write_csv
 from slideviz.terms import (
     CELL_STATES,
     RATED,
@@ -298,11 +295,11 @@ def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
     return int((at > x).sum()) % 2 == 1
 
 
-def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
-    """Return the worst cells as rows of texts, numbers with all digits."""
+def table_rows(worst: WorstCells) -> list[list[str]]:
+    """Return the worst cells as rows of texts, numbers with all digits, below their titles."""
     names = "xyz"[: worst.positions.shape[1]]
     measured = worst.measure.replace("-", "_")
-    rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []
+    rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]]
     for at, cell in enumerate(worst.known_as):
         numbers = (worst.values[at], *worst.positions[at])
         texts = [repr(float(number)) for number in numbers]
@@ -310,11 +307,3 @@ def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
         since = "" if worst.steps[at] < 0 else str(worst.steps[at])
         rows.append([str(cell), worst.kinds[at], texts[0], state, *texts[1:], since])
     return rows
-
-
-def write_table(worst: WorstCells, path: Path) -> None:
-    """Write the worst cells as comma-separated values, whole or not at all.
-
-    Raises SlidevizError if the file cannot be written.
-    """
-    write_csv(path, table_rows(worst), SlidevizError)

@@ -76,7 +76,7 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
             for cell, (kind, *measured, status, middle) in enumerate(lists, start):
                 yield cell, names[kind], *measured, CELL_STATES[status], *middle
 
-    write_csv(path, rows(), SlidevizError)
+    write_csv(path, rows())
     return path
 
 

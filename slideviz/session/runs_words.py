@@ -1,21 +1,18 @@
-"""Runs in words: names, the settings that distinguish them, and a table as text and CSV."""
+"""Runs in words: names, the settings that distinguish them, and a table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
 from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.case.motion_words import deformation, describe, motion_labels
-from slideviz.errors import SlidevizError
 from slideviz.session.run_messages import notes_of, warnings_of
 from slideviz.session.state import Run
 from slideviz.session.walls_table import angle_change, height_ratios
-from slideviz.system.csv_table import csv_text, write_csv
 from slideviz.terms import KERNELS, METHODS, PERIODIC_MODES, SLIDING
 
 WORDED = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
@@ -263,17 +260,7 @@ def describe_run(run: Run) -> str:
     return "\n".join(lines)
 
 
-def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
-    """Return the table as CSV, with a line of titles; numbers have all digits."""
-    return csv_text(_rows(runs), delimiter)
-
-
-def write_table(path: Path, runs: Sequence[Run]) -> None:
-    """Write the table as CSV; raises SlidevizError if the file cannot be written."""
-    write_csv(path, _rows(runs), SlidevizError)
-
-
-def _rows(runs: Sequence[Run]) -> list[list[object]]:
+def table_rows(runs: Sequence[Run]) -> list[list[object]]:
     """Return the cells of the table: a row of titles, and one for each run."""
     rows: list[list[object]] = [[column.title for column in COLUMNS]]
     return rows + [[column.value(run) for column in COLUMNS] for run in runs]

@@ -1,15 +1,12 @@
-"""The table of walls: the layers at each boundary before and after a step, as text and as CSV."""
+"""The table of walls: the layers at each boundary before and after a step."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 from slideviz.case.model import Case
-from slideviz.errors import SlidevizError
 from slideviz.session.results import StepFrame
 from slideviz.session.state import Session
-from slideviz.system.csv_table import csv_text, write_csv
 
 COLUMNS = ("Boundary", "First height", "Growth", "Equal", "Angle")
 """Titles of the columns in the window; each number is the worst of its boundary."""
@@ -44,7 +41,7 @@ class WallRow(NamedTuple):
     """Smallest, mean and largest of each number."""
 
 
-def wall_entries(session: Session) -> dict[str, dict]:
+def _entries(session: Session) -> dict[str, dict]:
     """Return the entries of the report for the frame shown, those with layers first."""
     frame = session.frame
     if frame is None or frame.walls is None:
@@ -56,7 +53,7 @@ def wall_entries(session: Session) -> dict[str, dict]:
 def wall_rows(session: Session) -> list[WallRow]:
     """Return the rows of the table for the frame shown; none where its walls are not known."""
     rows = []
-    for name, entry in wall_entries(session).items():
+    for name, entry in _entries(session).items():
         before, after = (
             tuple(_text(entry[number][state][end], form) for number, end, form in _NUMBERS)
             for state in ("before", "after")
@@ -118,19 +115,9 @@ def _layered(frame: StepFrame | None, case: Case) -> list[dict]:
     return list(frame.walls.of(names).summary().values())
 
 
-def table_text(session: Session, delimiter: str = ",") -> str:
-    """Return the table as CSV, with all numbers and all their digits."""
-    return csv_text(_csv_rows(session), delimiter)
-
-
-def write_table(path: Path, session: Session) -> None:
-    """Write the table as CSV; raises SlidevizError if the file cannot be written."""
-    write_csv(path, _csv_rows(session), SlidevizError)
-
-
-def _csv_rows(session: Session) -> list[list[object]]:
+def table_rows(session: Session) -> list[list[object]]:
     """Return a row of titles as ``growth.before.max``, and one of numbers for each boundary."""
-    flat = {name: _flat(entry) for name, entry in wall_entries(session).items()}
+    flat = {name: _flat(entry) for name, entry in _entries(session).items()}
     titles = list(next(iter(flat.values()), {}))
     return [["boundary", *titles], *([name, *row.values()] for name, row in flat.items())]
 

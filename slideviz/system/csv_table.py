@@ -19,7 +19,9 @@ def csv_text(rows: Iterable[Sequence[object]], delimiter: str = ",") -> str:
     return out.getvalue()
 
 
-def write_csv(path: Path, rows: Iterable[Sequence[object]], error: type[SlidevizError]) -> None:
+def write_csv(
+    path: Path, rows: Iterable[Sequence[object]], error: type[SlidevizError] = SlidevizError
+) -> None:
     """Write rows of cells to a CSV file, whole or not at all, or raise an ``error``."""
     with atomic_write(path, error) as file:
         text = TextIOWrapper(file, "utf-8", newline="", write_through=True)

@@ -11,6 +11,7 @@ from slideviz.mesh.quality import quality
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range
 from slideviz.session import inspect
 from slideviz.session.state import StepFrame
+from slideviz.system.csv_table import write_csv
 from slideviz.terms import RATED
 from tests.builders import layered
 
@@ -166,7 +167,7 @@ def test_the_surroundings_of_a_cell_are_its_middle_and_diagonal(square):
 
 def test_the_table_keeps_every_digit(frames, tmp_path):
     worst = inspect.worst_cells(frames, len(frames) - 1, "skew", 6)
-    inspect.write_table(worst, tmp_path / "worst.csv")
+    write_csv(tmp_path / "worst.csv", inspect.table_rows(worst))
     with (tmp_path / "worst.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["cell", "type", "skew", "inverted", "x", "y", "worst_at_step"]
@@ -180,4 +181,4 @@ def test_the_table_keeps_every_digit(frames, tmp_path):
 def test_a_table_that_cannot_be_written_says_why(frames, tmp_path):
     worst = inspect.worst_cells(frames, 1, "size", 2)
     with pytest.raises(SlidevizError, match="the folder does not exist"):
-        inspect.write_table(worst, tmp_path / "none" / "worst.csv")
+        write_csv(tmp_path / "none" / "worst.csv", inspect.table_rows(worst))

@@ -22,11 +22,11 @@ from slideviz.session.runs_words import (
     seconds_words,
     steps_words,
     summary,
-    table_text,
-    write_table,
+    table_rows,
 )
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import deform
+from slideviz.system.csv_table import csv_text, write_csv
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +49,10 @@ def runs(passage):
 def _settings(case):
     names = ("sliding", "periodic", "steps", "reduction")
     return {name: getattr(case, name) for name in names}
+
+
+def table_text(runs, delimiter=","):
+    return csv_text(table_rows(runs), delimiter)
 
 
 def rows(text, delimiter=","):
@@ -74,10 +78,10 @@ def test_the_table_has_settings_and_results_of_every_run(runs):
 
 
 def test_the_table_is_written_whole_or_not_at_all(runs, tmp_path):
-    write_table(tmp_path / "runs.csv", runs)
+    write_csv(tmp_path / "runs.csv", table_rows(runs))
     assert (tmp_path / "runs.csv").read_text() == table_text(runs)
     with pytest.raises(SlidevizError, match="the folder does not exist"):
-        write_table(tmp_path / "nowhere" / "runs.csv", runs)
+        write_csv(tmp_path / "nowhere" / "runs.csv", table_rows(runs))
 
 
 def test_a_run_is_described_in_a_line_and_in_full(runs):

@@ -14,7 +14,8 @@ from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.results import StepFrame
 from slideviz.session.runs_words import COLUMNS
-from slideviz.session.walls_table import table_text, wall_rows
+from slideviz.session.walls_table import table_rows, wall_rows
+from slideviz.system.csv_table import csv_text
 from tests.builders import grid
 
 
@@ -44,7 +45,7 @@ def test_rows_have_the_worst_before_and_after_layers_first():
 
 def test_the_csv_has_every_number():
     session = sheared_session({"x_m": "internal"})
-    rows = list(csv.DictReader(io.StringIO(table_text(session))))
+    rows = list(csv.DictReader(io.StringIO(csv_text(table_rows(session)))))
     low = next(row for row in rows if row["boundary"] == "y_m")
     assert float(low["first_height.ratio.mean"]) == pytest.approx(0.5)
     assert float(low["equal_layers.before.max"]) == 2

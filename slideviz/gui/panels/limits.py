@@ -21,6 +21,7 @@ from slideviz.session import changes, walls_table
 from slideviz.session.limits import choose_limit
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
+from slideviz.system.csv_table import write_csv
 
 NAME = Qt.ItemDataRole.UserRole
 """Item data role of the boundary, or the place of the limit, of a row."""
@@ -233,5 +234,5 @@ class LimitsPanel(Panel):
             "Export the table of walls",
             folder_of(self) / "walls.csv",
             "Comma-separated values (*.csv)",
-            lambda path: walls_table.write_table(path, session),
+            lambda path: write_csv(path, walls_table.table_rows(session)),
         )

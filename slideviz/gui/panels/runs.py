@@ -26,11 +26,11 @@ from slideviz.session.runs_words import (
     describe_run,
     run_words,
     summary,
-    table_text,
-    write_table,
+    table_rows,
 )
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
+from slideviz.system.csv_table import csv_text, write_csv
 
 TABLE_FILTERS = "Table (*.csv)"
 OF_ALL = ("copy", "export")  # commands for all runs, whichever row is selected
@@ -134,7 +134,7 @@ class RunActions:
 
     def copy_table(self, _number: int | None = None) -> None:
         """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
-        QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
+        QApplication.clipboard().setText(csv_text(table_rows(self.store.session.runs), "\t"))
         self._window.show_status("Copied the table of runs")
 
     def export_table(self, _number: int | None = None) -> None:
@@ -147,7 +147,7 @@ class RunActions:
             "Export the table of runs",
             folder / f"{stem}_runs.csv",
             TABLE_FILTERS,
-            lambda path: write_table(path, session.runs),
+            lambda path: write_csv(path, table_rows(session.runs)),
         )
 
 

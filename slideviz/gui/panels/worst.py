@@ -30,11 +30,11 @@ from slideviz.session.inspect import (
     nearest_boundary,
     table_rows,
     worst_cells,
-    write_table,
 )
 from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Session
 from slideviz.session.store import Store
+from slideviz.system.csv_table import write_csv
 from slideviz.terms import COLOR_BY, SIZE_SKEW
 
 
@@ -217,7 +217,7 @@ class WorstPanel(Panel):
             "Export worst cells",
             folder_of(self) / "worst_cells.csv",
             "Comma-separated values (*.csv)",
-            lambda path: write_table(worst, path),
+            lambda path: write_csv(path, table_rows(worst)),
         )
 
 
