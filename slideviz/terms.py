@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 
 @dataclass(frozen=True)
@@ -366,8 +366,7 @@ PeriodicKind = Literal["translational", "rotational"]
 PeriodicType = Literal["auto", "translational", "rotational"]
 PERIODIC_TYPES: dict[PeriodicType, Term] = {
     "auto": Term("automatic"),
-    "translational": Term("translational"),
-    "rotational": Term("rotational"),
+    **{kind: Term(kind) for kind in get_args(PeriodicKind)},
 }
 
 PERIODIC_DIRECTIONS: dict[str, tuple[int, PeriodicKind | None]] = {
@@ -610,13 +609,7 @@ def field_of(metric: str) -> str:
 # View --------------------------------------------------------------------------------------
 
 ColorMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
-COLOR_MAPS: dict[ColorMap, Term] = {
-    "viridis": Term("viridis"),
-    "cividis": Term("cividis"),
-    "plasma": Term("plasma"),
-    "inferno": Term("inferno"),
-    "gray": Term("gray"),
-}
+COLOR_MAPS: dict[ColorMap, Term] = {name: Term(name) for name in get_args(ColorMap)}
 """Color maps of matplotlib that color-blind people can read; the first is the default."""
 
 PointsShown = Literal["none", "types", "control"]

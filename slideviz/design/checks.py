@@ -152,7 +152,7 @@ class Checks:
         for index, (step, state) in enumerate(zip(self.steps, states, strict=True), start=1):
             self.require_sound(index, step.part, targets, state)
             self.require_alike(value(state.points))
-            errors = np.maximum(errors, state.max_error)
+            errors = np.maximum(errors, state.number("max_error"))
         return errors
 
     def require_sound(self, index: int, part: float, targets: FloatArray, state: StepState) -> None:
@@ -166,7 +166,7 @@ class Checks:
         shape = self.mesh.points.shape
         coords = value(state.coords).reshape(-1, *shape)
         targets = targets.reshape(len(coords), *targets.shape[-2:])
-        lost = np.broadcast_to(state.lost.reshape(-1), len(coords))
+        lost = np.broadcast_to(state.number("lost").reshape(-1), len(coords))
         far = farthest(coords, self.setup.coords)
         for k, target in enumerate(targets):
             if not np.isfinite(far[k]):

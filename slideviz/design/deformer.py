@@ -214,7 +214,7 @@ class Deformer:
         self._checks = Checks(mesh, setup, self._steps, facets, least)
         self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
         if not warn_of_error_estimate(
-            self._steps, np.max([state.error_estimate for state in states], axis=0)
+            self._steps, np.max([state.number("error_estimate") for state in states], axis=0)
         ):
             warn_of_condition(self._steps)
 
@@ -407,7 +407,7 @@ class Deformer:
         if displacement.ndim == 2:
             target = value(self._input.target(displacement))
             states = self._run(target)
-            error_estimate = np.max([state.error_estimate for state in states], axis=0)
+            error_estimate = np.max([state.number("error_estimate") for state in states], axis=0)
             return value(states[-1].points), self._checks.errors(target, states), error_estimate
         points = np.empty((len(displacement), *self.mesh.points.shape))
         alone = self.mesh.halo is not None or self._setup.relaxation is not None
@@ -431,7 +431,7 @@ class Deformer:
         setup, (step,) = self._setup, self._steps
         targets = value(self._input.target(displacement))
         state = step.moved(StepState(setup.coords), targets, out)
-        errors = np.maximum(self._checks.off_track(out), state.max_error)
+        errors = np.maximum(self._checks.off_track(out), state.number("max_error"))
         self._checks.require_sound(1, 1.0, targets, state)
         one, two = setup.images.T
         apart = (out[:, two] - out[:, one]) - (setup.coords[two] - setup.coords[one])
@@ -439,7 +439,7 @@ class Deformer:
         to_points(setup.frame, out, setup.coords, self.mesh.points)
         for points in out[:0] if alike else out:
             self._checks.require_alike(points)
-        return np.stack([errors, np.broadcast_to(state.error_estimate, errors.shape)])
+        return np.stack([errors, np.broadcast_to(state.number("error_estimate"), errors.shape)])
 
     def _joined(self, points_of: Callable[[ZoneDesign], Array]) -> Array:
         """Return the points (..., n, d) of all zones; those of a zone that stays are undeformed."""

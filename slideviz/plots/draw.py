@@ -18,14 +18,12 @@ from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-What = Literal["minimum", "mean", "seconds", "control_nodes", "max_error"]
+What = Literal["minimum", "mean", "seconds"]
 
 LABELS: dict[What, str] = {
     "minimum": "minimum quality [-]",
     "mean": "mean quality [-]",
     "seconds": "processor time [s]",
-    "control_nodes": "control nodes [-]",
-    "max_error": "largest error [mesh units]",
 }
 _LABEL_GAP = 0.1  # least distance of two labels of numbers of steps, relative to the axis
 _CROWDED = 300  # number of cycles of a greedy selection above which its line is thin
@@ -121,7 +119,7 @@ def against_steps(
     every = [float(getattr(row, what)) for row in rows]
     if what in ("minimum", "mean"):
         _quality_limits(axes, every)
-    elif _ratio(every) > 30 or what == "max_error":
+    elif _ratio(every) > 30:
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0)

@@ -100,7 +100,5 @@ class Outcome:
     mean: float
     inverted: int = 0  # inverted cells
     seconds: float = float("nan")  # processor time of the deformation
-    control_nodes: int = 0
-    max_error: float = float("nan")  # in the mesh's length unit
     series: int | None = None
     """Series number of its label; by default the index of the label among all labels."""

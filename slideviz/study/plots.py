@@ -14,7 +14,7 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
-from slideviz.plots.draw import against_steps, convergence, quality_by_step
+from slideviz.plots.draw import What, against_steps, convergence, quality_by_step
 from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.plots.histogram import histogram
 from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
@@ -32,11 +32,11 @@ Span = Literal["r", "x", "y", "z"]
 
 @dataclass(frozen=True, eq=False)
 class FacetLine:
-    """A line in a facet: its name, its number ``series`` (which sets its look), and its row."""
+    """A line in a facet: its name, its number ``series`` (which sets its look), and its result."""
 
     label: str
     series: int
-    row: CombinationRow
+    result: Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +50,14 @@ class Facet:
 def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
     """Return facets of the rows that have a result; lines of one name look alike in all facets."""
     asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
-    done = [row for row in rows if row.result is not None]
-    methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
+    done = [(_titles(row), row.result) for row in rows if row.result is not None]
+    methods, modes = (len({titles[axis] for titles, _ in done}) for axis in (0, 1))
     # 0: each method is a line, each mode a facet; 1: the other way round.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined
     lines_of: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
-    for row in done:
-        titles = _titles(row)
-        line = FacetLine(titles[lined], asked[lined].index(titles[lined]), row)
+    for titles, result in done:
+        line = FacetLine(titles[lined], asked[lined].index(titles[lined]), result)
         lines_of[titles[other]].append(line)
     several = len(lines_of) > 1
     made = [Facet(title if several else "", tuple(lines)) for title, lines in lines_of.items()]
@@ -70,12 +69,6 @@ def _titles(row: CombinationRow) -> tuple[str, str]:
 
 
 Profiler = Callable[[FacetLine], Profile]  # returns the profile of a line's quality along the span
-
-
-def result_of(line: FacetLine) -> Result:
-    """Return the result of a line; lines always have one."""
-    assert line.row.result is not None
-    return line.row.result
 
 
 def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
@@ -100,7 +93,7 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
     where = span or ("r" if turns else "z")
 
     def profile(line: FacetLine) -> Profile:
-        values = result_of(line).quality.values
+        values = line.result.quality.values
         made = along(mesh, values, where, axis, origin, label=line.label)
         return replace(made, series=line.series)
 
@@ -125,7 +118,7 @@ def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[t
     """
     numbers = list(dict.fromkeys(row.combination.steps for row in rows))
     if len({row.result.steps for row in rows if row.result}) > 1:
-        yield "steps", _grid(facets(rows), (_minimum, _mean, _seconds))
+        yield "steps", _grid(facets(rows), (_against("minimum"), _against("mean"), _SECONDS))
     for number in numbers:
         group = facets([row for row in rows if row.combination.steps == number])
         lines = [line for facet in group for line in facet.lines]
@@ -133,9 +126,9 @@ def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[t
             continue
         name = steps_name(number)
         yield f"histogram_{name}", _grid(group, (_histogram(lines),), across=True)
-        if any(len(result_of(line).minimum) > 1 for line in lines):
+        if any(len(line.result.minimum) > 1 for line in lines):
             yield f"by_step_{name}", _grid(group, (_by_step,), across=True)
-        if any(result_of(line).history for line in lines):
+        if any(line.result.history for line in lines):
             yield f"convergence_{name}", _grid(group, (_convergence,), across=True)
         if span is not None:
             yield f"spanwise_{name}", _grid(group, (_span(span, "minimum"), _span(span, "mean")))
@@ -163,36 +156,19 @@ def save_figure(
 _Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 
-def _outcomes(lines: Sequence[FacetLine]) -> list[Outcome]:
-    outcomes = []
-    for line in lines:
-        result = result_of(line)
-        outcomes.append(
-            Outcome(
-                line.label,
-                result.steps,
-                result.quality.min,
-                result.quality.mean,
-                result.quality.inverted,
-                result.processor_seconds,
-                result.control_nodes,
-                result.max_error,
-                line.series,
-            )
-        )
-    return outcomes
+def _against(what: What) -> _Draw:
+    def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
+        outcomes = []
+        for line in lines:
+            result, found = line.result, line.result.quality
+            numbers = found.min, found.mean, found.inverted, result.processor_seconds
+            outcomes.append(Outcome(line.label, result.steps, *numbers, line.series))
+        against_steps(axes, outcomes, what, _QUIET)
+
+    return draw
 
 
-def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    against_steps(axes, _outcomes(lines), "minimum", _QUIET)
-
-
-def _mean(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    against_steps(axes, _outcomes(lines), "mean", _QUIET)
-
-
-def _seconds(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    against_steps(axes, _outcomes(lines), "seconds", _QUIET)
+_SECONDS = _against("seconds")
 
 
 def _histogram(every: Sequence[FacetLine]) -> _Draw:
@@ -211,19 +187,19 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
 
 def _inverted(line: FacetLine) -> np.ndarray:
-    measured = result_of(line).quality
+    measured = line.result.quality
     return np.asarray(measured.status[measured.counted] == INVERTED)
 
 
 def _values(line: FacetLine) -> np.ndarray:
-    measured = result_of(line).quality
+    measured = line.result.quality
     return measured.values[measured.counted]
 
 
 def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
     runs = []
     for line in lines:
-        result = result_of(line)
+        result = line.result
         numbers = np.arange(1, result.steps + 1)
         runs.append(StepRun(line.label, numbers, result.minimum, result.mean, line.series))
     quality_by_step(axes, runs, _QUIET)
@@ -232,16 +208,16 @@ def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
 def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
     runs = []
     for line in lines:
-        if not result_of(line).history:
+        if not line.result.history:
             continue
-        cycles = [cycle for step, cycle in result_of(line).history if step == 1]
+        cycles = [cycle for step, cycle in line.result.history if step == 1]
         runs.append(
             GreedyRun(
                 line.label,
                 np.array([cycle.control_nodes for cycle in cycles]),
                 np.array([cycle.error for cycle in cycles]),
                 np.array([cycle.level for cycle in cycles]),
-                result_of(line).tolerance,
+                line.result.tolerance,
                 line.series,
             )
         )
@@ -276,8 +252,8 @@ def _grid(group: Sequence[Facet], draws: Sequence[_Draw], across: bool = False) 
                 here.set_xlabel("")
     for together in [axes[0]] if across else axes.T:
         _same_height(together)
-    if _seconds in draws:
-        _readable_seconds(list(axes[:, list(draws).index(_seconds)]))
+    if _SECONDS in draws:
+        _readable_seconds(list(axes[:, list(draws).index(_SECONDS)]))
     for inner in axes[0, 1:] if across else ():
         inner.tick_params(labelleft=False)
     _one_legend(figure)

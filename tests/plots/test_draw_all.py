@@ -149,7 +149,6 @@ def test_labels_of_steps_keep_apart(axes, steps):
     [
         ("mean", "mean quality [-]", "linear"),
         ("seconds", "processor time [s]", "log"),
-        ("control_nodes", "control nodes [-]", "linear"),
     ],
 )
 def test_every_value_has_its_label_and_a_fitting_scale(axes, what, label, scale):

@@ -121,20 +121,9 @@ class StepState:
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
     """(..., n, d): Cartesian positions; empty before the first step."""
 
-    @property
-    def max_error(self) -> FloatArray:
-        """As of a ``Solution``, (...,)."""
-        return np.asarray(self.solution.max_error if self.solution else 0.0)
-
-    @property
-    def lost(self) -> FloatArray:
-        """As of a ``Solution``, (...,)."""
-        return np.asarray(self.solution.lost if self.solution else 0.0)
-
-    @property
-    def error_estimate(self) -> FloatArray:
-        """As of a ``Solution``, (...,)."""
-        return np.asarray(self.solution.error_estimate if self.solution else 0.0)
+    def number(self, name: str) -> FloatArray:
+        """Return a number of the solution by its name, (...,); 0 before the first step."""
+        return np.asarray(getattr(self.solution, name) if self.solution else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
