@@ -19,6 +19,7 @@ from slideviz.design.frozen.solve import (
     solved,
 )
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf import tape
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import matrix
@@ -35,19 +36,7 @@ from slideviz.rbf.solve import (
     is_singular,
     pseudo_inverse,
 )
-from slideviz.rbf.tape import (
-    Array,
-    Variable,
-    dot,
-    join,
-    multiply,
-    product,
-    reshape,
-    solution,
-    take,
-    transpose,
-    value,
-)
+from slideviz.rbf.tape import Array, Variable, value
 
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns the object kept under a name; calls the function to make it if there is none yet."""
@@ -110,7 +99,7 @@ class FrozenFit:
             part = rows.only(index)
             if level:
                 before = self.interpolant.at(self._problem, part.nodes)
-                met = before if part.normals is None else dot(before, part.normals)
+                met = before if part.normals is None else tape.dot(before, part.normals)
                 part = replace(part, right=part.right - met)
             solved = self._solved(part, index, level, stage)
             self.interpolant = self.interpolant.plus(solved) if level else solved
@@ -128,17 +117,17 @@ class FrozenFit:
         if isinstance(solve, MeasuredSystem | WithPolynomial) and self._problem.reduction is None:
             self.error_estimate = np.maximum(self.error_estimate, solve.error_estimate)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
-            data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
+            data = tape.join(rows.right, np.zeros((extra, m))) if extra else rows.right
             met = partial(self._system_times, rows, extra=extra)
             if isinstance(solve, LeastSquares):
                 weights = solve.solution(met, data, value(weights))
             else:
-                weights = solution(met(value(weights)) - data, value(weights), forward, back)
+                weights = tape.solution(met(value(weights)) - data, value(weights), forward, back)
         tail = None
         if extra:
-            tail = take(weights, count + np.arange(extra))
-            tail = reshape(tail, extra * m // self._dim, self._dim)
-        return gathered(rows, take(weights, np.arange(count)), tail)
+            tail = tape.take(weights, count + np.arange(extra))
+            tail = tape.reshape(tail, extra * m // self._dim, self._dim)
+        return gathered(rows, tape.take(weights, np.arange(count)), tail)
 
     def _system_times(self, rows: ConstraintRows, found: FloatArray, *, extra: int) -> Array:
         """Return the system times ``found`` (n, m), a constant, for the derivative of the system.
@@ -150,19 +139,19 @@ class FrozenFit:
             return np.zeros_like(found)
         weights: Array = found[:count]
         if rows.normals is not None:
-            weights = multiply(rows.normals, weights)
+            weights = tape.multiply(rows.normals, weights)
         place = columns(self._features, rows.nodes)
         s = radial_sum(self._basis, place, place, weights)
         below: list[Array] = []
         if extra:
             t = terms(self._basis, place)
             tail = found[count:].reshape(-1, self._dim)
-            s = s + product(t, tail)
-            free = product(transpose(t), weights)
-            below = [reshape(free, extra, m)]
+            s = s + tape.product(t, tail)
+            free = tape.product(tape.transpose(t), weights)
+            below = [tape.reshape(free, extra, m)]
         if rows.normals is not None:
-            s = dot(s, rows.normals)
-        return join(s, *below)
+            s = tape.dot(s, rows.normals)
+        return tape.join(s, *below)
 
     def _solver(
         self, rows: ConstraintRows, index: IntArray, level: int, stage: str

@@ -20,6 +20,7 @@ from scipy.sparse import csr_array
 
 from slideviz.design.frozen.fit import FrozenFit
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.rbf import tape
 from slideviz.rbf.field import share
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.loops import add_correction, keep_undeformed, shift
@@ -28,19 +29,7 @@ from slideviz.rbf.operations import coords as coords_of
 from slideviz.rbf.operations import points
 from slideviz.rbf.problem import Levels, PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import projection_matrices
-from slideviz.rbf.tape import (
-    Array,
-    Variable,
-    function,
-    length,
-    mixed,
-    multiply,
-    put,
-    recorded,
-    take,
-    transform,
-    value,
-)
+from slideviz.rbf.tape import Array, Variable, value
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import one_step
 
@@ -97,11 +86,11 @@ def frozen_correction(
 
 def shares(frame: Frame, coords: Array, correction: FrozenCorrection) -> Array:
     """Return the share (h,) of the error that each target takes over, by its distance."""
-    here = points(frame, take(coords, correction.targets))
-    other = take(coords, correction.nearest) + correction.turn[:, None] * frame.shift()
-    gap = length(here - points(frame, other))
+    here = points(frame, tape.take(coords, correction.targets))
+    other = tape.take(coords, correction.nearest) + correction.turn[:, None] * frame.shift()
+    gap = tape.length(here - points(frame, other))
     q = np.minimum(value(gap) / correction.radius, 1.0)
-    return function(gap, share(q), -20.0 * q * (1.0 - q) ** 3 / correction.radius)
+    return tape.function(gap, share(q), -20.0 * q * (1.0 - q) ** 3 / correction.radius)
 
 
 CHECKED = 1e11
@@ -199,7 +188,7 @@ class FrozenStep:
         ``out`` (..., n, d): where the coordinates are written, if nothing is a variable.
         """
         setup = self.setup
-        goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
+        goal = _shifted(setup.coords[setup.known], tape.multiply(target, np.array([[self.part]])))
         run = _Run(self, before.coords, out)
         solution = one_step(setup, before.coords, goal, _SILENT, before.solution, run)
         displacement = solution.displacement
@@ -210,10 +199,10 @@ class FrozenStep:
         if len(on):
             held = np.ones(setup.coords.shape[1])
             held[:2] = 0.0
-            still = multiply(take(displacement, on), held[None])
-            displacement = put(displacement, on, still, overwrite=True)
+            still = tape.multiply(tape.take(displacement, on), held[None])
+            displacement = tape.put(displacement, on, still, overwrite=True)
         moved = _shifted(before.coords, displacement, overwrite=True)
-        moved = put(moved, setup.known, goal, overwrite=True)
+        moved = tape.put(moved, setup.known, goal, overwrite=True)
         return StepState(moved, replace(solution, displacement=np.empty((0, 0))))
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
@@ -226,10 +215,12 @@ class FrozenStep:
         rows = setup.copies
         donors, copies = halo.donors[rows], halo.receivers[rows]
         donor, start = self.mesh.points[donors], self.mesh.points[copies]
-        follow = transform(halo.rotations[rows], take(at, donors) - donor)
+        follow = tape.transform(halo.rotations[rows], tape.take(at, donors) - donor)
         overwrite = at is not moved
-        at = put(at, copies, _shifted(start, follow), overwrite=overwrite)
-        return put(moved, copies, coords_of(frame, take(at, copies)), overwrite=overwrite), at
+        at = tape.put(at, copies, _shifted(start, follow), overwrite=overwrite)
+        return tape.put(
+            moved, copies, coords_of(frame, tape.take(at, copies)), overwrite=overwrite
+        ), at
 
 
 class _Run:
@@ -287,9 +278,9 @@ class _Run:
         if displacement is self.out and not isinstance(part, Variable):
             add_correction(self.out, correction.targets, means, part[:, 0], value(errors))
             return displacement
-        more = multiply(mixed(means, errors), part)
-        more = take(displacement, correction.targets) + more
-        return put(displacement, correction.targets, more, overwrite=True)
+        more = tape.multiply(tape.mixed(means, errors), part)
+        more = tape.take(displacement, correction.targets) + more
+        return tape.put(displacement, correction.targets, more, overwrite=True)
 
     def project(self, nodes: IntArray, free: Array) -> Array:
         """Return the displacements (..., m, d) of sliding nodes projected on their boundary.
@@ -297,20 +288,20 @@ class _Run:
         On the plane of the facet, the line of the edge or the vertex that is closest at the
         reference.
         """
-        setup, base = self._setup, take(self._coords, nodes)
+        setup, base = self._setup, tape.take(self._coords, nodes)
         name = f"project {next(self._projections)}"
         anchor, matrix = self._kept(name, partial(self._tracked, nodes, value(base), value(free)))
-        away = transform(matrix - np.eye(matrix.shape[-1]), base - anchor)
+        away = tape.transform(matrix - np.eye(matrix.shape[-1]), base - anchor)
         slid = _plus_unless_rounding(
-            transform(matrix, free), away, ROUNDING * largest_coordinate(setup.coords)
+            tape.transform(matrix, free), away, ROUNDING * largest_coordinate(setup.coords)
         )
         copy, origin, turn = self._kept(f"ties of {name}", lambda: self._ties(nodes))
         if len(copy):
-            slid = put(slid, copy, transform(turn, take(slid, origin)))
+            slid = tape.put(slid, copy, tape.transform(turn, tape.take(slid, origin)))
         held = np.ones((len(nodes), matrix.shape[-1]))
         held[setup.axis[nodes], :2] = 0.0
         held[np.isin(nodes, setup.held)] = 0.0
-        return slid if held.all() else multiply(slid, held)
+        return slid if held.all() else tape.multiply(slid, held)
 
     def _tracked(
         self, nodes: IntArray, base: FloatArray, free: FloatArray
@@ -360,7 +351,7 @@ def _shifted(start: Array, by: Array, *, overwrite: bool = False) -> Array:
     """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
     x, u = value(start), value(by)
     out = shift(x, u if overwrite else u.copy())
-    return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
+    return tape.recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
 def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> Array:

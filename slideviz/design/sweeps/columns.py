@@ -16,21 +16,11 @@ from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import Any
 
+from slideviz.case import model
 from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import (
-    BoxMotion,
-    Case,
-    Cst,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
-    Motion,
-    Prescribed,
-    SpanMotion,
-    named,
-)
+from slideviz.case.model import Case, Motion, named
 from slideviz.case.motion_text import VERB_OF, VERBS
 from slideviz.case.words import number
 from slideviz.errors import CaseError, nearest, shown
@@ -240,20 +230,20 @@ def _normalized_name(name: str) -> str:
 
 
 def _head(motion: Motion) -> str:
-    verb = motion.kind if isinstance(motion, SpanMotion) else VERB_OF.get(type(motion), "")
+    verb = motion.kind if isinstance(motion, model.SpanMotion) else VERB_OF.get(type(motion), "")
     head = f"{'+'.join(named(motion.marker)) or '*'}.{verb}"
-    if isinstance(motion, BoxMotion):
-        at = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
+    if isinstance(motion, model.BoxMotion):
+        at = (motion.plane,) if isinstance(motion, model.FfdTwist) else motion.index
         return ".".join([head, motion.box, *map(str, at)])
-    if isinstance(motion, HicksHenne | Cst):
+    if isinstance(motion, model.HicksHenne | model.Cst):
         head = f"{head}.{motion.side}"
-    return f"{head}.{motion.term[0]}" if isinstance(motion, Cst) else head
+    return f"{head}.{motion.term[0]}" if isinstance(motion, model.Cst) else head
 
 
 def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
-    if isinstance(motion, FromFile | Prescribed):
+    if isinstance(motion, model.FromFile | model.Prescribed):
         return
-    if isinstance(motion, SpanMotion):
+    if isinstance(motion, model.SpanMotion):
         for k, span in enumerate(motion.spans):
             name = "value" if len(motion.spans) == 1 else f"{span:.15g}"
             yield name, NumberPlace(at, "values", k)
