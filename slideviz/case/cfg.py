@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from slideviz.case.lines import (
     require_no_su2_configuration,
     require_some_key,
 )
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, with_paths
 from slideviz.errors import CaseError, nearest, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
@@ -39,7 +38,7 @@ def read_case(path: Path) -> Case:
     case, problems, remarks = _parsed(path, text)
     if problems:
         raise CaseError(listed(path, problems))
-    case = _with_paths(case, lambda file: _from_folder(file, path.parent))
+    case = with_paths(case, lambda file: _from_folder(file, path.parent))
     if case.mesh_file is not None and case.mesh_file == case.mesh_out:
         remarks += (
             f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
@@ -55,7 +54,7 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     CaseError if the file cannot be written, or a value of the case has no form in a case file.
     """
     folder = Path(os.path.realpath(path.parent))
-    named = _with_paths(case, lambda file: _to_folder(file, folder))
+    named = with_paths(case, lambda file: _to_folder(file, folder))
     text = "".join(f"% {remark}\n" for remark in remarks) + _text(named, path)
     # Whatever is saved can be opened again: better no file than one with mistakes.
     again, problems, _ = _parsed(path, text)
@@ -182,17 +181,6 @@ def _text(case: Case, path: Path) -> str:
 
 def _unknown(key: str) -> str:
     return f"unknown key {shown(key)}{nearest(key, KEYS) or '; `slideviz keys` lists all'}"
-
-
-def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
-    return case.change(
-        mesh_file=change(case.mesh_file) if case.mesh_file else None,
-        mesh_out=change(case.mesh_out) if case.mesh_out else None,
-        motions=tuple(
-            replace(motion, path=change(motion.path)) if isinstance(motion, FromFile) else motion
-            for motion in case.motions
-        ),
-    )
 
 
 def _from_folder(file: Path, folder: Path) -> Path:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -284,6 +284,18 @@ def named(target: Target) -> tuple[str, ...]:
 def applies_to(motion: Motion, marker: str) -> bool:
     """Return whether a motion moves the moving marker ``marker``."""
     return not motion.marker or marker in named(motion.marker)
+
+
+def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
+    """Return the case with changed paths of its meshes and of the files of its motions."""
+    return case.change(
+        mesh_file=change(case.mesh_file) if case.mesh_file else None,
+        mesh_out=change(case.mesh_out) if case.mesh_out else None,
+        motions=tuple(
+            replace(motion, path=change(motion.path)) if isinstance(motion, FromFile) else motion
+            for motion in case.motions
+        ),
+    )
 
 
 NEW: dict[str, Any] = {"relax": "auto", "layers": "auto", "repair": "auto"}

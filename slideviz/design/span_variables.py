@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -61,18 +60,15 @@ class SpanVariables:
             The case has no motion over the span, or rotates, scales or pushes the same boundary
             after one; or the case does not fit the mesh.
         """
-        places = [k for k, motion in enumerate(case.motions) if isinstance(motion, SpanMotion)]
-        if not places:
+        span = [k for k, motion in enumerate(case.motions) if isinstance(motion, SpanMotion)]
+        if not span:
             raise CaseError("the case has no motion over the span; add one, as SpanMotion(...)")
-        _require_last(case, places[0])
+        _require_last(case, span[0])
         moved = displacements(case, mesh)
         self.mesh, self.case, self.nodes = mesh, case, moved.nodes
-        numbers = {(at.motion, at.component): name for name, at in numbers_of(case).items()}
-        self._at = [
-            (place, k) for place in places for k in range(len(_span_motion(case, place).values))
-        ]
-        self.names = tuple(numbers[at] for at in self._at)
-        self.values = np.array([_span_motion(case, place).values[k] for place, k in self._at])
+        self._at = {name: at for name, at in numbers_of(case).items() if at.motion in span}
+        self.names = tuple(self._at)
+        self.values = np.array([at.of(case) for at in self._at.values()])
 
     @check_types
     def case_of(self, values: FloatArray) -> Case:
@@ -84,9 +80,8 @@ class SpanVariables:
                 f"of {', '.join(self.names)}"
             )
         motions = list(self.case.motions)
-        for place in dict.fromkeys(place for place, _ in self._at):
-            mine = [v for v, (at, _) in zip(given.tolist(), self._at, strict=True) if at == place]
-            motions[place] = replace(_span_motion(self.case, place), values=tuple(mine))
+        for at, value in zip(self._at.values(), given.tolist(), strict=True):
+            at.put(motions, value)
         return self.case.change(motions=tuple(motions))
 
     @check_types
@@ -126,7 +121,7 @@ class SpanVariables:
             by_totals = blade.sections.moved(totals[-1])[1]
             rows = np.searchsorted(self.nodes, blade.nodes)
             for place, (row, slope) in zip(blade.places, slopes, strict=True):
-                columns = [k for k, (at, _) in enumerate(self._at) if at == place]
+                columns = [k for k, at in enumerate(self._at.values()) if at.motion == place]
                 yield rows, columns, by_totals[:, :, row], slope
 
 
@@ -138,9 +133,3 @@ def _require_last(case: Case, first: int) -> None:
                 f"motion {place} turns or scales what motion {first + 1} has moved over the span, "
                 "so derivatives would have to go through it; put it before"
             )
-
-
-def _span_motion(case: Case, place: int) -> SpanMotion:
-    motion = case.motions[place]
-    assert isinstance(motion, SpanMotion)
-    return motion

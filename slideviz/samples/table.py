@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, with_paths
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
@@ -216,9 +216,5 @@ def write_sample(
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
     """Return the case of the sample ``name``, with files in a folder, meshes of ``ending``."""
-    motions = tuple(
-        replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
-        for motion in case.motions
-    )
     mesh, out = folder / f"mesh.{ending}", folder / f"{name}_deformed.{ending}"
-    return case.change(mesh_file=mesh, mesh_out=out, motions=motions)
+    return with_paths(case, folder.joinpath).change(mesh_file=mesh, mesh_out=out)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.case.model import Case, Motion, named, with_paths
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
@@ -333,17 +333,12 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
     """Return the session after mesh or displacement files were moved: new paths by old ones."""
 
     def there(case: Case) -> Case:
-        motions = tuple(
-            replace(m, path=moved.get(m.path, m.path)) if isinstance(m, FromFile) else m
-            for m in case.motions
-        )
         file, out = case.mesh_file, case.mesh_out
-        if file is None or file not in moved:
-            return case.change(motions=motions)
-        new = moved[file]
-        if out is not None and out.parent == file.parent:
-            out = new.with_name(f"{new.stem}_deformed{out.suffix}")
-        return case.change(motions=motions, mesh_file=new, mesh_out=out)
+        case = with_paths(case, lambda path: moved.get(path, path))
+        if file and out and file in moved and out.parent == file.parent:
+            new = moved[file]
+            case = case.change(mesh_out=new.with_name(f"{new.stem}_deformed{out.suffix}"))
+        return case
 
     return replace(
         session,

@@ -39,7 +39,7 @@ from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
-from slideviz.session.saving import Camera, camera_from_case
+from slideviz.session.saving import Camera
 from slideviz.session.state import Session, StepFrame
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
 from slideviz.system.cleanup import private_folder
@@ -293,7 +293,7 @@ def prepare(
     coarse = coarse_surfaces(surfaces, mesh.points)
     if case is None:
         return Opened(session, surfaces, ghosts, coarse=coarse)
-    return Opened(session, surfaces, ghosts, bool(case.view), camera_from_case(case), coarse)
+    return Opened(session, surfaces, ghosts, bool(case.view), case.view.get("VIEW_CAMERA"), coarse)
 
 
 def _precompute(frame: StepFrame) -> None:

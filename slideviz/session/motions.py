@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -189,24 +190,22 @@ def new_motion(
     """
     if kind in (model.HicksHenne, model.Cst, model.Bump):
         return kind(marker, 0.0, chord=chord)
+    if kind in (model.FromFile, model.Onto):
+        return kind(Path(), marker)
     axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    if kind is model.Translate:
-        return model.Translate(marker, (0.0,) * dim)
-    if kind is model.Rotate:
-        return model.Rotate(marker, 0.0, "centroid" if machine is None else origin[:dim], axis)
-    if kind is model.Radial:
-        return model.Radial(marker, 1.0, 0.0, axis, origin[:dim])
-    if kind is model.Scale:
-        return model.Scale(marker, (1.0,) * dim)
-    if kind is model.Ffd:
-        return model.Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
-    if kind in (model.FfdCamber, model.FfdThickness):
-        return kind(marker, (*boxes, "")[0], (0, 0 if dim == 3 else -1), 0.0)
-    if kind is model.SpanMotion:
-        return model.SpanMotion(marker, "twist", (0.0, 1.0), (0.0, 0.0))
-    if kind is model.FfdTwist:
-        return model.FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
-    return model.Onto(Path(), marker) if kind is model.Onto else model.FromFile(Path(), marker)
+    box, last = (*boxes, "")[0], 0 if dim == 3 else -1
+    values: dict[type, tuple[Any, ...]] = {
+        model.Translate: ((0.0,) * dim,),
+        model.Rotate: (0.0, "centroid" if machine is None else origin[:dim], axis),
+        model.Radial: (1.0, 0.0, axis, origin[:dim]),
+        model.Scale: ((1.0,) * dim,),
+        model.Ffd: (box, (0, 0, last), (0.0, 0.0, 0.0)),
+        model.FfdCamber: (box, (0, last), 0.0),
+        model.FfdThickness: (box, (0, last), 0.0),
+        model.FfdTwist: (box, 0, 0.0),
+        model.SpanMotion: ("twist", (0.0, 1.0), (0.0, 0.0)),
+    }
+    return kind(marker, *values[kind])
 
 
 def targets(session: Session) -> tuple[Target, ...]:

@@ -129,13 +129,27 @@ Camera = tuple[float, ...]
 perhaps also width over height of the view."""
 
 
+_FIELDS = {
+    "VIEW_COLOR": "color_by",
+    "VIEW_RANGE": "color_range",
+    "VIEW_MAP": "color_map",
+    "VIEW_THRESHOLD": "threshold",
+    "VIEW_POINTS": "points",
+    "VIEW_COPIES": "passages",
+}
+"""Keys that have the value of a field of the view as it is."""
+
+
 def view_to_case(session: Session, camera: Camera | None = None) -> Case:
     """Return the case of a session with its view and camera as keys; defaults are left out."""
     view, first = session.view, ViewState()
-    before = _plain(first)
-    changed = {key: value for key, value in _plain(view).items() if before[key] != value}
-    ranges = {"VIEW_RANGE": view.color_range, "VIEW_THRESHOLD": view.threshold}
-    changed |= {key: value for key, value in ranges.items() if value is not None}
+    changed = {
+        key: getattr(view, field)
+        for key, field in _FIELDS.items()
+        if getattr(view, field) != getattr(first, field)
+    }
+    if view.drawn != first.drawn:
+        changed["VIEW_SHOW"] = tuple(hyphened(name) for name in SHOWN if name in view.drawn)
     if view.hidden:
         names = session.mesh.marker_names if session.mesh is not None else ()
         changed["VIEW_HIDDEN"] = tuple(name for name in names if name in view.hidden)
@@ -151,17 +165,8 @@ def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewS
 
     ``names``: the boundaries of the mesh; other names of hidden boundaries are ignored.
     """
-    kept, values = case.view, dict[str, Any]()
-    for key, field in (
-        ("VIEW_COLOR", "color_by"),
-        ("VIEW_RANGE", "color_range"),
-        ("VIEW_MAP", "color_map"),
-        ("VIEW_THRESHOLD", "threshold"),
-        ("VIEW_POINTS", "points"),
-        ("VIEW_COPIES", "passages"),
-    ):
-        if key in kept:
-            values[field] = kept[key]
+    kept = case.view
+    values: dict[str, Any] = {field: kept[key] for key, field in _FIELDS.items() if key in kept}
     if "VIEW_SHOW" in kept:
         values["drawn"] = frozenset(name for name in SHOWN if hyphened(name) in kept["VIEW_SHOW"])
     if "VIEW_HIDDEN" in kept:
@@ -174,23 +179,6 @@ def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewS
 def as_recovered(session: Session, source: Path | None) -> Session:
     """Return a session just opened from its recovery file as unsaved, of case file ``source``."""
     return replace(session, case=session.case.change(source=source), saved=Case())
-
-
-def camera_from_case(case: Case) -> Camera | None:
-    """Return the camera that a case has, or None."""
-    camera: Camera | None = case.view.get("VIEW_CAMERA")
-    return camera
-
-
-def _plain(view: ViewState) -> dict[str, Any]:
-    """Return the values of a view that are never None, by key of the case file."""
-    return {
-        "VIEW_COLOR": view.color_by,
-        "VIEW_MAP": view.color_map,
-        "VIEW_POINTS": view.points,
-        "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if name in view.drawn),
-        "VIEW_COPIES": view.passages,
-    }
 
 
 def _text(section: Section) -> SectionText:

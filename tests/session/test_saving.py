@@ -13,7 +13,7 @@ from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.saving import camera_from_case, view_from_case, view_to_case
+from slideviz.session.saving import view_from_case, view_to_case
 from slideviz.session.state import ViewState
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
@@ -57,12 +57,12 @@ def test_a_view_comes_back_from_the_file(session, tmp_path_factory, view):
     kept.change(source=file).write(file)
     again = Case.read(file)
     assert view_from_case(again, ViewState(), session.mesh.marker_names) == view
-    assert camera_from_case(again) == camera
+    assert again.view["VIEW_CAMERA"] == camera
 
 
 def test_a_fresh_view_needs_no_key(session):
     assert view_to_case(session).view == {}
-    assert camera_from_case(view_to_case(session)) is None
+    assert "VIEW_CAMERA" not in view_to_case(session).view
 
 
 def test_a_view_is_no_setting_of_the_run(session):

@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.argument_types import check_types
-from slideviz.case.model import BoxMotion, Case, FromFile
+from slideviz.case.model import BoxMotion, Case, with_paths
 from slideviz.design.sweeps.processes import (
     Packed,
     Processes,
@@ -206,10 +206,6 @@ class _Tasks:
     def of(self, design: Design, with_mesh: bool) -> Task:
         """Return the task of a design; ``with_mesh``: with the mesh, for a worker that lacks it."""
         case = design.case
-        motions = tuple(
-            replace(motion, path=motion.path.absolute()) if isinstance(motion, FromFile) else motion
-            for motion in case.motions
-        )
         output = None
         if self._folder is not None:
             if case.mesh_out_format:
@@ -225,7 +221,7 @@ class _Tasks:
             output = self._folder / f"{name}{ending}"
         return Task(
             design.number,
-            case.change(motions=motions, view={}, warnings=()),
+            with_paths(case, Path.absolute).change(view={}, warnings=()),
             self.packed.name,
             packed=self.packed if with_mesh else None,
             output=output,
