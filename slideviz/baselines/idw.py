@@ -35,10 +35,8 @@ from slideviz.system.jit_cache import njit
 class Weights:
     """Settings of inverse distance weighting."""
 
-    power: float
-    """The power c of the distance."""
-    fixed_weight: float = 1.0
-    """The weight g_j of nodes with displacement zero."""
+    power: float  # the power c of the distance
+    fixed_weight: float = 1.0  # the weight g_j of nodes with displacement zero
 
     def of(self, values: FloatArray) -> FloatArray:
         """Return g_j, (n,), of nodes with the displacements ``values`` (n, d)."""
@@ -211,13 +209,11 @@ class WeightedField:
     """Displacement field: means of the displacements of sources, by their inverse distance."""
 
     basis: Basis
-    sources: FloatArray
-    """(k, n): features of the boundary nodes."""
+    sources: FloatArray  # (k, n): features of the boundary nodes
     values: FloatArray
     weights: FloatArray
     """`values`, `weights` (n, d), (n,): their displacements v_j in the frame, and g_j."""
-    power: float
-    """c."""
+    power: float  # c
 
     def at(self, features: FloatArray, _: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
         """Return the displacement (m, d) at features (k, m)."""

@@ -42,10 +42,8 @@ _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNO
 class DesignTable:
     """A table of designs and their results."""
 
-    columns: tuple[str, ...] = ()
-    """Their names, as `slideviz.sweep` takes them."""
-    rows: tuple[tuple[str, ...], ...] = ()
-    """The values of each design, a text for each column."""
+    columns: tuple[str, ...] = ()  # their names, as `slideviz.sweep` takes them
+    rows: tuple[tuple[str, ...], ...] = ()  # the values of each design, a text for each column
     results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
     """By the number of the design, from 1."""
 

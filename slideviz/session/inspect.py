@@ -125,39 +125,29 @@ WORST = 100  # length of the list of the worst cells
 class CellInfo:
     """The facts about one cell."""
 
-    cell: int
-    """Its number in the mesh, from 0, as in an SU2 file."""
-    kind: str
-    """The name of its element type."""
+    cell: int  # its number in the mesh, from 0, as in an SU2 file
+    kind: str  # the name of its element type
     state: CellState
     size_skew: float
     size: float
-    skew: float
-    """`size_skew`, `size`, `skew`: its qualities, 0 to 1."""
+    skew: float  # `size_skew`, `size`, `skew`: its qualities, 0 to 1
     jacobians: FloatArray
     """(k,): its corner Jacobians, an area or volume; negative at folded corners."""
-    position: FloatArray
-    """(d,): the mean of its nodes, in the mesh's length unit."""
+    position: FloatArray  # (d,): the mean of its nodes, in the mesh's length unit
 
 
 @dataclass(frozen=True, eq=False)
 class WorstCells:
     """The worst cells of a frame, worst first."""
 
-    cells: IntArray
-    """(k,): their numbers in the mesh."""
-    values: FloatArray
-    """(k,): their measure; 0 for an inverted cell."""
-    inverted: np.ndarray
-    """(k,): whether each is inverted."""
-    positions: FloatArray
-    """(k, d): the means of their nodes, in the mesh's length unit."""
+    cells: IntArray  # (k,): their numbers in the mesh
+    values: FloatArray  # (k,): their measure; 0 for an inverted cell
+    inverted: np.ndarray  # (k,): whether each is inverted
+    positions: FloatArray  # (k, d): the means of their nodes, in the mesh's length unit
     steps: IntArray
     """(k,): the first frame at which each was worst; 0 is the undeformed mesh, -1 unknown."""
-    kinds: tuple[str, ...]
-    """The names of their element types."""
-    measure: ColorBy
-    """The quality in ``values``."""
+    kinds: tuple[str, ...]  # the names of their element types
+    measure: ColorBy  # the quality in ``values``
     numbers: IntArray | None = None
     """(k,): the numbers of the cells in the file, where only a part of the mesh is in memory."""
 

@@ -45,12 +45,9 @@ MOST_BYTES = 5_000_000  # most bytes of a file that can be edited by hand
 class TableRows:
     """The nodes that a table of displacements may list."""
 
-    of: str
-    """Their boundaries, in words."""
-    nodes: IntArray
-    """(k,): the nodes, sorted."""
-    shape: tuple[int, ...]
-    """(n, d): shape of the points of the mesh."""
+    of: str  # their boundaries, in words
+    nodes: IntArray  # (k,): the nodes, sorted
+    shape: tuple[int, ...]  # (n, d): shape of the points of the mesh
 
     @classmethod
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:

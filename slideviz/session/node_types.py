@@ -21,10 +21,8 @@ from slideviz.terms import NODE_TYPES, NodeType
 class TypedNodes:
     """Nodes to be drawn as points, each with its type."""
 
-    nodes: IntArray
-    """(k,): the nodes, ascending."""
-    kinds: IntArray
-    """(k,): the types of the nodes, as places in ``NODE_TYPES``."""
+    nodes: IntArray  # (k,): the nodes, ascending
+    kinds: IntArray  # (k,): the types of the nodes, as places in ``NODE_TYPES``
 
     @property
     def present(self) -> tuple[NodeType, ...]:

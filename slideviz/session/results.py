@@ -37,15 +37,13 @@ class StepFrame:
     mesh: Mesh
     """The mesh, or the skin of one that is larger than memory (see `slideviz.streaming.skin`)."""
     quality: Quality
-    step: Step | None = None
-    """The step; None for the undeformed mesh."""
+    step: Step | None = None  # the step; None for the undeformed mesh
     extra: StepFrame | None = None
     """The worst cells of a mesh of which only the skin is in memory, worst first. As numbers of
     cells of this frame, they follow those of the skin (see `place_of`)."""
     base: Mesh | None = None
     """The undeformed mesh of this frame, where it is not that of the session."""
-    file: Path | None = None
-    """The file of the whole mesh, if only the skin is in memory."""
+    file: Path | None = None  # the file of the whole mesh, if only the skin is in memory
     limits: tuple[LimitResult, ...] = ()
     """Of the last step of a run: the limits of its case, as far as they could be checked."""
     walls: Walls | None = None
@@ -151,30 +149,22 @@ class CheckedLimits:
     results: tuple[LimitResult, ...]
     """Of those of ``limits`` that could be checked, in their order. Their cells are numbers of
     cells of the frame."""
-    problem: str = ""
-    """Why others could not."""
+    problem: str = ""  # why others could not
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
     """A deformation that was computed: its case and its steps."""
 
-    number: int
-    """From 1, in the order of the starts; never used twice in a session."""
-    case: Case
-    """The settings."""
-    frames: tuple[StepFrame, ...] = ()
-    """The steps, without the undeformed mesh."""
-    end: Literal["", "done", "cancelled", "failed"] = ""
-    """How it ended; empty while it goes on."""
-    saved: bool = False
-    """Whether the mesh of its last step was written to a file."""
-    name: str = ""
-    """The user's name for it, or ""."""
+    number: int  # from 1, in the order of the starts; never used twice in a session
+    case: Case  # the settings
+    frames: tuple[StepFrame, ...] = ()  # the steps, without the undeformed mesh
+    end: Literal["", "done", "cancelled", "failed"] = ""  # how it ended; empty while it goes on
+    saved: bool = False  # whether the mesh of its last step was written to a file
+    name: str = ""  # the user's name for it, or ""
     undeformed: StepFrame | None = None
     """The undeformed mesh with its quality, where this run has another metric than the session."""
-    panels: Case | None = None
-    """For the run of a design: the session's case when it was asked for."""
+    panels: Case | None = None  # for the run of a design: the session's case when it was asked for
 
     @property
     def label(self) -> str:

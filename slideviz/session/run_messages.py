@@ -159,14 +159,10 @@ def _remarks(run: Run, notes: bool) -> tuple[str, ...]:
 class Requirement:
     """A requirement of a run that is not met."""
 
-    text: str
-    """A sentence for the user."""
-    place: PanelPlace
-    """The panel in which it can be met."""
-    marker: str = ""
-    """The boundary that lacks a motion; empty for other requirements."""
-    motion: int = 0
-    """The place of the motion that the requirement is about, from 0."""
+    text: str  # a sentence for the user
+    place: PanelPlace  # the panel in which it can be met
+    marker: str = ""  # the boundary that lacks a motion; empty for other requirements
+    motion: int = 0  # the place of the motion that the requirement is about, from 0
 
 
 def run_requirements(session: Session) -> tuple[Requirement, ...]:

@@ -40,12 +40,9 @@ KEPT_SLABS = 8  # most slabs of a frame that are cached
 class Groups:
     """Bounding balls of groups of `GROUP` cells, in the order of the file."""
 
-    centres: FloatArray
-    """(g, 3)."""
-    radii: FloatArray
-    """(g,)."""
-    scale: float
-    """The diagonal of the mesh's bounding box."""
+    centres: FloatArray  # (g, 3)
+    radii: FloatArray  # (g,)
+    scale: float  # the diagonal of the mesh's bounding box
 
     @classmethod
     def of(cls, source: FileSource, tick: Tick) -> Groups:

@@ -26,44 +26,32 @@ if TYPE_CHECKING:
 class ViewState:
     """The view of a session: colors, threshold, sections, step, things drawn."""
 
-    color_by: ColorBy = "role"
-    """The quantity that cells are colored by."""
+    color_by: ColorBy = "role"  # the quantity that cells are colored by
     color_range: tuple[float, float] | None = None
     """(float, float) or None: values at the ends of the color bar; None: 0 to 1 for quality, and 0
     to a round number above the largest of all runs for the displacement."""
-    color_map: str = "viridis"
-    """One of `slideviz.terms.COLOR_MAPS`."""
+    color_map: str = "viridis"  # one of `slideviz.terms.COLOR_MAPS`
     threshold: tuple[float, float] | None = None
     """(float, float) or None: draw only the cells whose value is in this range; None draws all."""
-    points: PointsShown = "none"
-    """Which nodes are drawn as points."""
+    points: PointsShown = "none"  # which nodes are drawn as points
     drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
     """Which things are drawn of those that the user can switch off."""
-    sections: tuple[Section, ...] = ()
-    """The sections of the mesh."""
-    passages: int = 0
-    """Passages drawn on each side of a periodic mesh; -1 draws all there are."""
-    hidden: frozenset[str] = frozenset()
-    """Boundaries that are not drawn."""
-    selected: tuple[str, ...] = ()
-    """Boundaries that are highlighted."""
-    frame: int = 0
-    """The number of the frame that is shown; 0 is the undeformed mesh."""
+    sections: tuple[Section, ...] = ()  # the sections of the mesh
+    passages: int = 0  # passages drawn on each side of a periodic mesh; -1 draws all there are
+    hidden: frozenset[str] = frozenset()  # boundaries that are not drawn
+    selected: tuple[str, ...] = ()  # boundaries that are highlighted
+    frame: int = 0  # the number of the frame that is shown; 0 is the undeformed mesh
     marked_cell: int | None = None
     """The number of the cell that is marked, as of ``StepFrame.place_of``."""
-    marked_in: int | None = None
-    """The run that was shown when it was marked; None for none."""
+    marked_in: int | None = None  # the run that was shown when it was marked; None for none
     beside: int | None = None
     """The number of a run shown in a second view beside the first; 0 is the undeformed mesh."""
-    swapped: bool = False
-    """Whether the second view is to the left of the first."""
+    swapped: bool = False  # whether the second view is to the left of the first
     ranges: tuple[tuple[ColorBy, tuple[float, float]], ...] = ()
     """tuple of (str, (float, float)): the color ranges of other quantities that the view was
     colored by before."""
-    section_index: int | None = None
-    """The place in ``sections`` of the one that is selected."""
-    handle: bool = False
-    """Whether the selected section has its handle drawn."""
+    section_index: int | None = None  # the place in ``sections`` of the one that is selected
+    handle: bool = False  # whether the selected section has its handle drawn
 
     @property
     def flat_index(self) -> int | None:
@@ -130,26 +118,17 @@ class Guess:
 class Session:
     """The open mesh, its case, its runs, and the view of them."""
 
-    mesh: Mesh | None = None
-    """The undeformed mesh; None before anything is open."""
-    path: Path | None = None
-    """The mesh file."""
-    case: Case = field(default_factory=Case)
-    """The case in the panels, with guessed roles."""
+    mesh: Mesh | None = None  # the undeformed mesh; None before anything is open
+    path: Path | None = None  # the mesh file
+    case: Case = field(default_factory=Case)  # the case in the panels, with guessed roles
     guesses: Mapping[str, Guess] = field(default_factory=dict)
     """Guesses that the user has not confirmed, by boundary."""
-    pairs: tuple[Pair, ...] = ()
-    """Boundaries that match each other."""
-    first: StepFrame | None = None
-    """The undeformed mesh with its quality."""
-    runs: tuple[Run, ...] = ()
-    """The runs, in the order of their starts."""
-    shown: int | None = None
-    """The number of the run whose steps are shown."""
-    saved: Case | None = None
-    """The case as it was saved or opened last, without its view."""
-    saved_sections: tuple[Section, ...] = ()
-    """The sections in the view of that case."""
+    pairs: tuple[Pair, ...] = ()  # boundaries that match each other
+    first: StepFrame | None = None  # the undeformed mesh with its quality
+    runs: tuple[Run, ...] = ()  # the runs, in the order of their starts
+    shown: int | None = None  # the number of the run whose steps are shown
+    saved: Case | None = None  # the case as it was saved or opened last, without its view
+    saved_sections: tuple[Section, ...] = ()  # the sections in the view of that case
     view: ViewState = field(default_factory=ViewState)
     checked: CheckedLimits | None = None
     """The limits as they were checked last (`slideviz.session.limits`)."""
@@ -166,10 +145,8 @@ class Session:
     invalid: tuple[tuple[PanelPlace, str], ...] = ()
     """tuple of (PanelPlace, str): fields whose text is not valid, so that the case still has the
     value before: the panel, and a sentence. No run starts meanwhile."""
-    removed: tuple[Run, ...] = ()
-    """The last runs removed from ``runs``, which undo can bring back."""
-    newest: int = 0
-    """The highest number that a run had so far, removed ones too."""
+    removed: tuple[Run, ...] = ()  # the last runs removed from ``runs``, which undo can bring back
+    newest: int = 0  # the highest number that a run had so far, removed ones too
 
     @property
     def in_file(self) -> bool:

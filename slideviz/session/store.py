@@ -108,8 +108,7 @@ class UndoEntry:
 
     before: UndoState | _OutsideChange
     """The state before the change (in the list for redo: after it)."""
-    words: str
-    """Words for the menu."""
+    words: str  # words for the menu
     kind: tuple[object, ...]
     """The function, what it changed, and names of values: changes with the same are undone as
     one."""

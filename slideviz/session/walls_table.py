@@ -31,14 +31,12 @@ class WallRow(NamedTuple):
     """A boundary in the table, with texts for each column after the first."""
 
     name: str
-    layered: bool
-    """Whether most of its facets have flat cells."""
+    layered: bool  # whether most of its facets have flat cells
     before: tuple[str, ...]
     after: tuple[str, ...]
     change: tuple[str, ...]
     """`before`, `after`, `change`: of the undeformed mesh, the step that is shown, and both."""
-    tip: str
-    """Smallest, mean and largest of each number."""
+    tip: str  # smallest, mean and largest of each number
 
 
 def _entries(session: Session) -> dict[str, dict]:
