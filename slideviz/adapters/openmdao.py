@@ -236,10 +236,7 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
     def get_tagged_indices(self, tags: Sequence[str]) -> IntArray:
         """Return the places (k,) in ``deformer.nodes`` of those on boundaries with these names.
 
-        Raises
-        ------
-        MeshError
-            The mesh has no such boundary.
+        Raises MeshError if the mesh has no such boundary.
         """
         mesh, found = self.deformer.mesh, np.zeros(len(self.deformer.nodes), bool)
         for tag in tags:

@@ -55,19 +55,10 @@ def weighted_means(
 ) -> FloatArray:
     """Return s at the targets, (N, d).
 
-    Parameters
-    ----------
-    basis
-        Its radius is the length that distances are divided by, which changes nothing but
-        rounding; its period chooses the distance.
-    targets, sources : (k, N), (k, n)
-        Features, as ``Frame.features`` gives them.
-    values, weights : (n, d), (n,)
-        v_j and g_j.
-    power
-        c.
-    tick
-        Called between chunks with the fraction done; may raise to stop.
+    ``basis``: its radius is the length that distances are divided by, which changes nothing but
+    rounding; its period chooses the distance. ``targets`` and ``sources``: features (k, N) and
+    (k, n), as ``Frame.features`` gives them. ``values`` and ``weights``: v_j (n, d) and g_j (n,).
+    ``power``: c. ``tick``: called between chunks with the fraction done; may raise to stop.
     """
     # Features 1 and 2 of a rotational period are sine and cosine, not lengths: they are not scaled.
     scale = np.full((4, 1), 1.0 / basis.radius)

@@ -21,14 +21,13 @@ from slideviz.case.lines import (
     listed,
     read_text,
     require_no_mesh,
-    require_no_su2_configuration,
-    require_some_key,
 )
 from slideviz.case.model import Case, with_paths
 from slideviz.errors import CaseError, nearest, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
+_FEW = 3  # most lines that are no key of a file that has none, but may still be a case file
 _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
 
@@ -99,8 +98,18 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
     """Return the case of a text, its problems, and warnings; ``path`` is for messages only."""
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
-    require_no_su2_configuration(path, entries)
-    require_some_key(path, entries, problems, KEYS)
+    names = {entry.key for entry in entries}
+    if names & {"DV_KIND", "DV_PARAM", "DV_VALUE"}:
+        raise CaseError(
+            f"{path}: is a configuration of SU2 with design variables, not a case file; deform by "
+            f"it with `slideviz def {path}`"
+        )
+    if len(problems) > _FEW and not names & KEYS.keys():
+        line, sentence = min(problems)
+        raise CaseError(
+            f"{path}: is no case file, for it has no line with a key of slideviz (line {line}: "
+            f"{sentence}); a mesh is named in MESH_FILENAME="
+        )
     rows: dict[str, Entry] = {}
     for entry in entries:
         first = rows.setdefault(entry.key, entry)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from slideviz.system.file_checks import require_length
 Problem = tuple[int, str]
 _END_OF_LINE = re.compile(r"\r\n|\n|\r")
 _KEY_LINE = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*=(.*)\Z", re.DOTALL)
-_LISTED, _FEW = 30, 3
+_LISTED = 30
 LARGEST = {
     "case file": 16_000_000,
     "displacement file": 2_000_000_000,
@@ -86,27 +86,6 @@ def require_no_mesh(path: Path, entries: list[Entry]) -> None:
     """Raise CaseError where the entries of a file are those of an SU2 mesh."""
     if any(entry.key in ("NDIME", "NZONE") for entry in entries):
         raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
-
-
-def require_no_su2_configuration(path: Path, entries: list[Entry]) -> None:
-    """Raise CaseError where the entries of a file are those of a configuration of SU2."""
-    if any(entry.key in ("DV_KIND", "DV_PARAM", "DV_VALUE") for entry in entries):
-        raise CaseError(
-            f"{path}: is a configuration of SU2 with design variables, not a case file; deform by "
-            f"it with `slideviz def {path}`"
-        )
-
-
-def require_some_key(
-    path: Path, entries: list[Entry], problems: list[Problem], known: Container[str]
-) -> None:
-    """Raise CaseError with one sentence where a file of many wrong lines has no ``known`` key."""
-    if len(problems) > _FEW and not any(entry.key in known for entry in entries):
-        line, sentence = min(problems)
-        raise CaseError(
-            f"{path}: is no case file, for it has no line with a key of slideviz (line {line}: "
-            f"{sentence}); a mesh is named in MESH_FILENAME="
-        )
 
 
 def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:

@@ -23,7 +23,7 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError, not_one_of, shown
-from slideviz.terms import AXES, Term, labels
+from slideviz.terms import AXES, Term, labels, tips
 
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
 """The kind of field by which the window lets users enter a value."""
@@ -94,8 +94,7 @@ def choice(words: Mapping[str, Any]) -> Kind:
 def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> Kind:
     """Return the kind of the values of an enumeration; ``also`` has further words for some."""
     kind = choice({**{value: value for value in terms}, **(also or {})})
-    tips = {value: term.tip for value, term in terms.items() if term.tip}
-    return replace(kind, entry="choice", words=labels(terms), tips=tips)
+    return replace(kind, entry="choice", words=labels(terms), tips=tips(terms))
 
 
 def integer(low: int) -> Kind:

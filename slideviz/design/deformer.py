@@ -297,7 +297,7 @@ class Deformer:
             solver: the result is its gradient with respect to the displacement of the moving nodes.
         """
         start, end = self._taped(displacement)
-        adjoint = self._shaped(weights, self.mesh.points.shape, "weights")
+        adjoint = self._checked(weights, "weights", self.mesh.points.shape)
         return np.array(start.tape.pull(end, adjoint, start))
 
     @check_types
@@ -368,18 +368,14 @@ class Deformer:
         """Return a deformer that is made anew with another displacement, (m, d) or (k, m, d)."""
         return Deformer(self.mesh, self.case, displacement)
 
-    def _checked(self, vectors: FloatArray, name: str) -> FloatArray:
-        """Return ``vectors`` as `_shaped` does, for the shape (m, d) of the moving nodes."""
-        return self._shaped(vectors, self.displacement.shape, name)
+    def _checked(
+        self, vectors: FloatArray, name: str, shape: tuple[int, ...] | None = None
+    ) -> FloatArray:
+        """Return ``vectors`` as float64 of ``shape`` (n, d), or (k, n, d); by default of designs.
 
-    def _shaped(self, vectors: FloatArray, shape: tuple[int, ...], name: str) -> FloatArray:
-        """Return ``vectors`` as float64 of ``shape`` (n, d), or (k, n, d).
-
-        Raises
-        ------
-        CaseError
-            They have another shape, or numbers that are not finite.
+        Raises CaseError if they have another shape, or numbers that are not finite.
         """
+        shape = shape or self.displacement.shape
         out = np.asarray(vectors, np.float64)
         if out.shape[-2:] != shape or out.ndim not in (2, 3):
             raise CaseError(
@@ -456,7 +452,7 @@ class Deformer:
 
     def _taped(self, displacement: FloatArray) -> tuple[Variable, Variable]:
         """Return a design (m, d) and its points as variables of a tape."""
-        design = self._shaped(displacement, self.displacement.shape, "displacement")
+        design = self._checked(displacement, "displacement")
         if design.ndim == 3:
             raise CaseError(
                 "derivatives are taken at one displacement; call it for each of several"

@@ -6,6 +6,7 @@ Each has a runner of its own, so that neither it nor a run waits for the other.
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from functools import partial
 
 from qtpy.QtCore import QObject, Signal
@@ -16,7 +17,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
 from slideviz.session import jobs
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
-from slideviz.session.limits import check_frame, set_checked
+from slideviz.session.limits import check_frame
 from slideviz.session.panes import shown_views
 from slideviz.session.results import CheckedLimits
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
@@ -112,7 +113,7 @@ class LimitCheck(BackgroundJob):
             self._runner.start(check_frame, session.frame, session.mesh, session.case)
 
     def _finished(self, checked: CheckedLimits) -> None:
-        self.store.change(set_checked, checked)
+        self.store.change(replace, checked=checked)
         self._schedule()
 
 

@@ -26,11 +26,6 @@ def fit_colors(session: Session, every: bool = True) -> Session:
 NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the roles are shown."
 
 
-def lacks_displacement(session: Session) -> bool:
-    """Return whether the view is colored by the displacement, and no run has a step yet."""
-    return session.view.color_by == "displacement" and not any(run.frames for run in session.runs)
-
-
 def not_drawable(session: Session) -> str:
     """Return why the view cannot be colored by what is chosen, or ""."""
     what = session.view.color_by
@@ -39,7 +34,8 @@ def not_drawable(session: Session) -> str:
             f"The {METRICS[what].label} compares neighbouring cells, which stay in the file. The "
             "roles are shown."
         )
-    return NO_DISPLACEMENT if lacks_displacement(session) else ""
+    lacking = what == "displacement" and not any(run.frames for run in session.runs)
+    return NO_DISPLACEMENT if lacking else ""
 
 
 def with_drawable_colors(session: Session) -> Session:

@@ -15,10 +15,11 @@ import numpy as np
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import StepFrame
 from slideviz.terms import (
     CELL_STATES,
     RATED,
@@ -33,30 +34,10 @@ from slideviz.terms import (
 NEAR = 4  # the nearest point of a boundary is looked for in the elements at so many nearest nodes
 
 
-@dataclass(frozen=True)
-class RotationAxis:
-    """The axis of rotational periodicity."""
-
-    axis: tuple[float, float, float]
-    origin: tuple[float, float, float]
-    """`axis`, `origin` (3,) tuple of float: its direction, and a point on it."""
-
-
-def axis_of(session: Session) -> RotationAxis | None:
-    """Return the axis of a session's rotational periodic pair of boundaries, or None."""
-    names = session.case.markers_with("periodic")
-    for pair in session.pairs:
-        if pair.kind == "rotational" and pair.first in names and pair.second in names:
-            return RotationAxis(pair.axis, pair.origin)
-    return None
-
-
-def coordinates(
-    positions: FloatArray, around: RotationAxis | None
-) -> tuple[tuple[str, ...], FloatArray]:
+def coordinates(positions: FloatArray, around: Pair | None) -> tuple[tuple[str, ...], FloatArray]:
     """Return d names and the values (k, d) of coordinates, of Cartesian ``positions`` (k, d).
 
-    They are radius, angle in degrees and height about an axis ``around``, or Cartesian for None.
+    They are radius, angle in degrees and height about the axis of ``around``, or Cartesian for None.
     """
     dim = positions.shape[1]
     if around is None:

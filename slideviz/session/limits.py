@@ -1,4 +1,4 @@
-"""The limits of the case, checked on the step that is shown: what a job does, and its result."""
+"""The limits of the case, checked on the step that is shown: what a job does."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.session.jobs import Report, Stopped
 from slideviz.session.results import CheckedLimits, StepFrame
-from slideviz.session.state import Session
 
 
 def check_frame(
@@ -39,13 +38,3 @@ def check_frame(
     except SlidevizError as error:
         problem = str(error)
     return CheckedLimits(frame, case.limits, check_limits(known, measured), problem)
-
-
-def set_checked(session: Session, checked: CheckedLimits) -> Session:
-    """Return the session with limits that a job has checked."""
-    return replace(session, checked=checked)
-
-
-def choose_limit(session: Session, place: int | None) -> Session:
-    """Return the session with the failing cells of a limit marked with rings; None: of none."""
-    return replace(session, limit=place)

@@ -131,7 +131,17 @@ class StepFrame:
 
     def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
-        return largest_displacement(self.mesh.points, undeformed.points)
+        now, before = self.mesh.points, undeformed.points
+        if now is before or not len(now):
+            return 0.0
+        lengths: list[float] = []
+
+        def of_part(part: slice) -> None:
+            shifts = now[part] - before[part]
+            lengths.append(float(np.einsum("nd,nd->n", shifts, shifts).max()))
+
+        in_parts(of_part, len(now))
+        return float(np.sqrt(max(lengths)))
 
 
 _LARGEST: WeakKeyDictionary[StepFrame, dict[ColorBy, float]] = WeakKeyDictionary()
@@ -226,17 +236,3 @@ def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[
                 square += (now[nodes[at], axis] - before[nodes[at], axis]) ** 2
             total += np.sqrt(square)
         found[i] = total / (end - begin)
-
-
-def largest_displacement(now: FloatArray, before: FloatArray) -> float:
-    """Return the largest distance of a point ``now`` (n, d) from where it was ``before`` (n, d)."""
-    if now is before or not len(now):
-        return 0.0
-    lengths: list[float] = []
-
-    def of_part(part: slice) -> None:
-        shifts = now[part] - before[part]
-        lengths.append(float(np.einsum("nd,nd->n", shifts, shifts).max()))
-
-    in_parts(of_part, len(now))
-    return float(np.sqrt(max(lengths)))

@@ -64,11 +64,6 @@ def seconds_words(seconds: float) -> str:
     return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
 
 
-def end_words(run: Run) -> str:
-    """Return how a run ended, in a word; "running" while it goes on."""
-    return run.end or "running"
-
-
 def control_nodes(run: Run) -> int | None:
     """Return the number of control nodes in a run's last step, or None."""
     return run.last_step.control_nodes if run.last_step is not None else None
@@ -157,7 +152,7 @@ def summary(run: Run, among: Sequence[Run] = (), method: bool = False) -> str:
     The method is one of them where the run has a name of its own, or with ``method``.
     """
     cases = [other.case for other in among]
-    words = [] if run.end == "done" else [end_words(run)]
+    words: list[str] = [] if run.end == "done" else [run.end or "running"]
     named = [method_words(run.case)] if run.name or method else []
     if len({method_words(case) for case in cases}) > 1:
         words += named
@@ -227,7 +222,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("largest error at control", lambda r: getattr(r.last_step, "max_error", None), ".3g"),
     Column("periodic misfit", _misfit, ".3g"),
     Column("seconds", lambda run: run.seconds, ".3f"),
-    Column("end", end_words),
+    Column("end", lambda run: run.end or "running"),
 )
 """The columns of the table; qualities and control nodes are those of a run's last step."""
 

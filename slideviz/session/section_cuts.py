@@ -164,14 +164,8 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     section = replace(section, whole_cells=mesh.dim == 2)
     pairs = session.pairs if pair is None else (pair, *session.pairs)
     [section] = bound_sections([section], mesh, case, pairs)
-    return shape.first(section, _shown_points(session))
-
-
-def _shown_points(session: Session) -> FloatArray:
-    """Return the points (u, 3) of the nodes that cells use, in the frame that is shown."""
-    shown = session.mesh if session.frame is None else session.frame.mesh
-    assert shown is not None
-    return cell_points(shown)
+    shown = mesh if session.frame is None else session.frame.mesh
+    return shape.first(section, cell_points(shown))
 
 
 def _middle_of_moving(session: Session) -> FloatArray:

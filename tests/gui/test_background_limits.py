@@ -1,5 +1,6 @@
 """The limits of the case are checked in the background, on the step that is shown."""
 
+from dataclasses import replace
 from html import unescape
 
 import pytest
@@ -8,7 +9,6 @@ from qtpy.QtWidgets import QPushButton
 from slideviz.case.limits import outcome
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.session import changes
-from slideviz.session.limits import choose_limit
 from slideviz.session.runs_words import COLUMNS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -31,7 +31,7 @@ def test_limits_are_checked_on_what_is_shown_and_rings_are_at_cells_that_fail(wi
     assert low.actual == values.min()
     assert len(low.cells) == 5
     assert "points:inverted" not in scene.plotter.actors
-    store.change(choose_limit, 0)
+    store.change(replace, limit=0)
     assert scene.plotter.actors["points:inverted"].mapper.dataset.n_points == 5
     assert scene.stage.ring_words == (("5 fail", SELECTED_COLOR),)
     store.change(changes.show_frame, 0)

@@ -1,5 +1,7 @@
 """The panel of limits and walls."""
 
+from dataclasses import replace
+
 import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
@@ -7,7 +9,7 @@ from qtpy.QtTest import QTest
 from slideviz.case.limits import read_limits
 from slideviz.gui.panels.limits import LimitsPanel
 from slideviz.session import changes
-from slideviz.session.limits import check_frame, set_checked
+from slideviz.session.limits import check_frame
 from slideviz.session.store import Store
 from tests.session.test_walls_table import sheared_session
 
@@ -36,7 +38,7 @@ def show(panel, limits="", **roles):
     panel.store.change(changes.set_case, limits=read_limits(limits))
     session = panel.store.session
     checked = check_frame(session.frame, session.mesh, session.case, lambda _: None, lambda: False)
-    panel.store.change(set_checked, checked)
+    panel.store.change(replace, checked=checked)
 
 
 def texts(item):

@@ -7,7 +7,7 @@ import numpy as np
 from slideviz.case.limits import read_limits
 from slideviz.case.model import Case
 from slideviz.mesh.quality import quality, quality_totals
-from slideviz.session.limits import check_frame, choose_limit, set_checked
+from slideviz.session.limits import check_frame
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame, result_settings
 from tests.builders import grid
@@ -15,7 +15,7 @@ from tests.builders import grid
 
 def checked(session):
     found = check_frame(session.frame, session.mesh, session.case, print, lambda: False)
-    return set_checked(session, found)
+    return replace(session, checked=found)
 
 
 def test_limits_are_known_for_the_frame_and_the_limits_they_were_checked_with():
@@ -25,13 +25,13 @@ def test_limits_are_known_for_the_frame_and_the_limits_they_were_checked_with():
     limited = replace(session, case=session.case.change(limits="largest_angle < 61, inverted = 0"))
     assert limited.limit_results is None
     assert limited.limit_chosen is None
-    known = choose_limit(checked(limited), 0)
+    known = replace(checked(limited), limit=0)
     low, folded = known.limit_results
     assert not low.passed
     assert folded.passed
     assert known.limit_chosen is low
     np.testing.assert_array_equal(low.cells, np.arange(len(mesh.cells)))
-    assert choose_limit(known, None).limit_chosen is None
+    assert replace(known, limit=None).limit_chosen is None
     other = replace(known, case=known.case.change(limits="min > 0.5"))
     assert other.limit_results is None
     assert replace(known, first=StepFrame(mesh, quality(mesh))).limit_results is None

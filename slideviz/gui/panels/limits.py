@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from qtpy.QtCore import QSignalBlocker, QSize, Qt, QTimer
 from qtpy.QtGui import QBrush, QColor, QPaintEvent
@@ -18,7 +19,6 @@ from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes, walls_table
-from slideviz.session.limits import choose_limit
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 from slideviz.system.csv_table import write_csv
@@ -216,7 +216,7 @@ class LimitsPanel(Panel):
     def _limit_clicked(self, item: QTreeWidgetItem) -> None:
         session, place = self.store.session, item.data(0, NAME)
         again = place == session.limit
-        self.store.change(choose_limit, None if again or place < 0 else place)
+        self.store.change(replace, limit=None if again or place < 0 else place)
         chosen = self.store.session.limit_chosen
         if chosen is not None and len(chosen.cells):
             cell = int(chosen.cells[0])

@@ -20,10 +20,9 @@ from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
+from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.inspect import (
-    RotationAxis,
-    axis_of,
     cell_info,
     coordinates,
     measure,
@@ -31,6 +30,7 @@ from slideviz.session.inspect import (
     table_rows,
     worst_cells,
 )
+from slideviz.session.motions import machine_pair
 from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -130,7 +130,7 @@ class WorstPanel(Panel):
             session.frame,
             len(session.frames),
             measure(session.view.color_by),
-            axis_of(session),
+            machine_pair(session),
         )
 
     def _fill(self, session: Session) -> None:
@@ -142,7 +142,7 @@ class WorstPanel(Panel):
         worst = worst_cells(session.frames, at, what)
         title = f"{COLOR_BY[what].axis}, of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
-        self.model.show(worst, axis_of(session))
+        self.model.show(worst, machine_pair(session))
         self.table.setColumnHidden(SINCE, what not in SIZE_SKEW)  # others are not followed
 
     def _sync_mark(self, session: Session) -> None:
@@ -161,7 +161,7 @@ class WorstPanel(Panel):
         cell = cell if frame is not None and frame.has(cell) else None
         self.info.setVisible(cell is not None)
         if cell is not None:
-            key = session.frame, cell, axis_of(session)
+            key = session.frame, cell, machine_pair(session)
             if key != self._info_key:
                 # Finding the nearest boundary of a large mesh takes a while.
                 self._info_key = key
@@ -230,7 +230,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     info = cell_info(session.frame, cell)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
-    around = axis_of(session)
+    around = machine_pair(session)
     parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"
     lines = [
         f"<b>Cell {info.cell}</b>, {info.kind}{state}",
@@ -248,7 +248,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     return "<br>".join(lines)
 
 
-def _place_text(position: FloatArray, around: RotationAxis | None) -> str:
+def _place_text(position: FloatArray, around: Pair | None) -> str:
     names, values = coordinates(position[None], around)
     return "&nbsp; ".join(
         f"{name.removesuffix(' [°]')} {value:.7g}{'°' if '°' in name else ''}"

@@ -12,7 +12,8 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 from slideviz.gui.widgets.labels import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
-from slideviz.session.inspect import RotationAxis, WorstCells, coordinates, decimals
+from slideviz.mesh.periodic import Pair
+from slideviz.session.inspect import WorstCells, coordinates, decimals
 from slideviz.terms import COLOR_BY, SIZE_SKEW
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
@@ -90,7 +91,7 @@ class WorstModel(QAbstractTableModel):
         """(n,): the index in ``worst`` of the cell in each row."""
         self._by, self._down = QUALITY, False
 
-    def show(self, worst: WorstCells | None, around: RotationAxis | None = None) -> None:
+    def show(self, worst: WorstCells | None, around: Pair | None = None) -> None:
         """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst
