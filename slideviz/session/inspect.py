@@ -37,7 +37,7 @@ NEAR = 4  # the nearest point of a boundary is looked for in the elements at so 
 def coordinates(positions: FloatArray, around: Pair | None) -> tuple[tuple[str, ...], FloatArray]:
     """Return d names and the values (k, d) of coordinates, of Cartesian ``positions`` (k, d).
 
-    They are radius, angle in degrees and height about the axis of ``around``, or Cartesian for None.
+    They are radius, angle in degrees and height about the axis of ``around``; Cartesian for None.
     """
     dim = positions.shape[1]
     if around is None:
