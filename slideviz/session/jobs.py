@@ -45,7 +45,6 @@ from slideviz.solver.intersection import folding_message, intersection_message, 
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
 from slideviz.system.file_checks import require_regular_file
-from slideviz.system.threads import Tick
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
@@ -100,29 +99,28 @@ def save_steps(
 ) -> list[Path]:
     """Write the mesh of every step, whole files only, and return their paths.
 
-    A VTKHDF file has all steps, and before them the undeformed mesh ``first``. Raises SlidevizError
+    A VTKHDF file has all steps, with quality and displacement, and before them the undeformed mesh
+    ``first``. Raises SlidevizError
     if a file cannot be written; those before it stay. ``path``: the name to put numbers into (see
     `step_paths`). ``frames``: the steps, without the undeformed mesh.
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:
-        tick = _tick(f"Writing {path.name}", report, stopped)
-        _save_series(path, [*([first] if first else []), *frames], tick)
+        tick, every = (
+            _tick(f"Writing {path.name}", report, stopped),
+            (*filter(None, [first]), *frames),
+        )
+        start = every[0].mesh
+        with format_for(path).function("series")(path, start) as series:
+            for k, frame in enumerate(every):
+                tick(k / len(every))
+                moved = {"displacement": frame.mesh.points - start.points}
+                series.add(frame.mesh.points, cell_values(frame), moved)
         return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
         _tick(f"Writing {target.name}", report, stopped)(k / len(frames))
         save_mesh(target, frame, False, lambda _: None, stopped)
     return paths
-
-
-def _save_series(path: Path, frames: Sequence[StepFrame], tick: Tick) -> None:
-    """Write all frames into one VTKHDF file, with quality, and displacement from the first one."""
-    start = frames[0].mesh
-    with format_for(path).function("series")(path, start) as series:
-        for k, frame in enumerate(frames):
-            tick(k / len(frames))
-            moved = {"displacement": frame.mesh.points - start.points}
-            series.add(frame.mesh.points, cell_values(frame), moved)
 
 
 def intersection_key(session: Session) -> tuple[object, ...]:
@@ -143,9 +141,8 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
     files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
     prepare_spans(case, mesh)
     try:
-        if not case.motions or check_case(case, mesh) or stopped():
-            return "", ""
-        if not all(path.is_file() for path in files):
+        ready = case.motions and not check_case(case, mesh) and not stopped()
+        if not ready or not all(path.is_file() for path in files):
             return "", ""
         found = folded = None
         for one, zone in each_zone(by_zone(case, mesh), mesh):
@@ -155,7 +152,10 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
                 found = intersection_message(*asked) or jump_message(*asked)
                 folded = folded or (None if found else folding_message(*asked))
     except SlidevizError as error:
-        return _first_line(error, files), ""
+        first, *others = str(error).splitlines()
+        for path in files:  # without their folders
+            first = first.replace(str(path), path.name)
+        return (f"{first} ({len(others)} more)." if others else f"{first}."), ""
     message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
     return message, (f"{folded}." if folded else "")
 
@@ -170,14 +170,6 @@ def prepare_spans(case: Case, mesh: Mesh) -> None:
                 _ = channel.curves
 
 
-def _first_line(error: SlidevizError, files: list[Path]) -> str:
-    """Return the first line of an error, without folders of files, and how many more there are."""
-    first, *others = str(error).splitlines()
-    for path in files:
-        first = first.replace(str(path), path.name)
-    return f"{first} ({len(others)} more)." if others else f"{first}."
-
-
 def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
     laid = tuple(motion for motion in session.case.motions if isinstance(motion, Onto))
@@ -190,7 +182,6 @@ def set_intersection(session: Session, found: tuple[str, str], key: tuple[object
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]
 
-CASE_SUFFIXES = (".cfg",)
 PHASES = {
     "classify": "sorting nodes",
     "solve": "solving",
@@ -200,6 +191,8 @@ PHASES = {
     "layers": "keeping the layers at walls",
     "repair": "mending the cells",
     "quality": "quality",
+    "read": "reading the boundary",
+    "write": "copying the file",
 }
 """Words in the window for the phases of a run (``Progress.phase``)."""
 
@@ -245,7 +238,7 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
     from slideviz.formats.files import read
 
     case, mesh_path = None, path
-    if path.suffix.lower() in CASE_SUFFIXES:
+    if path.suffix.lower() == ".cfg":
         report(JobProgress(f"Reading {path.name}"))
         case = Case.read(path)
         if case.mesh_file is None:
@@ -291,9 +284,8 @@ def prepare(
     ghosts = Ghosts(mesh)
     ghosts.moved(session.case, wait=True)
     coarse = coarse_surfaces(surfaces, mesh.points)
-    if case is None:
-        return Opened(session, surfaces, ghosts, coarse=coarse)
-    return Opened(session, surfaces, ghosts, bool(case.view), case.view.get("VIEW_CAMERA"), coarse)
+    view = {} if case is None else case.view
+    return Opened(session, surfaces, ghosts, bool(view), view.get("VIEW_CAMERA"), coarse)
 
 
 def _precompute(frame: StepFrame) -> None:
@@ -396,10 +388,8 @@ def compute_in_file(
     """
     from slideviz.streaming.run import stream
 
-    phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
-
     def progress(now: Progress) -> None:
-        phase = phases.get(now.phase, now.phase) + now.of_zone
+        phase = PHASES.get(now.phase, now.phase) + now.of_zone
         _tick(f"From file to file: {phase}", report, stopped)(overall(now))
 
     skin = first.mesh
@@ -418,9 +408,8 @@ _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
 def overall(now: Progress) -> float:
     """Return roughly the fraction of a run that is done."""
     start = _STARTS.get(now.phase, 0.9)
-    later = [value for value in _STARTS.values() if value > start]
-    inside = start + now.fraction * (min(later, default=0.95) - start)
-    return float((now.step - 1 + inside) / now.total)
+    end = min((value for value in _STARTS.values() if value > start), default=0.95)
+    return float((now.step - 1 + (start + now.fraction * (end - start))) / now.total)
 
 
 def save_mesh(

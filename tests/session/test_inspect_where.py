@@ -1,21 +1,27 @@
 """Where cells are: about an axis, and beside which boundary."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.session.inspect import RotationAxis, coordinates, decimals, nearest_boundary
+from slideviz.session.inspect import coordinates, decimals, nearest_boundary
+
+
+def about(axis, origin):
+    return SimpleNamespace(axis=axis, origin=origin)
 
 
 def test_places_are_told_about_an_axis():
     at = np.array([[3.0, 4.0, 7.0], [1.0, -2.0, 0.0]])
-    names, values = coordinates(at, RotationAxis((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    names, values = coordinates(at, about((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
     assert names == ("r", "\u03b8 [°]", "z")
     assert np.allclose(values[0], (20.0**0.5, np.degrees(np.arctan2(4, 2)), 7.0))
     assert np.allclose(values[1], (2.0, -90.0, 0.0))
-    names, values = coordinates(at[:, :2], RotationAxis((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
+    names, values = coordinates(at[:, :2], about((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
     assert (names, values.shape) == (("r", "\u03b8 [°]"), (2, 2))
-    assert coordinates(at, RotationAxis((0.0, 1.0, 1.0), (0.0, 0.0, 0.0)))[0][2] == "axial"
+    assert coordinates(at, about((0.0, 1.0, 1.0), (0.0, 0.0, 0.0)))[0][2] == "axial"
     names, values = coordinates(at, None)
     assert names == ("x", "y", "z")
     assert values is at
