@@ -108,23 +108,7 @@ NODE_TYPES: dict[NodeType, Term] = {
 }
 """The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
-MotionKind = Literal[
-    "translate",
-    "rotate",
-    "scale",
-    "radial",
-    "hicks-henne",
-    "cst",
-    "bump",
-    "ffd",
-    "ffd-camber",
-    "ffd-thickness",
-    "ffd-twist",
-    "span",
-    "file",
-    "onto",
-]
-MOTION_KINDS: dict[MotionKind, Term] = {
+MOTION_KINDS = {
     "translate": Term("translate"),
     "rotate": Term("rotate"),
     "scale": Term("scale"),
@@ -140,6 +124,7 @@ MOTION_KINDS: dict[MotionKind, Term] = {
     "file": Term("displacement file", "A line for each node: its number and its displacement."),
     "onto": Term("onto a surface", "A surface (STL, VTU), or a mesh with a boundary of that name."),
 }
+"""What motions do to boundaries; but for ``span``, verbs of ``MOTION``."""
 
 SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]
 

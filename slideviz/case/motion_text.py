@@ -15,10 +15,10 @@ from slideviz.case.model import Motion, Point, Target, named
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, counted, is_none, name_text, number, words_of
 from slideviz.errors import CaseError, nearest, not_one_of, shown
-from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS, MotionKind, SpanKind
+from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS, SpanKind
 
 VERBS = (*(kind for kind in MOTION_KINDS if kind != "span"), *SPAN_KINDS)
-VERB_OF: dict[type, MotionKind] = {
+VERB_OF: dict[type, str] = {
     model.Translate: "translate",
     model.Rotate: "rotate",
     model.Scale: "scale",

@@ -27,17 +27,14 @@ def notify(
     ``failed`` is called with each error; where it is None, the first error is raised after all
     functions were called.
     """
-    first: Exception | None = None
+    errors: list[Exception] = []
     for function in tuple(functions):
         try:
             function(*values)
         except Exception as error:
-            if failed is not None:
-                failed(error)
-            else:
-                first = first or error
-    if first is not None:
-        raise first
+            (failed or errors.append)(error)
+    if errors:
+        raise errors[0]
 
 
 @dataclass(frozen=True)
@@ -196,18 +193,15 @@ class Store:
         self.session = session
         if len(self._queue) > 1:
             return
-        first: Exception | None = None
+        errors: list[Exception] = []
         try:
             while self._queue:
-                try:
-                    notify(self._listeners, *self._queue[0], failed=self.failed)
-                except Exception as error:
-                    first = first or error
+                notify(self._listeners, *self._queue[0], failed=self.failed or errors.append)
                 self._queue.pop(0)
         finally:
             self._queue.clear()
-        if first is not None:
-            raise first
+        if errors:
+            raise errors[0]
 
     # Undo ------------------------------------------------------------------------------
     @property

@@ -173,9 +173,11 @@ STEPS = (1, 5, 20)  # numbers of steps that are compared by default
 class Combination:
     """A method, a periodic mode and a number of steps."""
 
-    method: str  # one of ``COMPARED_METHODS``: none, ps, ds, idw or elastic
+    method: str
+    """One of ``COMPARED_METHODS``: none, ps, ds, idw or elastic."""
     periodic: PeriodicMode
-    steps: int  # ``AUTO``: the solver chooses
+    steps: int
+    """``AUTO``: the solver chooses."""
 
     @property
     def label(self) -> str:
