@@ -369,10 +369,7 @@ PERIODIC_DIRECTIONS: dict[str, tuple[int, PeriodicKind | None]] = {
 # Quality -----------------------------------------------------------------------------------
 
 SkewMetric = Literal["knupp", "rbf-slide"]
-SKEW_METRICS: dict[SkewMetric, Term] = {
-    "knupp": Term("Knupp"),
-    "rbf-slide": Term("as RBF-SliDe"),
-}
+SKEW_METRICS: dict[SkewMetric, Term] = {"knupp": Term("Knupp"), "rbf-slide": Term("as RBF-SliDe")}
 
 CellState = Literal["valid", "inverted", "unproven"]
 CELL_STATES: tuple[CellState, ...] = ("valid", "inverted", "unproven")

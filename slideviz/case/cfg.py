@@ -14,14 +14,7 @@ from typing import Any
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import (
-    Entry,
-    Problem,
-    entries_of,
-    listed,
-    read_text,
-    require_no_mesh,
-)
+from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case, with_paths
 from slideviz.errors import CaseError, nearest, shown
 from slideviz.system.atomic import atomic_write

@@ -97,9 +97,7 @@ DEGREES = Kind(
     lambda degrees: " ; ".join(f"({i}, {j}, {k})" for i, j, k in degrees),
 )
 ORDERS = Kind(
-    "i, j, k",
-    lambda text: _integers(list_of(text), 1),
-    lambda orders: ", ".join(map(str, orders)),
+    "i, j, k", lambda text: _integers(list_of(text), 1), lambda orders: ", ".join(map(str, orders))
 )
 
 _setting = partial(setting, MOTION)
@@ -142,11 +140,7 @@ _ROWS = (
         label="FFD coordinates",
     ),
     _setting(
-        "FFD_AXIS",
-        "A point on that axis.",
-        POINT,
-        label="FFD axis",
-        idle_reason=_without_axis,
+        "FFD_AXIS", "A point on that axis.", POINT, label="FFD axis", idle_reason=_without_axis
     ),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)

@@ -131,19 +131,9 @@ def _put_file(case: Case, path: Path | None) -> Case:
 _FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
 
 _ROWS = (
+    setting(FILES, "MESH_FILENAME", "The mesh to deform.", PATH, field="mesh_file"),
     setting(
-        FILES,
-        "MESH_FILENAME",
-        "The mesh to deform.",
-        PATH,
-        field="mesh_file",
-    ),
-    setting(
-        FILES,
-        "MESH_OUT_FILENAME",
-        "Where the deformed mesh is written.",
-        PATH,
-        field="mesh_out",
+        FILES, "MESH_OUT_FILENAME", "Where the deformed mesh is written.", PATH, field="mesh_out"
     ),
     setting(
         FILES,
@@ -152,10 +142,7 @@ _ROWS = (
         _FORMAT,
     ),
     setting(
-        FILES,
-        "MESH_OUT_FORMAT",
-        "SU2's text or binary, whatever the ending of the file.",
-        _FORMAT,
+        FILES, "MESH_OUT_FORMAT", "SU2's text or binary, whatever the ending of the file.", _FORMAT
     ),
     setting(
         FILES,
@@ -215,10 +202,7 @@ _ROWS = (
     *METHOD_ROWS,
     *REDUCTION_ROWS,
     setting(
-        QUALITY,
-        "GENERATE_QUALITY",
-        "Write the quality of the deformed mesh too.",
-        run_label="",
+        QUALITY, "GENERATE_QUALITY", "Write the quality of the deformed mesh too.", run_label=""
     ),
     setting(
         QUALITY,

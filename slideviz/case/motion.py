@@ -298,9 +298,9 @@ def by_zone(case: Case, mesh: Mesh) -> Case:
     motions, _ = _together(case.motions, mesh.points, on, files)
     warnings = case.warnings
     for place, motion in enumerate(motions):
-        if motion in shared and isinstance(motion, FromFile):
+        if motion in shared and isinstance(motion, model.FromFile):
             listed = files[key_of(motion)]
-            motions[place] = Prescribed(listed.nodes, listed.vectors, motion.marker)
+            motions[place] = model.Prescribed(listed.nodes, listed.vectors, motion.marker)
             warnings = *warnings, *listed.warnings
     return case.change(motions=tuple(motions), warnings=tuple(dict.fromkeys(warnings)))
 

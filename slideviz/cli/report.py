@@ -102,10 +102,7 @@ def run_report(
             "used": last.tolerance is not None,
             "tolerance": last.tolerance,
         },
-        "support_radius": {
-            "automatic": automatic_radius(case),
-            "used": last.support_radius,
-        },
+        "support_radius": {"automatic": automatic_radius(case), "used": last.support_radius},
         "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),
         "periodic_misfit": max(

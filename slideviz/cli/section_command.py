@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
-from slideviz.cli.section_options import (
-    limits,
-    neighbours,
-    pair_of_names,
-    pixels,
-    section_reader,
-)
+from slideviz.cli.section_options import limits, neighbours, pair_of_names, pixels, section_reader
 from slideviz.terms import COLOR_MAPS, QUANTITIES, SKEW_METRICS
 
 if TYPE_CHECKING:

@@ -155,12 +155,7 @@ class _Measure:
     """The surfaces of a mesh with their period and span, and the distances between them."""
 
     def __init__(
-        self,
-        case: Case,
-        mesh: Mesh,
-        reference: Mesh,
-        places: FloatArray,
-        labels: Mapping[str, str],
+        self, case: Case, mesh: Mesh, reference: Mesh, places: FloatArray, labels: Mapping[str, str]
     ) -> None:
         """``labels``: the names of boundaries in results, where the mesh has others."""
         self._labels = labels

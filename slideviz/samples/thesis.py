@@ -100,11 +100,7 @@ BLOCK_LENGTH, BLOCK_HEIGHT = 0.2, 0.04
 SIDES = ("LEFT", "RIGHT", "LOWER", "UPPER", "FRONT", "BACK")
 """Markers of the sides: first and last along each axis."""
 _RING = ((0, 0), (1, 0), (1, 1), (0, 1))
-_CORNERS = {
-    1: ((0,), (1,)),
-    2: _RING,
-    3: tuple((*corner, up) for up in (0, 1) for corner in _RING),
-}
+_CORNERS = {1: ((0,), (1,)), 2: _RING, 3: tuple((*corner, up) for up in (0, 1) for corner in _RING)}
 """Corners of a cell as steps along each axis, in SU2's order, by dimension."""
 
 

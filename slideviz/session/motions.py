@@ -13,19 +13,10 @@ import numpy as np
 
 from slideviz.case import model
 from slideviz.case.boxes import box_definition, boxes_for
-from slideviz.case.displacement import (
-    Displacements,
-    parse_displacements,
-    read_displacements,
-)
+from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Motion, Target, applies_to, named
-from slideviz.case.motion import (
-    displacements,
-    key_of,
-    moved_together,
-    placed_displacements,
-)
+from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
 from slideviz.case.motion_words import direction_words
 from slideviz.case.onto import is_laid, laid_displacements
 from slideviz.errors import CaseError, SlidevizError

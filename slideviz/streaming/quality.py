@@ -64,11 +64,7 @@ class QualityCollector:
         return some
 
     def add(
-        self,
-        ids: Index,
-        values: FloatArray,
-        status: NDArray[np.uint8],
-        signs: NDArray[np.int8],
+        self, ids: Index, values: FloatArray, status: NDArray[np.uint8], signs: NDArray[np.int8]
     ) -> None:
         """Add the values, statuses and signs of the cells ``ids`` (k,)."""
         self._values[ids], self._status[ids] = values, status
@@ -313,10 +309,7 @@ def facet_sums(path: Path, zone: int) -> Iterator[Callable[[tuple[int, int]], in
 
 
 def require_consistent_orientation(
-    zone: ZoneSource,
-    parts: Sequence[tuple[int, int]],
-    ranks: SerialPool = SERIAL,
-    remedy: str = "",
+    zone: ZoneSource, parts: Sequence[tuple[int, int]], ranks: SerialPool = SERIAL, remedy: str = ""
 ) -> None:
     """Raise where the sums of the hashes of all facets of a zone do not add up to 0.
 

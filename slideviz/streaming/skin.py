@@ -33,16 +33,7 @@ from slideviz.formats.su2b.read import (
 )
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
-from slideviz.mesh.model import (
-    Cells,
-    FloatArray,
-    IntArray,
-    Marker,
-    Mesh,
-    Origin,
-    Part,
-    sealed,
-)
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, Part, sealed
 from slideviz.mesh.zones import join_zones
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, equal_shares

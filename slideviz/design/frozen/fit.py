@@ -242,10 +242,7 @@ class FrozenFit:
         total = along.shape[1]
 
         def make() -> tuple[Any, IntArray]:
-            use = self._chosen(
-                f"{name} terms",
-                lambda: independent(along),
-            )
+            use = self._chosen(f"{name} terms", lambda: independent(along))
             system = np.zeros((count + len(use),) * 2)
             system[:count, :count] = matrix(self._basis, place)
             system[:count, count:] = along[:, use]

@@ -16,13 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.su2b.layout import (
-    MAGIC,
-    BinaryFile,
-    ElementTable,
-    ZonePlace,
-    find_zones,
-)
+from slideviz.formats.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zones
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
 from slideviz.mesh.interfaces import find_interfaces
