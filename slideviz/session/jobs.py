@@ -360,8 +360,7 @@ def repair(
         step = replace(step, safe=safe)
     for frame in earlier:
         report(frame)
-    undeformed = mesh if last.step is not None else None
-    measured = quality(step.mesh, undeformed, case.quality_metric)
+    measured = quality(step.mesh, None if last.step is None else mesh, case.quality_metric)
     report(_frame_of(step, measured, case, mesh, case.limits))
 
 
