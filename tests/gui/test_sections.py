@@ -284,7 +284,7 @@ def test_hub_and_shroud_are_chosen_beside_sections_and_motions_over_the_span(win
     # The same two fields, in the form of the motion.
     driver.choose(window.motions.editor.walls.ends[0], "HUB")
     assert window.store.session.case.span is None
-    assert (hub.currentData(), sections(window)[0].walls.hub) == ("HUB", "HUB")
+    assert (hub.currentData(), sections(window)[0].walls.channels[0].hub) == ("HUB", "HUB")
     window.store.undo()
     assert window.store.session.case.span == ("INFLOW", "SHROUD")
 
