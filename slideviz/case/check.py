@@ -371,7 +371,8 @@ def file_before_motions(case: Case) -> tuple[Note, ...]:
     sequences: dict[tuple[Motion, ...], list[str]] = {}
     for marker in case.markers_with("moving"):
         sequence = tuple(motion for motion in case.motions if applies_to(motion, marker))
-        sequences.setdefault(sequence, []).append(marker)
+        if len(sequence) > 1:
+            sequences.setdefault(sequence, []).append(marker)
     return tuple(
         Note(
             f"{first.path.name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), and "
@@ -379,7 +380,7 @@ def file_before_motions(case: Case) -> tuple[Note, ...]:
             "leaves the file out"
         )
         for (first, *others), markers in sequences.items()
-        if type(first) is FromFile and not first.marker and others
+        if type(first) is FromFile and not first.marker
     )
 
 
