@@ -63,7 +63,7 @@ KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_
 
 
 Check = Callable[[Any], str]  # returns why a value is not allowed; "" if it is
-Make = Callable[[], QWidget]  # makes a field
+FieldFactory = Callable[[], QWidget]  # makes a field
 
 
 def _unchanged(value: Any) -> Any:
@@ -79,24 +79,24 @@ class FormRow(NamedTuple):
 
     title: str
     attribute: str
-    make: Make
+    make: FieldFactory
     shown: Callable[[Any], Any] = _unchanged
     """Returns what the field shows for a value of the attribute."""
     read: Callable[[Any], Any] = _unchanged
     """Returns the value of the attribute for that of the field."""
 
 
-def _number(tip: str, value: float = 0.0, allowed: Check | None = None) -> Make:
+def _number(tip: str, value: float = 0.0, allowed: Check | None = None) -> FieldFactory:
     return lambda: NumberField(value, allowed, tip)
 
 
 def _vector(tip: str, values: Sequence[float] = (0.0,) * 3, allowed: Check | None = None,
-            names: Sequence[str] = "xyz") -> Make:  # fmt: skip
+            names: Sequence[str] = "xyz") -> FieldFactory:  # fmt: skip
     return lambda: VectorField(values, allowed, names, tip)
 
 
 def _choice(tip: str, words: Mapping[Any, str] = MappingProxyType({}),
-            tips: Mapping[str, str] = MappingProxyType({})) -> Make:  # fmt: skip
+            tips: Mapping[str, str] = MappingProxyType({})) -> FieldFactory:  # fmt: skip
     def make() -> Choice:
         field = Choice(words, tip)
         field.set_tips(tips)
