@@ -10,13 +10,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from slideviz.formats.su2.lines import Piece, number_of
+from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.numbers import (
     fill_cells,
     fill_points,
@@ -24,7 +24,7 @@ from slideviz.formats.su2.numbers import (
     require_all_coordinates,
 )
 from slideviz.formats.su2.text import Text
-from slideviz.formats.su2b.layout import NAME_BYTES
+from slideviz.formats.su2b.layout import NAME_BYTES, ElementTable, ZonePlace
 from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of, write_at
 from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
@@ -48,56 +48,10 @@ class BinaryLayout:
     """(p + 1, t): number of elements of each type before each of the p pieces, and in the last row
     of all. Types are in the order of ``SORTED``."""
     named: bool  # whether the file gets the names of the markers; else numbers, which always fit
-    width: int = 8  # bytes of a count or an index, 4 or 8
-    begin: int = HEAD  # first byte of its zone
-    number: int = 1  # number of its zone
-
-    @property
-    def conn(self) -> np.dtype:
-        """Return the data type of counts and indices."""
-        return np.dtype(f"<u{self.width}")
-
-    @property
-    def point(self) -> np.dtype:
-        """Return the data type of a point: its coordinates and its index."""
-        return np.dtype([("x", "<f8", (self.text.zone.dim,)), ("i", self.conn)])
-
-    @property
-    def offsets(self) -> int:
-        """Return the first byte of the offsets of the elements."""
-        return self.begin + 8 + self.width
-
-    @property
-    def entries(self) -> int:
-        """Return the first byte of the list of the elements (type, nodes, index of each)."""
-        return self.offsets + self.width * (self.text.n_cells + 1)
-
-    @property
-    def length(self) -> int:
-        """Return how many numbers the list of the elements has."""
-        return int(self.before[-1] @ _WIDTHS)
-
-    @property
-    def points(self) -> int:
-        """Return the first byte of the points."""
-        return self.entries + self.width * (self.length + 1)
-
-    @property
-    def markers(self) -> int:
-        """Return the offset of the first byte of the markers."""
-        return self.points + self.text.n_points * self.point.itemsize
-
-    @property
-    def end(self) -> int:
-        """Return the end of the zone, which is the size of the file if it is the last."""
-        sizes = (
-            NAME_BYTES + self.width * (2 + 2 * piece_rows + nodes)
-            for piece_rows, nodes in (
-                (number_of(m.rows), sum(piece.nodes for piece in m.rows))
-                for m in self.text.zone.markers
-            )
-        )
-        return self.markers + 4 + sum(sizes)
+    conn: np.dtype  # of counts and indices
+    point: np.dtype  # of a point: its coordinates and its index
+    place: ZonePlace  # where each part of the zone begins, without its markers
+    markers: int  # first byte of the markers
 
     def names(self) -> list[bytes]:
         """Return the names of the markers as bytes of the file, filled up to ``NAME_BYTES``."""
@@ -116,38 +70,50 @@ def binary_layouts(texts: Sequence[Text], *, is_result: bool) -> list[BinaryLayo
     names and 8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they
     fit.
     """
+    tables = [_counted(text) for text in texts]
+    lengths = [int(before[-1] @ _WIDTHS) for before in tables]
+    short = max(*lengths, *(text.n_points for text in texts)) <= LARGEST_4 and not is_result
+    width, begin = 4 if short else 8, HEAD
     layouts: list[BinaryLayout] = []
-    for text in texts:
-        before = np.zeros((len(text.zone.elements) + 1, len(SORTED)), np.int64)
-        np.cumsum(_counted(text), axis=0, out=before[1:])
-        layouts.append(BinaryLayout(text, before, is_result))
-    largest = max(max(one.length, one.text.n_points) for one in layouts)
-    width, begin = 4 if not is_result and largest <= LARGEST_4 else 8, HEAD
-    for k, one in enumerate(layouts):
-        layouts[k] = replace(one, width=width, begin=begin, number=k + 1)
-        begin = layouts[k].end
+    for number, (text, before, length) in enumerate(zip(texts, tables, lengths, strict=True), 1):
+        dim, conn = text.zone.dim, np.dtype(f"<u{width}")
+        point = np.dtype([("x", "<f8", (dim,)), ("i", conn)])
+        offsets = begin + 8 + width
+        entries = offsets + width * (text.n_cells + 1)
+        points = entries + width * (length + 1)
+        markers = points + text.n_points * point.itemsize
+        sizes = (
+            NAME_BYTES + width * (2 + sum(2 * piece.rows + piece.nodes for piece in marker.rows))
+            for marker in text.zone.markers
+        )
+        table = ElementTable(text.n_cells, offsets, entries, length, numbered=True)
+        end = markers + 4 + sum(sizes)
+        place = ZonePlace(number, begin, end, dim, table, text.n_points, points, ())
+        layouts.append(BinaryLayout(text, before, is_result, conn, point, place, markers))
+        begin = end
     return layouts
 
 
 def _counted(text: Text) -> IntArray:
-    """Return the number (p, t) of elements of each type (as ``SORTED``) in each piece."""
+    """Return how many elements of each type are before each piece (`BinaryLayout.before`)."""
     from slideviz.formats.su2.loops import count_types
 
     pieces, rows = text.zone.elements, text.n_cells
-    out = np.zeros((len(pieces), len(SORTED)), np.int64)
+    before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
+    out = before[1:]
     # The types with fewest and most nodes: if all elements are one of these, the total tells it.
     for vtk in (5, 9) if text.zone.dim == 2 else (10, 12):
         if sum(piece.nodes for piece in pieces) == rows * SIZES[vtk]:
-            out[:, SORTED.index(vtk)] = [piece.rows for piece in pieces]
-            return out
+            out[:, SORTED.index(vtk)] = np.cumsum([piece.rows for piece in pieces])
+            return before
 
     def count(piece: Piece) -> IntArray:
         counts = np.zeros(257, np.int64)
         count_types(np.frombuffer(text.lines.text(piece), np.uint8), counts)
         return counts[list(SORTED)]
 
-    out[:] = list(ordered_map(count, pieces))
-    return out
+    np.cumsum(list(ordered_map(count, pieces)), axis=0, out=out)
+    return before
 
 
 def write_layouts(
@@ -160,11 +126,11 @@ def write_layouts(
     """
     for layout, share in zip(layouts, equal_shares(progress, len(layouts)), strict=True):
         _write_layout(layout, path, share, ranks)
-    return np.array([layouts[0].width, len(layouts)], "<i4").tobytes()
+    return np.array([layouts[0].conn.itemsize, len(layouts)], "<i4").tobytes()
 
 
 def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool) -> None:
-    text, conn = layout.text, layout.conn
+    text, conn, place = layout.text, layout.conn, layout.place
     zone, lines = text.zone, text.lines
     tasks: list[_Task] = [
         (kind, first, min(first + PIECES, len(pieces)))
@@ -187,10 +153,10 @@ def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: Seria
     lines.raw.require_same()
     with open_temporary(path) as file:
         for at, content in (
-            (layout.begin, np.array([layout.number, zone.dim], "<i4").tobytes()),
-            (layout.begin + 8, np.array(text.n_cells, conn).tobytes()),
-            (layout.entries - layout.width, np.array(layout.length, conn).tobytes()),
-            (layout.points - layout.width, np.array(text.n_points, conn).tobytes()),
+            (place.begin, np.array([place.number, zone.dim], "<i4").tobytes()),
+            (place.begin + 8, np.array(text.n_cells, conn).tobytes()),
+            (place.cells.entries - conn.itemsize, np.array(place.cells.length, conn).tobytes()),
+            (place.points - conn.itemsize, np.array(text.n_points, conn).tobytes()),
             (layout.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),
         ):
             file.seek(at)
@@ -224,7 +190,7 @@ def _layout_tasks(
 
 def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
     """Write the elements of piece ``k``, sorted by type, to file descriptor ``out``; return 0."""
-    text = layout.text
+    text, table, size = layout.text, layout.place.cells, layout.conn.itemsize
     piece = text.zone.elements[k]
     types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
     fill_cells(text.lines, piece, types, nodes, dim=text.zone.dim, n_points=text.n_points)
@@ -238,10 +204,10 @@ def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
         row = int(totals[:column].sum()) + before
         start = int(totals[:column] @ _WIDTHS[:column]) + before * width
         some = cells if len(mine) == len(types) else cells.take(mine)
-        table = rows_of(some.types, some.connectivity, piece.row + mine)
+        rows = rows_of(some.types, some.connectivity, piece.row + mine)
         offsets = start + width * np.arange(len(mine))
-        write_at(out, layout.offsets + row * layout.width, offsets.astype(layout.conn))
-        write_at(out, layout.entries + start * layout.width, table.astype(layout.conn))
+        write_at(out, table.offsets + row * size, offsets.astype(layout.conn))
+        write_at(out, table.entries + start * size, rows.astype(layout.conn))
     return 0
 
 
@@ -259,5 +225,5 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
         raise too_large(text.lines.name, piece.row + at, points[at])
     block = np.empty(piece.rows, layout.point)
     block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
-    write_at(out, layout.points + piece.row * layout.point.itemsize, block)
+    write_at(out, layout.place.points + piece.row * layout.point.itemsize, block)
     return filled

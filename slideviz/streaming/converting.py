@@ -14,12 +14,12 @@ from slideviz.errors import printable
 from slideviz.formats.binary_copy import binary_layouts, write_layouts
 from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
 from slideviz.formats.source import open_source
-from slideviz.formats.su2.text import Text, find_texts
+from slideviz.formats.su2.text import find_texts
 from slideviz.formats.su2.write import content_blocks, require_text_names
 from slideviz.formats.su2b.read import BLOCK, read_markers
 from slideviz.formats.su2b.write import halo_error, require_binary_names
 from slideviz.formats.table import ZoneContent, format_of
-from slideviz.mesh.model import Cells, FloatArray, IntArray
+from slideviz.mesh.model import Cells, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
 from slideviz.streaming.source import FileSource, Scratch, ZoneSource
@@ -44,9 +44,6 @@ def text_of_binary(zones: Sequence[ZoneSource], folder: Path) -> Iterator[bytes]
 
 def _text_of_zone(source: ZoneSource, folder: Path) -> Iterator[bytes]:
 
-    def points(i: int, j: int) -> FloatArray:
-        return np.ascontiguousarray(source.points.rows(i, j - i)["x"], np.float64)
-
     with ExitStack() as stack:
         where = _places(stack, source, folder)
 
@@ -63,7 +60,7 @@ def _text_of_zone(source: ZoneSource, folder: Path) -> Iterator[bytes]:
             n_points=source.n_points,
             cells=cells,
             types=lambda i, j: cells(i, j)[0],
-            points=points,
+            points=lambda i, j: source.points.coordinates(slice(i, j)),
             markers=tuple(read_markers(source.file, source.place)),
         )
         yield from content_blocks([content], source.file.name)
@@ -136,24 +133,16 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     texts = find_texts(open_source(source), zone, progress_share(tick, 0.0, 0.1))
     for number, text in enumerate(texts, 1):
         name = printable(source.name) + (f", zone {number}" if number > 1 else "")
-        _require_binary(text, name)
+        if text.zone.sends:
+            raise halo_error(name)
+        require_binary_names(name, (marker.name for marker in text.zone.markers))
     layouts, alone = binary_layouts(texts, is_result=True), texts[0].zone.bounds.zones > len(texts)
     warn(sentence_of_lost(target, printable(source.name), lost_of_texts(texts), alone=alone))
-    require_disk_space(target, target, layouts[-1].end)
+    require_disk_space(target, target, layouts[-1].place.end)
     with atomic_write(target) as file:
-        os.truncate(file.fileno(), layouts[-1].end)
+        os.truncate(file.fileno(), layouts[-1].place.end)
         file.write(write_layouts(layouts, Path(file.name), progress_share(tick, 0.1)))
     tick(1.0)
-
-
-def _require_binary(text: Text, name: str) -> None:
-    """Raise where an SU2 binary file cannot hold a zone: with a halo, or long or odd marker names.
-
-    Raises MeshError as `slideviz.formats.su2b.write.require_binary` does for a mesh in memory.
-    """
-    if text.zone.sends:
-        raise halo_error(name)
-    require_binary_names(name, (marker.name for marker in text.zone.markers))
 
 
 def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:

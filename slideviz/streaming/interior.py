@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import DeformError, MeshError, UnsoundError
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.rbf.frames import on_axis
 from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.layers import LayerZone, find_zone
@@ -28,16 +28,9 @@ from slideviz.solver.steps import MeshRepair, Step
 class InteriorDisplacer:
     """Displaces any nodes of a mesh, by the steps of its skin."""
 
-    skin: Mesh  # the undeformed skin
+    skin: Mesh  # the undeformed skin, without its cells
     setup: Setup  # the setup of the skin
     steps: Sequence[Step]  # the steps of the skin, with their ``field``
-
-    def without_cells(self) -> InteriorDisplacer:
-        """Return the same without the skin's cells and markers, which no displacement needs."""
-        none = Cells.from_blocks([])
-        skin = replace(self.skin, cells=none, markers=())
-        steps = [replace(step, mesh=skin.with_points(step.mesh.points)) for step in self.steps]
-        return replace(self, skin=skin, steps=steps)
 
     def repaired(self, repair: MeshRepair) -> InteriorDisplacer:
         """Return the same after the repair of the whole mesh, with its nodes in the skin moved."""

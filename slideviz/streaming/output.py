@@ -33,7 +33,7 @@ from slideviz.streaming.quality import (
     require_consistent_orientation,
 )
 from slideviz.streaming.source import FileSource, PointTable, ZoneSource
-from slideviz.streaming.stream_input import StreamInput, text_blocks
+from slideviz.streaming.stream_input import StreamInput, patched_text
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool
@@ -149,8 +149,7 @@ class Output:
             partial.note([None if at in mine else one for at, one in enumerate(partial.sums)])
         # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
-        steps = displacer and displacer.without_cells()
-        arguments = *self.zones[zone].undeformed, partial.path, steps, synced
+        arguments = *self.zones[zone].undeformed, partial.path, displacer, synced
         with (
             self._timer.phase("evaluate") as tick,
             self._ranks.sharing(point_writer, *arguments) as do,
@@ -175,8 +174,8 @@ class Output:
             arguments = self._stack, self._path.parent, count, self._metric
             self._collectors = [QualityCollector(*arguments) for _ in range(2)]
         collector = RunCollector(*(one.of_cells(self._cells[zone]) for one in self._collectors))
-        todo, steps = parts(source.n_cells), displacer and displacer.without_cells()
-        workers = *source.undeformed, partial.path, self._metric, listed, steps
+        todo = parts(source.n_cells)
+        workers = *source.undeformed, partial.path, self._metric, listed, displacer
         with (
             self._timer.phase("quality") as tick,
             self._ranks.sharing(cell_measurer, *workers) as do,
@@ -212,12 +211,14 @@ class Output:
         if not self._is_text:
             return
         partial, written = self._opened(), 0
-        if not self._input.texts:
-            tables = [PointTable(one.file.of(partial.file), one.place) for one in self.zones]
-            moved = [replace(z, points=t) for z, t in zip(self.zones, tables, strict=True)]
-            blocks = text_of_binary(moved, Path(os.path.realpath(self._path)).parent)
+        moved = [
+            replace(z, points=PointTable(z.file.of(partial.file), z.place), base=z.points)
+            for z in self.zones
+        ]
+        if self._input.texts:
+            blocks = patched_text(self._input.texts, moved, boxes)
         else:
-            blocks = text_blocks(self._input, self.zones, partial.path, boxes)
+            blocks = text_of_binary(moved, Path(os.path.realpath(self._path)).parent)
         size = self._input.text_size([zone.place for zone in self.zones])
         with self._timer.phase("write") as tick:
             with atomic_write(self._path, replaces=self._replaces) as file:

@@ -31,20 +31,11 @@ Chosen = Callable[[ElementBlock, IntArray], NDArray[np.bool_]]
 class FileRegions:
     """A deformed mesh in a file, of which one region is in memory at a time.
 
-    Parameters
-    ----------
-    source : ZoneSource
-        The mesh, and the undeformed points.
-    file : int
-        Descriptor of the file of its points, to which moved ones are written.
-    skin : Mesh
-        The boundary and the cells at it.
-    freedom : Freedom
-        Of the nodes of the skin.
-    facets : (f, 2 or 4)
-        The sides that are on a boundary, by nodes of the skin.
-    going_on : callable
-        Called with each block of cells; what it raises ends the work.
+    ``source``: the mesh, and the undeformed points.
+    ``file``: descriptor of the file of its points, to which moved ones are written.
+    ``skin`` and ``freedom``: the boundary and the cells at it, and the freedom of its nodes.
+    ``facets`` (f, 2 or 4): the sides that are on a boundary, by nodes of the skin.
+    ``going_on``: called with each block of cells; what it raises ends the work.
     """
 
     def __init__(
@@ -160,16 +151,10 @@ def mend_file(
 ) -> MeshRepair:
     """Return a streamed mesh with its bad cells mended in the file.
 
-    Parameters
-    ----------
-    source, file
-        As of `FileRegions`.
-    skin, setup : Mesh, Setup
-        The undeformed skin, with its cells, and its setup.
-    points : (k, d)
-        Of the deformed skin.
-    before, after : Quality
-        Of all cells, undeformed and deformed.
+    ``source`` and ``file``: as of `FileRegions`.
+    ``skin`` and ``setup``: the undeformed skin, with its cells, and its setup.
+    ``points`` (k, d): of the deformed skin.
+    ``before`` and ``after``: quality of all cells, undeformed and deformed.
     """
     below, count = min(case.repair_below, before.min), source.n_cells
     parts = [slice(first, first + CELLS) for first in range(0, count, CELLS)]

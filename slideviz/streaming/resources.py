@@ -9,10 +9,9 @@ from pathlib import Path
 
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
-from slideviz.formats.binary_copy import BinaryLayout
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.text import find_texts
-from slideviz.formats.su2b.layout import ZonePlace, open_zones
+from slideviz.formats.su2b.layout import ZonePlace
 from slideviz.formats.su2b.partial import names_of
 from slideviz.formats.table import format_of
 from slideviz.solver.deform import free_memory
@@ -78,26 +77,19 @@ def text_size(places: Sequence[ZonePlace]) -> int:
     return sum(8 * (one.cells.length + (2 * one.dim + 1) * one.n_points) for one in places)
 
 
-def bytes_of_text(layouts: Sequence[BinaryLayout], is_text: bool, later: int) -> int:
-    """Return the most bytes on the disk at a time in the run of a text mesh.
+def bytes_of_run(
+    places: Sequence[ZonePlace], width: int, size: int, copy: int, *, is_text: bool, later: int
+) -> int:
+    """Return the most bytes on the disk at a time in a run.
 
+    ``places`` and ``width``: of the zones in the binary file, and of its indices.
+    ``size`` and ``copy``: bytes of the output, and of the binary copy of a text.
     ``is_text``: whether the output is a text. ``later``: bytes for each cell that the caller writes
     afterwards.
     """
-    size = layouts[-1].end
-    result = layouts[0].text.lines.raw.size if is_text else size
-    points = sum(one.markers - one.points for one in layouts) if is_text else 0
-    cells = sum(one.text.n_cells for one in layouts)
-    return result + CELL_BYTES * cells + max(size + points, later * cells)
-
-
-def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
-    """Return the peak disk space in bytes of a run of a binary mesh; see `bytes_of_text`."""
-    with open_zones(path, zone) as (source, places):
-        result = text_size(places) if is_text else source.size
-        points = sum(is_text * one.n_points * source.point(one.dim).itemsize for one in places)
+    points = sum(is_text * one.n_points * (8 * one.dim + width) for one in places)
     cells = sum(one.cells.count for one in places)
-    return result + CELL_BYTES * cells + max(points, later * cells)
+    return size + CELL_BYTES * cells + max(copy + points, later * cells)
 
 
 def reusable_bytes(output: Path) -> int:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, Part, sealed
 from slideviz.mesh.zones import join_zones
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick, equal_shares
+from slideviz.system.threads import Tick, equal_shares, progress_share
 
 
 @contextmanager
@@ -51,6 +51,7 @@ def naming_text(text: Text, path: Path) -> Iterator[None]:
         raise MeshError(message) from problem
 
 
+T = TypeVar("T")
 Index = slice | IntArray  # numbers of cells, as an index of an array
 
 
@@ -112,9 +113,8 @@ def _skin_of_zone(
     nodes = np.flatnonzero(used)
     with ranks.sharing(_boundary_cell_reader, path, place.number, nodes) as do:
         tasks = range(0, place.cells.count, BLOCK)
-        cells, ids = _join_boundary_cells(
-            source, place, map(_counting_progress(progress, 0.0, 0.6, len(tasks)), do(tasks))
-        )
+        blocks = _ticking(do(tasks), progress_share(progress, 0.0, 0.6), len(tasks))
+        cells, ids = _join_boundary_cells(source, place, blocks)
     used[cells.connectivity] = True
     numbers = np.flatnonzero(used)
     with ranks.sharing(_point_reader, path, place.number) as do:
@@ -123,8 +123,8 @@ def _skin_of_zone(
         parts = [
             (first, numbers[a:b]) for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
         ]
-        blocks = map(_counting_progress(progress, 0.6, 1.0, len(parts)), do(parts))
-        numbers, points = _join_points(source, place, numbers, blocks)
+        found = _ticking(do(parts), progress_share(progress, 0.6), len(parts))
+        numbers, points = _join_points(source, place, numbers, found)
     return Mesh(
         points,
         _renumbered(cells, numbers),
@@ -148,20 +148,11 @@ def without_cells(skin: Mesh) -> Mesh:
     )
 
 
-def _counting_progress(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
-    """Return a function that returns its argument, and with each of ``count`` calls ticks.
-
-    The argument of ``tick`` rises from ``begin`` to ``end``.
-    """
-    done = 0
-
-    def count_and_return(result: Any) -> Any:
-        nonlocal done
-        done += 1
-        tick(begin + (end - begin) * done / count)
-        return result
-
-    return count_and_return
+def _ticking(results: Iterator[T], tick: Tick, count: int) -> Iterator[T]:
+    """Yield ``count`` results, and tick after each."""
+    for k, result in enumerate(results, 1):
+        tick(k / count)
+        yield result
 
 
 @dataclass(frozen=True, eq=False)

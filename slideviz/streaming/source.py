@@ -13,7 +13,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,28 +126,6 @@ def cut_cells(
     )
 
 
-class MeshSource(Protocol):
-    """The cells of a mesh, and perhaps of the undeformed one, in blocks."""
-
-    @property
-    def mesh(self) -> Mesh:
-        """Return the part of the mesh in memory: all of it, or its boundary and the cells at it."""
-
-    @property
-    def n_cells(self) -> int:
-        """Return the number of its cells."""
-
-    @property
-    def n_points(self) -> int:
-        """Return the number of its points."""
-
-    def blocks(self, tick: Tick) -> Iterator[CellBlock]:
-        """Yield all cells, block by block."""
-
-    def types(self, ids: IntArray) -> NDArray[np.uint8]:
-        """Return the VTK types (k,) of the cells ``ids`` (k,)."""
-
-
 @dataclass(frozen=True, eq=False)
 class MemorySource:
     """A mesh in memory: one block."""
@@ -193,6 +170,10 @@ class PointTable:
         """Return points as they are in the file: coordinates ``x`` (count, d) and more."""
         kind = self.file.point(self.place.dim)
         return self.file.array(self.byte(first), count, kind, "the points")
+
+    def coordinates(self, rows: slice) -> FloatArray:
+        """Return the points (m, d) of consecutive nodes."""
+        return np.ascontiguousarray(self.rows(rows.start, rows.stop - rows.start)["x"], float)
 
     def at(self, nodes: IntArray) -> FloatArray:
         """Return the points (k, d) of ascending nodes (k,); neighbours are read in one piece."""
@@ -368,6 +349,9 @@ class FileSource:
         mine = [(zone, some[(some >= 0) & (some < zone.n_cells)]) for zone, some in shifted]
         block = join_blocks(zone.cells(some) for zone, some in mine if len(some))
         return block.take(np.searchsorted(block.ids, ids))
+
+
+MeshSource = MemorySource | FileSource
 
 
 def has_cells_of(mesh: Zone, other: Zone) -> bool:

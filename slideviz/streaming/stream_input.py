@@ -11,29 +11,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from slideviz.errors import MeshError, printable
 from slideviz.formats.binary_copy import binary_layouts, write_layouts
 from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
 from slideviz.formats.source import open_source
-from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.text import Text, find_texts
-from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
+from slideviz.formats.su2.write import PointChange, patched_blocks, require_text_names
 from slideviz.formats.su2b.layout import ZonePlace, open_zones
 from slideviz.formats.su2b.partial import BINARY, checksums, finish_head, partial_file
 from slideviz.formats.su2b.write import require_binary_names
 from slideviz.formats.table import format_of
 from slideviz.mesh.model import Mesh
 from slideviz.streaming.resources import (
-    bytes_of_binary,
-    bytes_of_text,
+    bytes_of_run,
     require_disk_space,
     reusable_bytes,
     text_size,
 )
 from slideviz.streaming.skin import naming_text, read_skin
-from slideviz.streaming.source import PointTable, ZoneSource
+from slideviz.streaming.source import ZoneSource
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
@@ -109,8 +105,8 @@ def open_read_only(
     with draft(folder) as copy:
         try:
             open_temporary(copy, new=True).close()
-            require_disk_space(copy, path, layouts[-1].end)
-            os.truncate(copy, layouts[-1].end)
+            require_disk_space(copy, path, layouts[-1].place.end)
+            os.truncate(copy, layouts[-1].place.end)
             head = write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED))
             with open_temporary(copy) as file:
                 file.write(head)
@@ -149,9 +145,15 @@ def open_for_run(
     ``later``: bytes for each cell that the caller writes beside the output afterwards.
     """
     if require_su2(path, file_format) == "su2b":
+        with open_zones(path, zone) as (source, places):
+            size = text_size(places) if is_text else source.size
         if is_text:
-            warn(_lost_in_text(output, path, zone))
-        size = bytes_of_binary(path, zone, is_text=is_text, later=later)
+            name = printable(path.name)
+            for place in places:
+                require_text_names(name, (marker.name for marker in place.markers))
+            lost = [OTHER_ZONES] * (source.zones > len(places))
+            warn(sentence_of_lost(output, name, lost, ".su2b"))
+        size = bytes_of_run(places, source.width, size, 0, is_text=is_text, later=later)
         require_disk_space(output, output, size - reusable_bytes(output))
         yield StreamInput(path, zone)
         return
@@ -162,14 +164,17 @@ def open_for_run(
             require_binary_names(name, (m.name for m in text.zone.markers))
         warn(sentence_of_lost(output, name, lost_of_texts(texts)))
     layouts, left = binary_layouts(texts, is_result=not is_text), reusable_bytes(output)
-    state, size = path.stat(), layouts[-1].end
+    state, size, width = path.stat(), layouts[-1].place.end, layouts[0].conn.itemsize
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {size}"
     with partial_file(output, size, about, resume=resume, more=BINARY) as copy:
         is_reused = (
             copy.done > 0
             and checksums(copy.path, progress_share(tick, SCANNED, COPIED), ranks) == copy.sums
         )
-        require_disk_space(output, output, bytes_of_text(layouts, is_text, later) - left)
+        places = tuple(one.place for one in layouts)
+        result = state.st_size if is_text else size
+        needed = bytes_of_run(places, width, result, size, is_text=is_text, later=later)
+        require_disk_space(output, output, needed - left)
         if not is_reused:
             head = write_layouts(layouts, copy.path, progress_share(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
@@ -179,46 +184,18 @@ def open_for_run(
         copy.remove()
 
 
-def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
-    """Return a sentence on the other zones of a binary mesh, which a text lacks; "" if none.
-
-    Raises MeshError if the name of a boundary cannot be written in a text.
-    """
-    with open_zones(path, zone) as (source, places):
-        name = printable(path.name)
-    for place in places:
-        require_text_names(name, (marker.name for marker in place.markers))
-    return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > len(places)), ".su2b")
-
-
-def text_blocks(
-    mesh_input: StreamInput, zones: Sequence[ZoneSource], after: Path, boxes: Sequence[bytes | None]
+def patched_text(
+    texts: Sequence[Text], moved: Sequence[ZoneSource], boxes: Sequence[bytes | None]
 ) -> Iterator[bytes]:
-    """Yield the text of ``mesh_input`` block by block, with the coordinates in the file ``after``.
+    """Yield a text, block by block, with the points of its zones ``moved`` in its binary copy.
 
-    ``zones``: of the binary copy of the text.
-    ``after``: a file with the new points where the binary copy has the old ones.
     ``boxes``: of each zone, boxes for free-form deformation that replace those in the text; None
     keeps the latter.
     """
-    raw, edits = mesh_input.texts[0].lines.raw, []
-    pieces: dict[Piece, PointTable] = {}
-    for text, zone, ffd in zip(mesh_input.texts, zones, boxes, strict=True):
-        pieces |= dict.fromkeys(text.zone.points, zone.points)
-        if ffd is not None:
-            end = text.lines.byte(text.zone.bounds.end)
-            edits += box_edits(raw, text.unknown, end, ffd)
-    with mesh_input.path.open("rb") as old, after.open("rb") as new:
-
-        def rows(piece: Piece) -> bytes:
-            table = pieces[piece]
-            at, end = table.byte(piece.row), table.byte(piece.row + piece.rows)
-            kind = table.file.point(table.place.dim)
-            before, now = (
-                np.frombuffer(os.pread(file.fileno(), end - at, at), kind)["x"].astype(np.float64)
-                for file in (old, new)
-            )
-            return moved_rows(raw, piece, before, now)
-
-        ordered = tuple(sorted(pieces, key=lambda piece: piece.begin))
-        yield from patched_blocks(raw, ordered, rows, sorted(edits))
+    changes = []
+    for text, zone, ffd in zip(texts, moved, boxes, strict=True):
+        assert zone.base is not None
+        tables = zone.base.coordinates, zone.points.coordinates
+        end = text.lines.byte(text.zone.bounds.end)
+        changes.append(PointChange(text.zone.points, *tables, text.unknown, end, ffd))
+    yield from patched_blocks(texts[0].lines.raw, changes)

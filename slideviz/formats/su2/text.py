@@ -42,57 +42,6 @@ _NAME_IT = "; name the marker"
 _COUNT_THEM = "; add it with the number of elements"
 
 
-class SectionRows:
-    """Finds the rows of sections of a file, and raises for wrong counts of them."""
-
-    def __init__(self, lines: Lines) -> None:
-        self.lines = lines
-        self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
-
-    def none(self, section: KeywordBlock) -> None:
-        """Raise MeshError if a section that should have no rows of numbers has any."""
-        rows = self.lines.pieces(section.line, section.stop)
-        if rows:
-            raise self.lines.error(
-                self.lines.row(rows, 0),
-                f"numbers stand here after {section.key}= {show(section.value)}, where none "
-                "belong; remove the line or restore the keyword before it",
-            )
-
-    def counted(self, section: KeywordBlock, what: str) -> Rows:
-        """Return the rows of numbers of a section, as many as its keyword line says.
-
-        Raises MeshError if there are more or fewer rows, or other text among them.
-        ``what``: what is on the rows, for messages: ``points``.
-        """
-        count = count_of(self.lines, section)
-        rows = self.lines.pieces(section.line, section.stop)
-        found = number_of(rows)
-        at = int(np.searchsorted(self.text_lines, section.line, "right"))
-        text = int(self.text_lines[at]) if at < len(self.text_lines) else section.stop
-        before = number_of(self.lines.pieces(section.line, text))
-        if text < section.stop and before < count:
-            word = (self.lines.line(text).split() or [b""])[0]
-            raise self.lines.error(
-                text,
-                f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
-                f"on line {section.line + 1}); correct it",
-            )
-        if found < count:
-            raise self.lines.error(
-                min(section.stop, len(self.lines) - 1),
-                f"only {found} {what} precede this line, but {section.key}= {count} (line "
-                f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
-            )
-        if found > count:
-            raise self.lines.error(
-                self.lines.row(rows, count),
-                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
-                f"says: {found}; correct the count",
-            )
-        return rows
-
-
 @dataclass(frozen=True, eq=False)
 class MarkerRows:
     """A boundary: its name, the line of its MARKER_TAG, and the rows of its elements."""
@@ -154,7 +103,7 @@ class _Walk:
         self.lines = lines
         self.sections = sections
         self.bounds = bounds
-        self.rows = SectionRows(lines)
+        self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
     def zone(self) -> TextZone:
         """Return where the parts are; raise MeshError for a mistake."""
@@ -164,15 +113,15 @@ class _Walk:
             raise self.lines.error(
                 heads["NDIME"].line, f"NDIME= {dim} is not possible; write 2 or 3"
             )
-        self.rows.none(heads["NDIME"])
-        elements = self.rows.counted(heads["NELEM"], "elements")
-        points = self.rows.counted(heads["NPOIN"], "points")
+        self._require_no_rows(heads["NDIME"])
+        elements = self._counted(heads["NELEM"], "elements")
+        points = self._counted(heads["NPOIN"], "points")
         for key, rows in (("NELEM", elements), ("NPOIN", points)):
             if not rows:
                 raise self.lines.error(
                     heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
                 )
-        self.rows.none(heads["NMARK"])
+        self._require_no_rows(heads["NMARK"])
         markers, sends, unknown = self._walk()
         self._check_markers(heads["NMARK"], markers, len(sends))
         return TextZone(
@@ -189,6 +138,49 @@ class _Walk:
                 if part.spelt in ALIASES
             ),
         )
+
+    def _require_no_rows(self, section: KeywordBlock) -> None:
+        """Raise MeshError if a section that should have no rows of numbers has any."""
+        rows = self.lines.pieces(section.line, section.stop)
+        if rows:
+            raise self.lines.error(
+                self.lines.row(rows, 0),
+                f"numbers stand here after {section.key}= {show(section.value)}, where none "
+                "belong; remove the line or restore the keyword before it",
+            )
+
+    def _counted(self, section: KeywordBlock, what: str) -> Rows:
+        """Return the rows of numbers of a section, as many as its keyword line says.
+
+        Raises MeshError if there are more or fewer rows, or other text among them.
+        ``what``: what is on the rows, for messages: ``points``.
+        """
+        count = count_of(self.lines, section)
+        rows = self.lines.pieces(section.line, section.stop)
+        found = number_of(rows)
+        at = int(np.searchsorted(self.text_lines, section.line, "right"))
+        text = int(self.text_lines[at]) if at < len(self.text_lines) else section.stop
+        before = number_of(self.lines.pieces(section.line, text))
+        if text < section.stop and before < count:
+            word = (self.lines.line(text).split() or [b""])[0]
+            raise self.lines.error(
+                text,
+                f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
+                f"on line {section.line + 1}); correct it",
+            )
+        if found < count:
+            raise self.lines.error(
+                min(section.stop, len(self.lines) - 1),
+                f"only {found} {what} precede this line, but {section.key}= {count} (line "
+                f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
+            )
+        if found > count:
+            raise self.lines.error(
+                self.lines.row(rows, count),
+                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
+                f"says: {found}; correct the count",
+            )
+        return rows
 
     def _only(self, key: str) -> KeywordBlock:
         """Return the section of a key; raise MeshError if there is none or a second one."""
@@ -219,7 +211,7 @@ class _Walk:
             if section.key == "MARKER_TAG":
                 name = self._name(section)
                 head, domain, at = self._marker_head(section, at, name == SEND_RECEIVE)
-                rows = self.rows.counted(head, f"elements of marker {name}")
+                rows = self._counted(head, f"elements of marker {name}")
                 if name == SEND_RECEIVE:
                     sends.append(SendRows(section.line, head.stop, domain, rows))
                 else:
@@ -243,7 +235,7 @@ class _Walk:
         whether it is a SEND_RECEIVE marker. SEND_TO is empty where there is none; the next section
         is an index. Raises MeshError if MARKER_ELEMS does not follow.
         """
-        self.rows.none(tag)
+        self._require_no_rows(tag)
         following = self.sections[at] if at < len(self.sections) else None
         if following is None or following.key != "MARKER_ELEMS":
             raise self.lines.error(
@@ -254,7 +246,7 @@ class _Walk:
         at, domain = at + 1, b""
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
             # The elements follow the SEND_TO line.
-            self.rows.none(following)
+            self._require_no_rows(following)
             head = self.sections[at]
             following = KeywordBlock(following.key, following.value, head.line, head.stop)
             at, domain = at + 1, head.value

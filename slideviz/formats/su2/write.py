@@ -6,6 +6,7 @@ Numbers are written with as few digits as identify the float64, so that nothing 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -96,54 +97,64 @@ def _only_points_differ(mesh: Mesh) -> bool:
 
 
 def _patched(zones: Sequence[Mesh]) -> Iterator[bytes]:
-    """Yield the file of zones with all coordinates replaced that differ in any bit, and new boxes.
-
-    Each zone has a `Document`.
-    """
-    pieces: list[tuple[Piece, Mesh, Document]] = []
-    edits: list[Edit] = []
-    for zone in zones:
-        document = zone.origin
-        assert isinstance(document, Document)
-        pieces += [(piece, zone, document) for piece in document.rows]
-        if document.ffd is not None:
-            edits += box_edits(document.raw, document.unknown, document.zone[1], document.ffd)
-    at = {piece.begin: (zone, document) for piece, zone, document in pieces}
-
-    def text(piece: Piece) -> bytes:
-        zone, document = at[piece.begin]
-        mine = slice(piece.row, piece.row + piece.rows)
-        return moved_rows(document.raw, piece, document.points[mine], zone.points[mine])
-
-    rows = tuple(sorted((each[0] for each in pieces), key=lambda piece: piece.begin))
-    yield from patched_blocks(pieces[0][2].raw, rows, text, sorted(edits))
+    """Yield the file of zones, each with a `Document`, with new points and boxes."""
+    documents = [zone.origin for zone in zones if isinstance(zone.origin, Document)]
+    changes = [
+        PointChange(
+            *(read.rows, read.points.__getitem__, zone.points.__getitem__),
+            *(read.unknown, read.zone[1], read.ffd),
+        )
+        for zone, read in zip(zones, documents, strict=True)
+    ]
+    yield from patched_blocks(documents[0].raw, changes)
 
 
-def patched_blocks(
-    raw: Source, rows: Rows, rows_text: Callable[[Piece], bytes], edits: Sequence[Edit]
-) -> Iterator[bytes]:
-    """Yield a file, block by block, with new texts for the pieces of points, and with ``edits``.
+@dataclass(frozen=True, eq=False)
+class PointChange:
+    """What is new in a zone of a text: its points, and perhaps its boxes."""
 
-    ``rows_text`` returns the new text of a piece of ``rows``. Raises MeshError if the file was
-    changed since it was read.
+    rows: Rows  # of the points
+    before: Callable[[slice], FloatArray]
+    after: Callable[[slice], FloatArray]
+    """`before`, `after`: return the points (m, d) of some rows, as read and as to be written."""
+    unknown: Sequence[tuple[int, int]]
+    end: int
+    """`unknown`, `end`: first byte and end of each unknown section, and the end of the zone."""
+    ffd: bytes | None  # the new boxes for free-form deformation; None: those it had
+
+
+def patched_blocks(raw: Source, changes: Sequence[PointChange]) -> Iterator[bytes]:
+    """Yield a file, block by block, with new boxes and those coordinates that differ in any bit.
+
+    Raises MeshError if the file was changed since it was read.
     """
     raw.require_same()
+    edits = sorted(
+        edit
+        for one in changes
+        if one.ffd is not None
+        for edit in _box_edits(raw, one.unknown, one.end, one.ffd)
+    )
+    change = {piece: one for one in changes for piece in one.rows}
     done = 0
     tasks: list[tuple[int, int] | Piece | bytes] = []
-    for piece in rows:
+    for piece in sorted(change, key=lambda piece: piece.begin):
         tasks += [*_around(edits, done, piece.begin), piece]
         done = piece.end
 
     def text(task: tuple[int, int] | Piece | bytes) -> bytes:
         if isinstance(task, bytes):
             return task
-        return raw[slice(*task)] if isinstance(task, tuple) else rows_text(task)
+        if isinstance(task, tuple):
+            return raw[slice(*task)]
+        one, rows = change[task], slice(task.row, task.row + task.rows)
+        return _moved_rows(raw, task, one.before(rows), one.after(rows))
 
     yield from ordered_map(text, [*tasks, *_around(edits, done, raw.size + 1)])
     raw.require_same()
 
 
-def box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
+def _box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
     """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
 
     If the zone has none, ``ffd`` is put at its end. ``unknown``: first byte and end of each unknown
@@ -169,7 +180,7 @@ def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
     return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
 
 
-def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
+def _moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
     """Return the text of a piece of points with the coordinates that changed replaced.
 
     Raises MeshError if the file was changed. ``before`` and ``now`` (m, d) float64: the points of
