@@ -209,11 +209,6 @@ class Part:
     n_cells: int
     """`n_points`, `n_cells`: numbers of points and cells of the whole mesh."""
 
-    @property
-    def sizes(self) -> tuple[int, int]:
-        """Return the numbers of points and cells of the whole mesh."""
-        return self.n_points, self.n_cells
-
 
 @dataclass(frozen=True, eq=False)
 class ZoneInterface:

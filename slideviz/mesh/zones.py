@@ -156,7 +156,7 @@ def spellings(mesh: Mesh) -> Mapping[str, str]:
 def _part(zones: Sequence[Mesh]) -> tuple[Part | None, list[int], list[int]]:
     """Return the part of all zones of which parts are in memory; the first numbers of each zone."""
     sizes = [
-        (len(zone.points), len(zone.cells)) if (one := zone.part) is None else one.sizes
+        (one.n_points, one.n_cells) if (one := zone.part) else (len(zone.points), len(zone.cells))
         for zone in zones
     ]
     (*points, n_points), (*cells, n_cells) = (

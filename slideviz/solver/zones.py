@@ -279,7 +279,7 @@ def joined_repairs(
         parts = [(place, one.mesh.part) for place, one in done if one.mesh.part is not None]
         points = np.concatenate([each.points + place.first_point for place, each in parts])
         cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
-        part = Part(sealed(points), sealed(cells), *mesh.part.sizes)
+        part = Part(sealed(points), sealed(cells), mesh.part.n_points, mesh.part.n_cells)
         bare = [replace(one.mesh, markers=()) for _, one in done]
         now = replace(join_zones(bare), part=part)
     return MeshRepair(

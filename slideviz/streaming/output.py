@@ -109,7 +109,9 @@ class Output:
 
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
         """Take those parts as not done whose bytes do not have their checksum."""
-        sums = partial.sums = partial.sums or [None] * len(self._parts)
+        if len(partial.sums) != len(self._parts):
+            partial.sums = [None] * len(self._parts)
+        sums = partial.sums
         for k, zone in enumerate(self.zones):
             done = [at for at in self._parts_of(k) if sums[at] is not None]
             todo = [self._parts[at][1] for at in done]

@@ -109,6 +109,7 @@ class CellCounts:
     """Counts the cells of a mesh by their VTK types, and its points that no cell uses."""
 
     def __init__(self, source: MeshSource) -> None:
+        self.points = source.n_points  # how many the mesh has
         self._used = np.zeros(source.n_points, bool)
         self._types = np.zeros(256, np.int64)
 
@@ -117,11 +118,6 @@ class CellCounts:
         self._used[block.nodes[block.mesh.cells.nodes]] = True
         for vtk, (ids, _) in block.mesh.cells.by_type.items():
             self._types[vtk] += len(ids)
-
-    @property
-    def points(self) -> int:
-        """Return the number of points."""
-        return len(self._used)
 
     @property
     def unused(self) -> int:

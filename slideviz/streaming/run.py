@@ -291,14 +291,10 @@ class _ZoneRuns:
     def _mend(self, zone: int, case: Case, skin: Mesh, setup: Setup) -> None:
         displacer = self._displacers[zone]
         found = self._measured[zone] = self._out.measure(zone, self._listed, displacer)
-        points, quality = displacer.steps[-1].mesh.points, (found.before, found.after)
-        before, after = (one.quality() for one in quality)
+        points = displacer.steps[-1].mesh.points
+        numbers = skin, setup, points, found.before.quality(), found.after.quality()
         done = self._out.change(
-            zone,
-            "repair",
-            lambda at, file, tick: mend_file(
-                case, at, file, tick, skin, setup, points, before, after
-            ),
+            zone, "repair", lambda at, file, tick: mend_file(case, at, file, tick, *numbers)
         )
         self._displacers[zone] = displacer.repaired(done)
         if len(done.nodes):
