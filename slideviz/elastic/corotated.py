@@ -24,7 +24,13 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from slideviz.elastic.stiffness import POISSON, ReferenceShape, ShapeBlock, cell_volumes
+from slideviz.elastic.stiffness import (
+    POISSON,
+    ReferenceShape,
+    ShapeBlock,
+    by_node,
+    cell_volumes,
+)
 from slideviz.mesh.jacobians import add3, cross3, dot3
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.polar import rotation, spin
@@ -145,13 +151,8 @@ class Corotated:
 
     @cached_property
     def _corners(self) -> tuple[IntArray, IntArray]:
-        """Return indptr (n + 1,) and the corners of all elements that are each node, in order."""
         nodes = np.concatenate([part.nodes.ravel() for part in self.parts])
-        indptr = np.zeros(len(self.points) + 1, np.int64)
-        np.cumsum(np.bincount(nodes, minlength=len(self.points)), out=indptr[1:])
-        out: IntArray = np.empty(len(nodes), np.int32 if len(nodes) < 2**31 else np.int64)
-        invert(nodes, indptr[:-1].copy(), out)
-        return indptr, out
+        return by_node(nodes, len(self.points))
 
 
 def _turn_part(
@@ -175,14 +176,6 @@ def _add_part(
 def _plain(values: FloatArray) -> FloatArray:
     """Return the values as those of a mesh are, so that the loops are compiled once."""
     return sealed(np.ascontiguousarray(values))
-
-
-@njit(**OPTIONS)
-def invert(nodes, at, out):  # type: ignore[no-untyped-def]
-    """Write the places of each node in ``nodes`` (m,) to out (m,), from ``at`` (n,) on."""
-    for k in range(len(nodes)):
-        out[at[nodes[k]]] = k
-        at[nodes[k]] += 1
 
 
 @njit(**OPTIONS)

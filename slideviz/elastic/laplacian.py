@@ -26,10 +26,10 @@ from numba import prange
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 
-from slideviz.elastic.corotated import Corotated, invert
+from slideviz.elastic.corotated import Corotated
 from slideviz.elastic.forces import _at
 from slideviz.elastic.multigrid import RIDGE
-from slideviz.elastic.stiffness import ShapeBlock
+from slideviz.elastic.stiffness import ShapeBlock, by_node
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
@@ -85,10 +85,9 @@ class LaplacianCycle:
     ) -> LaplacianCycle:
         """Return the cycle of an elastic body.
 
-        ``place`` (n,) is the number of each node's unknown, -1
-        for known nodes. ``held`` (k, d): which components of the unknowns stay zero. Rows of
-        ``axes`` (k, d, d) or (d, d) are the axes of these components: orthonormal, (d, d) for
-        Cartesian ones.
+        ``place`` (n,) is the number of each node's unknown, -1 for known nodes.
+        ``held`` (k, d): which components of the unknowns stay zero. Rows of ``axes`` (k, d, d) or
+        (d, d) are the axes of these components: orthonormal, (d, d) for Cartesian ones.
         """
         matrix = laplacian(body, place, len(held))
         columns = {column.tobytes(): column for column in held.T}  # each once
@@ -224,10 +223,7 @@ def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
         first += m * a * a
         in_parts(partial(_gradients_part, sealed(body.points), part, modulus, mine), m)
     corners = np.concatenate([place[part.nodes].ravel() for part in body.parts]).astype(np.int32)
-    starts = np.zeros(count + 2, np.int64)
-    np.cumsum(np.bincount(corners + 1, minlength=count + 1), out=starts[1:])
-    order = np.empty(len(corners), np.int32 if len(corners) < 2**31 else np.int64)
-    invert(corners + 1, starts[:-1].copy(), order)
+    starts, order = by_node(corners + 1, count + 1)
     graph = starts[1:], order, corners, sizes
     indptr = np.zeros(count + 1, np.int32)
     with one_at_a_time(len(corners) * 10):

@@ -362,3 +362,20 @@ def _into(turn, block, half, left):  # type: ignore[no-untyped-def]
     for i in range(d):
         for j in range(d):
             block[i, j] = half[i, j]
+
+
+def by_node(nodes: np.ndarray, count: int) -> tuple[IntArray, IntArray]:
+    """Return indptr (count + 1,) and the places in ``nodes`` (m,) of each node, in order."""
+    indptr = np.zeros(count + 1, np.int64)
+    np.cumsum(np.bincount(nodes, minlength=count), out=indptr[1:])
+    out: IntArray = np.empty(len(nodes), np.int32 if len(nodes) < 2**31 else np.int64)
+    _invert(nodes, indptr[:-1].copy(), out)
+    return indptr, out
+
+
+@njit(**OPTIONS)
+def _invert(nodes, at, out):  # type: ignore[no-untyped-def]
+    """Write the places of each node in ``nodes`` (m,) to out (m,), from ``at`` (n,) on."""
+    for k in range(len(nodes)):
+        out[at[nodes[k]]] = k
+        at[nodes[k]] += 1

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Cells, IntArray, sealed
+from slideviz.mesh.model import Cells, IntArray, offsets_of, sealed
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
@@ -50,7 +50,7 @@ class CellsAround:
 @weak_cache
 def sides_of(cells: Cells) -> Sides:
     """Return the sides of cells with their neighbours, cached as long as the cells live."""
-    first = np.concatenate(([0], np.cumsum(SIDES[cells.types])))
+    first = offsets_of(SIDES[cells.types])
     n_nodes = int(cells.connectivity.max(initial=-1)) + 1
     owner = np.repeat(np.arange(len(cells)), np.diff(first))
     table = cells.types, cells.offsets, cells.connectivity, SIDE_NODES, first, owner

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.mesh.model import column_bounds, sorted_nodes
+from slideviz.mesh.model import column_bounds, ranges, sorted_nodes
 from slideviz.mesh.planes import FacetSimplices, Planes, line_normals, normals
 
 if TYPE_CHECKING:
@@ -222,7 +222,7 @@ def _node_through(
     begin = np.searchsorted(edges[:, 0], touches[:, 0], "left")
     count = np.searchsorted(edges[:, 0], touches[:, 0], "right") - begin
     row = np.repeat(np.arange(len(touches)), count)
-    ends = edges[np.arange(len(row)) + np.repeat(begin - np.cumsum(count) + count, count), 1]
+    ends = edges[ranges(begin, count), 1]
     height = planes.heights(points[ends][:, None], touches[row, 1])[:, 0]
     above = np.bincount(row[height > planes.margin], minlength=len(touches)) > 0
     below = np.bincount(row[height < -planes.margin], minlength=len(touches)) > 0

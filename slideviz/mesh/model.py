@@ -42,6 +42,16 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     return array
 
 
+def offsets_of(sizes: ArrayLike) -> IntArray:
+    """Return the offsets (k + 1,) of parts with ``sizes`` (k,), one after the other."""
+    return np.concatenate(([0], np.cumsum(sizes)))
+
+
+def ranges(first: IntArray, sizes: IntArray) -> IntArray:
+    """Return first, first + 1, ... of each of the ranges with ``first`` (k,) and ``sizes`` (k,)."""
+    return np.arange(sizes.sum()) + np.repeat(first - np.cumsum(sizes) + sizes, sizes)
+
+
 def column_bounds(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the smallest and the largest coordinates (d,), (d,) of points (n, d)."""
     # One column after the other is five times as fast as all at once.
@@ -90,7 +100,7 @@ class Cells:
         if np.any(counts == 0):
             raise MeshError(f"element type {ids[np.argmin(counts)]} is not supported")
         if len(counts) == len(ids):
-            offsets = np.concatenate(([0], np.cumsum(counts)))
+            offsets = offsets_of(counts)
         else:  # all of one type
             offsets = np.arange(0, counts[0] * len(ids) + 1, counts[0])
         flat = frozen_array(connectivity, np.int64)
@@ -169,9 +179,7 @@ class Cells:
         if which.dtype == bool:
             entries = np.repeat(which, sizes)
         else:
-            sizes = sizes[which]
-            begins = self.offsets[which] - (np.cumsum(sizes) - sizes)
-            entries = np.repeat(begins, sizes) + np.arange(sizes.sum())
+            entries = ranges(self.offsets[which], sizes[which])
         return Cells.from_types(self.types[which], self.connectivity[entries])
 
     def same_as(self, other: Cells) -> bool:

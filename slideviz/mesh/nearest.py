@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, ranges
 from slideviz.system.threads import cores
 
 
@@ -105,7 +105,7 @@ def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray
     if count.sum() > CROWDED * (len(points) + len(at)):
         return None
     row = np.repeat(np.arange(len(at)), count)
-    number = order[np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)]
+    number = order[ranges(first, count)]
     gap = (at[row] - points[number]) ** 2
     square = sum(gap.T[1:], gap.T[0])
     row, number, square = (x[square < reach * reach] for x in (row, number, square))

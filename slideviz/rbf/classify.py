@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.fans import Fans
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, ranges
 from slideviz.mesh.topology import Boundary, unit
 from slideviz.system.jit_cache import njit
 
@@ -347,8 +347,7 @@ def _collect(
         np.searchsorted(at[rows[:, 0]], representative[slid], side) for side in ("left", "right")
     )
     node = np.repeat(slid, stop - start)
-    row = np.arange(len(node)) - np.repeat(np.cumsum(stop - start) - stop, stop - start)
-    rows = rows[row]
+    rows = rows[ranges(start, stop - start)]
     order = np.lexsort((rows[:, 1], node))
     rows, node = rows[order], node[order]
     new = np.ones(len(rows), bool)

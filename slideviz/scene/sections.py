@@ -10,7 +10,7 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.quality import INVERTED
 from slideviz.scene.actors import VALUES
 from slideviz.scene.mesh import recolored
@@ -266,8 +266,7 @@ class CutLines:
 def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:
     """Return polylines through points (k, 2) as one PolyData at z = ``lift``."""
     points = np.concatenate(parts)
-    sizes = [len(part) for part in parts]
-    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    offsets = offsets_of([len(part) for part in parts])
     shape = pv.PolyData()
     shape.points = np.column_stack([points, np.full(len(points), lift)])
     shape.SetLines(pv.CellArray.from_arrays(offsets, np.arange(len(points))))  # type: ignore[arg-type]

@@ -32,15 +32,12 @@ _MOST = 400
 class UnrolledPolygons(NamedTuple):
     """Polygons around an axis, cut open at the seam: a point on it is there once for each side."""
 
-    local: FloatArray
-    """(p, 3): the points in the section's frame."""
+    local: FloatArray  # (p, 3): the points in the section's frame
     angle: FloatArray
     """(p,): their angles around the axis in radians, within one turn but for polygons on the seam,
     which stay whole."""
-    corners: IntArray
-    """(k,): the point of each corner of the polygons."""
-    middle: float
-    """The middle of the range of angles, in radians."""
+    corners: IntArray  # (k,): the point of each corner of the polygons
+    middle: float  # the middle of the range of angles, in radians
 
 
 def unrolled(section: Section, polygons: Polygons, near: float | None) -> UnrolledPolygons:
@@ -98,8 +95,7 @@ class Patch:
     middle: PlaceOnSection
     """(float, float): the place of the handle: the middle of the patch or, where that is in a hole,
     the place of the cut nearest to it."""
-    places: FloatArray
-    """(k, 2): some places of the cut, with angles in the range of ``angles``."""
+    places: FloatArray  # (k, 2): some places of the cut, with angles in the range of angles
 
     @property
     def is_full_ring(self) -> bool:

@@ -10,10 +10,10 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.model import Section
-from slideviz.sections.polygons import CellsInRange, Polygons, offsets_of
+from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 

@@ -24,12 +24,9 @@ _DIGITS = 4  # digits of a place relative to the size of the view: more than a m
 class HandleParts:
     """The visible parts of the handle of a section in a 2D mesh, which can be dragged."""
 
-    middle: FloatArray
-    """(m, 2): one point; none where it is out of view."""
-    ends: FloatArray
-    """(e, 2): the two ends of a line, or one point on a circle."""
-    lines: list[FloatArray]
-    """list of (k, 2) float64: the section itself, as polylines."""
+    middle: FloatArray  # (m, 2): one point; none where it is out of view
+    ends: FloatArray  # (e, 2): the two ends of a line, or one point on a circle
+    lines: list[FloatArray]  # list of (k, 2) float64: the section itself, as polylines
 
 
 def handle_parts(section: Section, box: Box) -> HandleParts | None:

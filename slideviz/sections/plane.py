@@ -38,10 +38,8 @@ _STEEP = 0.8
 class Axes:
     """The camera's axes for looking straight at a plane."""
 
-    rows: FloatArray
-    """(3, 3): unit vectors to the right, up, and towards the camera."""
-    labels: tuple[Label, Label]
-    """(Label, Label): the axis labels for the right and for up."""
+    rows: FloatArray  # (3, 3): unit vectors to the right, up, and towards the camera
+    labels: tuple[Label, Label]  # (Label, Label): the axis labels for the right and for up
 
 
 def plane_axes(section: Section) -> Axes:

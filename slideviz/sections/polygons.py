@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, offsets_of, ranges
 
 ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
@@ -17,12 +17,9 @@ ONLY_INVERTED = (-1.0, -0.5)
 class CellsInRange:
     """The cells of a mesh within a threshold; instances with the same cells are equal."""
 
-    key: bytes
-    """The mask, packed to bits, for comparing and hashing."""
-    mask: np.ndarray = field(compare=False, repr=False)
-    """(m,): whether each cell is within."""
-    words: str = field(compare=False)
-    """The range in words."""
+    key: bytes  # the mask, packed to bits, for comparing and hashing
+    mask: np.ndarray = field(compare=False, repr=False)  # (m,): whether each cell is within
+    words: str = field(compare=False)  # the range in words
 
     @classmethod
     def of(cls, values: FloatArray, threshold: tuple[float, float]) -> CellsInRange:
@@ -59,14 +56,10 @@ def range_words(threshold: tuple[float, float]) -> str:
 class Polygons:
     """Polygons, or lines where the mesh is 2D, each with the cell it belongs to."""
 
-    points: FloatArray
-    """(p, 3): the corners of all polygons."""
-    offsets: IntArray
-    """(q + 1,): polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``."""
-    connectivity: IntArray
-    """(k,): indices into ``points``."""
-    cells: IntArray
-    """(q,): the cell of the mesh that each polygon is a part of."""
+    points: FloatArray  # (p, 3): the corners of all polygons
+    offsets: IntArray  # (q + 1,): polygon i has the corners connectivity[offsets[i]:offsets[i + 1]]
+    connectivity: IntArray  # (k,): indices into points
+    cells: IntArray  # (q,): the cell of the mesh that each polygon is a part of
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -88,7 +81,7 @@ class Polygons:
     def take(self, order: IntArray) -> Polygons:
         """Return the polygons with the numbers ``order`` (t,), in that order; all points stay."""
         sizes = self.sizes[order]
-        corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ranges(sizes)]
+        corners = self.connectivity[ranges(self.offsets[order], sizes)]
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
     def outline(self) -> Polygons:
@@ -124,13 +117,3 @@ def joined(pieces: Sequence[Polygons]) -> Polygons:
         np.concatenate(corners),
         np.concatenate([piece.cells for piece in pieces]),
     )
-
-
-def offsets_of(sizes: IntArray) -> IntArray:
-    """Return the offsets (q + 1,) of polygons with ``sizes`` (q,) corners."""
-    return np.concatenate([[0], np.cumsum(sizes)])
-
-
-def _ranges(sizes: IntArray) -> IntArray:
-    """Return 0, 1, ... size - 1 for every size in ``sizes`` (q,), one after the other."""
-    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)

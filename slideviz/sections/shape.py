@@ -90,12 +90,9 @@ class Shape(Protocol):
     the length unit is meant, it is that of the mesh.
     """
 
-    terms: ShapeTerms
-    """Its names, numbers and words."""
-    in_plane: InPlane | None
-    """Its functions in 2D meshes; None where it cannot cut these."""
-    directed: bool
-    """Whether the sign of the direction matters, for signed distances at least."""
+    terms: ShapeTerms  # its names, numbers and words
+    in_plane: InPlane | None  # its functions in 2D meshes; None where it cannot cut these
+    directed: bool  # whether the sign of the direction matters, for signed distances at least
     near: float = 0.0
     """Part of an edge of a cell within which, next to a node, the section goes through the node."""
 

@@ -37,9 +37,8 @@ _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number
 class SpanChannel:
     """The walls of a zone, and the span between them."""
 
-    hub: str
+    hub: str  # its boundary, as that of the shroud
     shroud: str
-    """`hub`, `shroud`: their boundaries."""
     field: SpanField
     zone: int  # the number of the zone in the mesh, from 0
 

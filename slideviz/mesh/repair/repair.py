@@ -172,11 +172,9 @@ class _Whole:
         )
 
     def near(self, _cells: IntArray, _rings: int) -> Region:
-        """Return the mesh."""
         return replace(self._region, mesh=self._region.mesh.with_points(self.points))
 
     def move(self, _region: Region, points: FloatArray) -> None:
-        """Take the points (n, d) of the mesh."""
         self.points = points
 
 
