@@ -24,12 +24,10 @@ from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
-from slideviz.rbf.projection import as_simplices, surface_extension
+from slideviz.rbf.projection import as_simplices, surface_rim
 
 FARTHEST = 0.01
 """Largest distance from the target that may remain, over the boundary's size, by default."""
-BEYOND = 2.0
-"""How far walls go on, over the largest distance from the target before: nodes slide along it."""
 MOST_AWAY = 0.05  # largest part of the nodes whose normals may not face the target
 
 Key = tuple[object, ...]
@@ -91,8 +89,7 @@ def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displa
     points, local = mesh.points[nodes], np.searchsorted(nodes, facets)
     rim = nodes[np.unique(find_edges(points, local)[1])]
     target = _read_target(motion.path, mesh, names)
-    reach = BEYOND * float(np.linalg.norm(target.surface(points)[0] - points, axis=1).max())
-    walls = _walls(case, mesh, nodes, index, rim, reach)
+    walls = _walls(case, mesh, nodes, index, rim)
     laid = lay_onto(points, local, target, list(walls.values()))
     size = float(np.ptp(points, axis=0).max())
     note = _checked(motion, names, laid, walls, size)
@@ -100,12 +97,11 @@ def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displa
 
 
 def _walls(
-    case: Case, mesh: Mesh, nodes: IntArray, index: list[int], rim: IntArray, reach: float
+    case: Case, mesh: Mesh, nodes: IntArray, index: list[int], rim: IntArray
 ) -> dict[str, Wall]:
     """Return the boundaries on which the rim stays, as nodes that slide there see them.
 
-    They are surfaces of the frame, as an annulus is round, and go on flat where the moving
-    boundary ends them.
+    They are surfaces of the frame, as an annulus is round, and go on flat beyond the rim.
     """
     inside, sides = without_halo(mesh)[0], case.markers_with("periodic")
     pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin) if sides else ()
@@ -113,6 +109,7 @@ def _walls(
         inside.points, pairs, periodic_distance=case.periodic in ("fixed", "moving")
     )
     coords, boundary, walls = frame.coords(mesh.points), boundary_of(mesh), dict[str, Wall]()
+    shift = frame.shift()
     place = partial(corners, coords, axis=on_axis(frame, coords))
     moving = np.zeros(len(coords), bool)
     moving[nodes] = True
@@ -120,10 +117,11 @@ def _walls(
         member = boundary.marker == which
         on = np.intersect1d(rim, boundary.facets[member])
         if which not in index and len(on):
-            beyond = surface_extension(boundary, member, moving, place, reach)
-            simplices = np.concatenate([as_simplices(place(boundary.facets[member])), beyond])
-            shift = frame.shift()
-            tree = ClosestPoints(simplices, shift if shift.any() else None)
+            tree = ClosestPoints(
+                as_simplices(place(boundary.facets[member])),
+                shift if shift.any() else None,
+                surface_rim(boundary, member, moving, place),
+            )
             walls[name] = Wall(np.searchsorted(nodes, on), partial(_on_wall, tree, frame))
     return walls
 

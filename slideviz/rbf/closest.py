@@ -21,6 +21,10 @@ ON = 1e-30
 squared distance from the origin."""
 MOST, TURNS = 1e150, 2.0**30
 """Largest coordinate with which periods are counted, and the largest number of them."""
+EDGE = 1e-9
+"""A closest point is on the side of a triangle where the opposite corner has at most this part in
+it."""
+NO_SYMMETRY = (1.0, 0.6180339887, 0.4142135624)  # a direction in which points of a mesh differ
 
 
 @njit(**OPTIONS)
@@ -257,13 +261,19 @@ class ClosestPoints:
 
     The tree has the images one period before and after. A point more than one period from the
     middle of the simplices is taken back by whole periods, and its closest point forth by as many.
+
+    Beyond a rim simplices go on flat: where the closest point would be on the rim, it is the foot
+    on the line or plane of the simplex there.
     """
 
-    def __init__(self, corners: FloatArray, shift: FloatArray | None = None) -> None:
+    def __init__(
+        self, corners: FloatArray, shift: FloatArray | None = None, rim: FloatArray | None = None
+    ) -> None:
         """Build the tree.
 
         ``corners`` (n, c, d): segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
         ``shift`` (d,): one period; None: there are no images.
+        ``rim`` (e, c - 1, d): ends of segments, or sides of triangles, with the same coordinates.
         """
         self.corners = corners
         """(n, c, d): the simplices. Their images are not stored, to save memory."""
@@ -281,6 +291,7 @@ class ClosestPoints:
             self._along = shift / (shift @ shift)
             places = corners.reshape(-1, dim) @ self._along
             self._middle = (places.min() + places.max()) / 2.0
+        self._rim = None if rim is None or not len(rim) else _on_rim(corners, rim)
         depth = max(0, int(np.ceil(np.log2(max(1, items / LEAF)))))
         self._bounds = np.empty((2 ** (depth + 1) - 1, 6), np.float32)
         self._order = np.arange(items, dtype=np.int32)
@@ -330,4 +341,48 @@ class ClosestPoints:
                 targets, self._corners, self._shifts, self._order, self._bounds, begin, out, which
             )
         out[far] += by
-        return out[:, :dim], which + turns * len(self._order)
+        at, which = out[:, :dim], which + turns * len(self._order)
+        if self._rim is not None:
+            self._go_on(x, at, which)
+        return at, which
+
+    def _go_on(self, x: FloatArray, at: FloatArray, which: IntArray) -> None:
+        """Move closest points ``at`` (m, d) of x (m, d) that are on the rim to the feet of x."""
+        assert self._rim is not None
+        on_rim = self._rim[which % len(self.corners)]
+        rows = np.flatnonzero(on_rim.any(axis=1))
+        corners, on_rim = self.simplices(which[rows]), on_rim[rows]
+        sides = corners[:, 1:] - corners[:, :1]
+        to_parts = np.linalg.pinv(sides).transpose(0, 2, 1)  # of corners 1 and 2 in a point
+
+        def parts(points: FloatArray) -> FloatArray:
+            return np.einsum("mcd,md->mc", to_parts, points[rows] - corners[:, 0])
+
+        there = parts(at)
+        absent = np.column_stack([1.0 - there.sum(axis=1), there]) <= EDGE
+        lacks, count = absent.sum(axis=1), corners.shape[1]
+        beyond = (lacks == count - 1) & (on_rim[:, :count] & ~absent).any(axis=1)
+        if count == 3:
+            beyond |= (lacks == 1) & (on_rim[:, count:] & absent).any(axis=1)
+        foot = corners[:, 0] + np.einsum("mc,mcd->md", parts(x), sides)
+        at[rows[beyond]] = foot[beyond]
+
+
+def _on_rim(corners: FloatArray, rim: FloatArray) -> np.ndarray:
+    """Return which corners of simplices (n, c, d) are on the rim, and which opposite sides.
+
+    (n, c) bool for segments, (n, 2 c) for triangles.
+    """
+
+    def among(points: FloatArray, others: FloatArray) -> np.ndarray:
+        keys = (
+            sum(x * by for x, by in zip(each.T, NO_SYMMETRY, strict=False))
+            for each in (points.reshape(-1, points.shape[-1]), others.reshape(-1, points.shape[-1]))
+        )
+        return np.isin(*keys).reshape(points.shape[:-1])
+
+    found = among(corners, rim)
+    if corners.shape[1] == 2:
+        return found
+    middles = corners[:, [1, 2, 0]] + corners[:, [2, 0, 1]]
+    return np.concatenate([found, among(middles, rim.sum(axis=1))], axis=1)

@@ -7,8 +7,8 @@ node never leaves its curve or surface however many steps are made. With periodi
 pieces are continued beyond the periodic boundaries by their own images.
 
 A blade that moves along its hub leaves the place where it stood, and nodes of the hub slide into
-that place, where the hub has no facets. So at the rim of a moving boundary a sliding surface is
-extended flat, in the plane of its last facet, as far as the moving boundary moves.
+that place, where the hub has no facets. So beyond the rim of a moving boundary a sliding surface
+goes on flat, in the plane of its last facet.
 
 While the primitive that a closest point is on (facet, edge or vertex) stays the same, the closest
 point of x is ``a + P (x - a)``: P is I - n n^T on a facet, t t^T on an edge and zero at a vertex,
@@ -90,51 +90,16 @@ Place = Callable[[IntArray], FloatArray]
 """Returns the corners (m, k, d) of facets or segments (m, k), undeformed and in the frame."""
 
 
-def surface_extension(
-    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place, reach: float
+def surface_rim(
+    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place
 ) -> FloatArray:
-    """Return simplices (s, d, d) that continue a surface (3D) or curve (2D) beyond its moving rim.
+    """Return the ends (e, d - 1, d) of sides where moving boundaries end a surface, in 2D a curve.
 
-    ``member`` (f,) bool: facets of the surface (3D) or curve (2D).
-    ``moving`` (n,) bool: nodes of the moving boundaries.
-    ``reach``: length of the extension, in the mesh's length unit.
+    ``member`` (f,) bool: facets of the surface. ``moving`` (n,) bool: nodes of moving boundaries.
     """
     one, two = boundary.joints.T
-    rim = np.flatnonzero(member[one] != member[two])
-    rim = rim[moving[boundary.joint_nodes[rim]].all(axis=1)]
-    facet = np.where(member[one[rim]], one[rim], two[rim])
-    ends = place(boundary.joint_nodes[rim])
-    sides = place(boundary.facets[facet])
-    if not len(facet):
-        return np.empty((0, boundary.dim, boundary.dim))
-    out = ends.mean(axis=1) - sides.mean(axis=1)
-    if boundary.dim == 2:
-        return np.concatenate([ends, ends + reach * unit(out)[:, None]], axis=1)
-    along = unit(ends[:, 1] - ends[:, 0])
-    out -= np.einsum("ed,ed->e", out, along)[:, None] * along
-    far = ends + reach * unit(out)[:, None]
-    first = np.stack([ends[:, 0], ends[:, 1], far[:, 1]], axis=1)
-    second = np.stack([ends[:, 0], far[:, 1], far[:, 0]], axis=1)
-    return np.concatenate([first, second])
-
-
-def edge_extension(
-    segments: IntArray, moving: np.ndarray, place: Place, reach: float
-) -> FloatArray:
-    """Return segments (s, 2, d) that continue a chain of segments (m, 2) beyond its moving ends.
-
-    ``moving`` (n,) bool: nodes of the moving boundaries.
-    ``reach``: length of each segment, in the mesh's length unit.
-    """
-    node, count = np.unique(segments, return_counts=True)
-    last = node[(count == 1) & moving[node]]
-    corners = place(segments)
-    found = []
-    for column in (0, 1):
-        rows = np.isin(segments[:, column], last)
-        end, before = corners[rows, column], corners[rows, 1 - column]
-        found.append(np.stack([end, end + reach * unit(end - before)], axis=1))
-    return np.concatenate(found)
+    rim = (member[one] != member[two]) & moving[boundary.joint_nodes].all(axis=1)
+    return place(boundary.joint_nodes[rim])
 
 
 ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}
@@ -178,7 +143,6 @@ def find_tracks(
     roles: Mapping[str, str],
     feature_angle_deg: float,
     shift: FloatArray | None,
-    reach: float = 0.0,
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
 
@@ -186,14 +150,12 @@ def find_tracks(
     ``roles``: role of each marker, by its name.
     ``shift`` (d,) or None: one period, by which tracks are continued beyond periodic boundaries;
     None: they end there.
-    ``reach``: how far tracks are continued at the rims of moving boundaries, in the mesh's length
-    unit.
     """
     of_node = np.full(classes.total, -1, np.int64)
-    simplices: list[FloatArray] = []
+    simplices: list[tuple[FloatArray, FloatArray]] = []
     curved = False
     moving = np.zeros(classes.total, bool)
-    moving[classes.moving] = reach > 0
+    moving[classes.moving] = True
     across = _across_period(boundary, classes.representative, roles) if shift is not None else None
     vectors = corner_vectors(place(boundary.facets))
     labels = _surface_labels(boundary, vectors, roles, feature_angle_deg, across)
@@ -206,16 +168,16 @@ def find_tracks(
         member = np.isin(labels, chosen)
         of_node[nodes] = len(simplices)
         curved |= _bends(vectors[member])
-        beyond = surface_extension(boundary, member, moving, place, reach)
-        simplices.append(np.concatenate([as_simplices(place(boundary.facets[member])), beyond]))
+        rim = surface_rim(boundary, member, moving, place)
+        simplices.append((as_simplices(place(boundary.facets[member])), rim))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(simplices)
             corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
-            beyond = edge_extension(ends, moving, place, reach)
-            simplices.append(np.concatenate([corners, beyond]))
-    tracks = tuple(ordered_map(lambda corners: ClosestPoints(corners, shift), simplices))
+            node, count = np.unique(ends, return_counts=True)
+            simplices.append((corners, place(node[(count == 1) & moving[node], None])))
+    tracks = tuple(ordered_map(lambda track: ClosestPoints(track[0], shift, track[1]), simplices))
     return Tracks(tracks, of_node, bool(curved))
 
 

@@ -13,7 +13,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.nearest import near_duplicates
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary
@@ -31,6 +31,9 @@ class Domain:
     roles: Mapping[str, Role]  # role of each marker; of halo copies, that of what they copy
     boundary: Boundary  # facets of the boundary
     fans: Fans  # the facets around each of its nodes, by marker and between edges
+    wall_fans: Fans
+    """Those of the normals during a motion, without facets at moving nodes where others remain: at
+    a blade these are thin, and they tilt while the blade leaves the wall a little between steps."""
     pairs: tuple[Pair, ...]  # periodic pairs of markers
     frame: Frame
     coords: FloatArray  # (n, d): undeformed positions in the frame
@@ -51,7 +54,7 @@ class Domain:
     def normals_at(self, coords: FloatArray) -> FloatArray:
         """Return the unit normals of the fans at coordinates (n, d) in the frame."""
         corners = corners_of(coords, self.boundary.facets, self.axis)
-        return fan_normals(self.boundary, self.fans, coords, corners)
+        return fan_normals(self.boundary, self.wall_fans, coords, corners)
 
 
 def find_domain(case: Case, mesh: Mesh) -> Domain:
@@ -75,6 +78,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         roles=case.roles,
         boundary=boundary,
         fans=fans,
+        wall_fans=_without_rims(fans, boundary, classes),
         pairs=pairs,
         frame=frame,
         coords=coords,
@@ -87,6 +91,16 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes),
     )
+
+
+def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
+    moving = np.zeros(classes.total, bool)
+    moving[classes.moving] = True
+    at_rim = moving[boundary.facets].any(axis=1)[fans.facet]
+    others = np.bincount(fans.fan, ~at_rim, len(fans.fan_node)) > 0.0
+    keep = ~at_rim | ~others[fans.fan]
+    facet, node, fan = (frozen_array(x[keep], np.int64) for x in (fans.facet, fans.node, fans.fan))
+    return replace(fans, facet=facet, node=node, fan=fan)
 
 
 def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:

@@ -119,7 +119,7 @@ def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
     """Return the unit normal of each fan (m, d), as ``slideviz.mesh.fans.fan_normals``."""
-    boundary, fans = setup.boundary, setup.fans
+    boundary, fans = setup.boundary, setup.wall_fans
     corners = _Corners(setup).of(coords)
     if boundary.dim == 2:
         vectors = transform(TURN[2], corners[1] - corners[0])

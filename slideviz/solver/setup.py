@@ -135,11 +135,6 @@ def loose_warnings(
     return [sentence]
 
 
-REACH = 1.5
-"""How far surfaces are continued beyond moving boundaries, over the largest displacement: nodes
-that slide past the end of their surface have something to slide on."""
-
-
 @dataclass(frozen=True, eq=False)
 class Setup(Domain):
     """A domain, its prescribed displacements, and the data that are the same in all steps."""
@@ -255,7 +250,6 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         roles=case.roles,
         feature_angle_deg=case.feature_angle_deg,
         shift=frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None,
-        reach=REACH * conditions.largest,
     )
     warnings = (
         *domain.warnings,

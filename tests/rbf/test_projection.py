@@ -195,8 +195,25 @@ def test_projection_is_idempotent_and_stays_on_the_track(sliding_case):
         back = tracks.tracks[index].query(at)
         np.testing.assert_allclose(back, at, atol=1e-13)
         low, high = (f(tracks.tracks[index].corners, axis=(0, 1)) for f in (np.min, np.max))
-        assert np.all(at >= low - 1e-13)
+        # Beyond a moving boundary tracks go on.
+        assert np.all((at >= low - 1e-13) | (low == mesh.points[classes.moving].min(axis=0)))
         assert np.all(at <= high + 1e-13)
+
+
+def test_beyond_a_rim_simplices_go_on_flat_and_nowhere_else():
+    chain = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [2.0, 1.0]]])
+    track = ClosestPoints(chain, None, np.array([[[2.0, 1.0]]]))
+    at = track.query(np.array([[3.0, 2.5], [-1.0, 0.2], [0.5, 0.3]]))
+    assert at == pytest.approx(np.array([[3.25, 2.25], [0.0, 0.0], [0.5, 0.0]]))
+    side = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    square = np.array([[[0.0, 0.0, 0.0], *side], [[0.0, 0.0, 0.0], side[1], [0.0, 1.0, 0.0]]])
+    # Not where the surface turns up at once beyond another rim: what is there is nearer.
+    wall = np.array([[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.1, 0.5, 1.0]]])
+    period = np.array([0.0, 5.0, 0.0])
+    track = ClosestPoints(np.concatenate([square, wall]), period, side[None])
+    x = [[1.5, 0.5, 0.3], [1.5, 1.2, 0.1], [-0.5, 0.5, -0.3], [0.5, 0.5, 0.2], [1.5, 5.5, 0.3]]
+    wanted = [[1.5, 0.5, 0.0], [1.5, 1.2, 0.0], [0.0, 0.5, 0.0], [0.5, 0.5, 0.0], [1.5, 5.5, 0.0]]
+    assert track.query(np.array(x)) == pytest.approx(np.array(wanted))
 
 
 def test_a_zero_displacement_stays_zero_to_the_bit(sliding_case):
