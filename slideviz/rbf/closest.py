@@ -374,12 +374,11 @@ def _on_rim(corners: FloatArray, rim: FloatArray) -> np.ndarray:
     (n, c) bool for segments, (n, 2 c) for triangles.
     """
 
+    def keys(points: FloatArray) -> FloatArray:
+        return np.asarray(sum(points[..., k] * NO_SYMMETRY[k] for k in range(points.shape[-1])))
+
     def among(points: FloatArray, others: FloatArray) -> np.ndarray:
-        keys = (
-            sum(x * by for x, by in zip(each.T, NO_SYMMETRY, strict=False))
-            for each in (points.reshape(-1, points.shape[-1]), others.reshape(-1, points.shape[-1]))
-        )
-        return np.isin(*keys).reshape(points.shape[:-1])
+        return np.isin(keys(points), keys(others))
 
     found = among(corners, rim)
     if corners.shape[1] == 2:

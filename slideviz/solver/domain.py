@@ -96,9 +96,9 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
 def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = True
-    at_rim = moving[boundary.facets].any(axis=1)[fans.facet]
-    others = np.bincount(fans.fan, ~at_rim, len(fans.fan_node)) > 0.0
-    keep = ~at_rim | ~others[fans.fan]
+    away = ~np.any(moving[boundary.facets[fans.facet]], axis=1)
+    others = np.bincount(fans.fan, away, len(fans.fan_node)) > 0.0
+    keep = away | ~others[fans.fan]
     facet, node, fan = (frozen_array(x[keep], np.int64) for x in (fans.facet, fans.node, fans.fan))
     return replace(fans, facet=facet, node=node, fan=fan)
 
