@@ -380,10 +380,11 @@ def test_a_displacement_file_and_what_is_typed_are_checked_at_once(opened, tmp_p
     field = next(f for f in opened.window.motions.findChildren(NumberField) if f.isVisible())
     before = field.text()
     opened.type(field, "1..5")
-    QTest.keyClick(field, Qt.Key.Key_Escape)
-    assert field.text() == before
     said = opened.window.statusBar().currentMessage()
     assert said == f"Invalid: “1..5” is not a number; the value is still {before}."
+    QTest.keyClick(field, Qt.Key.Key_Escape)
+    assert field.text() == before
+    assert not opened.window.statusBar().currentMessage()
 
 
 def test_motions_are_reordered_changed_and_removed_and_need_a_moving_boundary(opened):

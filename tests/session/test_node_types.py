@@ -114,11 +114,12 @@ def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passag
 
 
 def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
-    from slideviz.mesh import cached_boundary as kept
+    from slideviz.mesh import topology
 
     mesh, found = replace(passage.mesh, name="another"), []
-    real = kept.find_boundary
-    monkeypatch.setattr(kept, "find_boundary", lambda m: found.append(m) or real(m))
+    real = topology._find_owners
+    counted = lambda m, *args: found.append(m) or real(m, *args)  # noqa: E731
+    monkeypatch.setattr(topology, "_find_owners", counted)
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), passage.case)
     find_surfaces(mesh)
     NodeTypes().of(changes.set_view(session, points="types"))
