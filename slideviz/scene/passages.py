@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from itertools import chain
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import marker_zones
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.session.passages import Period, find_periods, matrices
+from slideviz.session.passages import Period, matrices
 from slideviz.session.state import Session
 
 PALER = 0.45
@@ -83,18 +81,6 @@ class PassageLayer(KeyedLayer):
         if self._matrices:
             self._style()
 
-    def _pairs(self, session: Session) -> tuple[Pair, ...]:
-        """Return the pair whose period repeats the mesh; those of zones where they differ."""
-        mesh = session.mesh
-        if not session.view.passages or mesh is None:
-            return ()
-        pair = self._period.of(session)
-        if pair is not None or not mesh.zone_parts:
-            return () if pair is None else (pair,)
-        with suppress(SlidevizError):  # said beside the Run button
-            return find_periods(mesh, session.case, session.pairs)
-        return ()
-
     def _repeats(self, session: Session, pair: Pair, name: str) -> bool:
         """Return whether a pair repeats a boundary, or what is shown of the cells of all zones."""
         mesh = session.mesh
@@ -105,7 +91,8 @@ class PassageLayer(KeyedLayer):
 
     def key(self, session: Session) -> tuple[object, ...]:
         # The threshold's actor is made when it first has cells.
-        return self._pairs(session), session.view.passages, self._threshold.actor
+        pairs = self._period.of_zones(session) if session.view.passages else ()
+        return pairs, session.view.passages, self._threshold.actor
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
         """Return data set and actor of everything that the passages repeat, by name."""
@@ -117,7 +104,7 @@ class PassageLayer(KeyedLayer):
         return sources
 
     def draw(self, session: Session) -> None:
-        wanted = [(pair, matrices(session, pair)) for pair in self._pairs(session)]
+        wanted = [(pair, matrices(session, pair)) for pair in self._period.of_zones(session)]
         # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer
         for copy in chain.from_iterable(self._actors.values()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Literal
 
 import numpy as np
@@ -118,25 +119,35 @@ def show_passages(
 
 
 class Period:
-    """Finds the period of a session's mesh, and caches it for the last periodic boundaries."""
+    """Finds the periods of a session's mesh, and caches them for the last periodic boundaries."""
 
     def __init__(self) -> None:
-        self._found: tuple[object, Pair | None] | None = None
+        self._last: tuple[object, Pair | None, tuple[Pair, ...]] = (), None, ()
 
     def of(self, session: Session) -> Pair | None:
-        """Return the pair of boundaries whose period repeats the mesh; None without a match."""
+        """Return the pair of boundaries whose period repeats the mesh; None without a match.
+
+        None also where zones have different periods.
+        """
+        return self._find(session)[0]
+
+    def of_zones(self, session: Session) -> tuple[Pair, ...]:
+        """Return the pair whose period repeats the mesh; those of zones where they differ."""
+        return self._find(session)[1]
+
+    def _find(self, session: Session) -> tuple[Pair | None, tuple[Pair, ...]]:
         case, mesh = session.case, session.mesh
         if mesh is None:
-            return None
+            return None, ()
         names = case.markers_with("periodic")
         key = (mesh, session.pairs, names, case.periodic_type, case.axis, case.origin)
-        if self._found is None or self._found[0] != key:
-            try:
-                period = find_period(mesh, case, session.pairs)
-            except SlidevizError:
-                period = None  # periodic boundaries that do not match: said beside the Run button
-            self._found = key, period
-        return self._found[1]
+        if self._last[0] != key:
+            self._last = key, None, ()
+            with suppress(SlidevizError):  # do not match: said beside the Run button
+                pair = find_period(mesh, case, session.pairs)
+                every = find_periods(mesh, case, session.pairs) if pair is None else (pair,)
+                self._last = key, pair, every
+        return self._last[1:]
 
 
 def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:

@@ -12,7 +12,8 @@ from slideviz.gui.panels.display import MOST_PASSAGES, NOT_PERIODIC, ROLES_ONLY,
 from slideviz.samples.table import write_sample
 from slideviz.scene.passages import PassageLayer
 from slideviz.scene.pick import to_display
-from slideviz.session import changes
+from slideviz.session import changes, jobs
+from tests.builders import stage
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -156,10 +157,24 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     assert box.passages.value() == 0
 
 
+def test_neighbours_of_zones_with_a_period_each(driver, tmp_path):
+    opened = jobs.prepare(stage(), tmp_path / "stage.su2", None, lambda _: None, lambda: False)
+    driver.window.show_opened(opened)
+    box = panel(driver)
+    assert box.passages.isEnabled()
+    assert "1:per1 and 1:per2 repeat by 40° about z; 2:per1" in box.passages.toolTip()
+    box.passages.setValue(box.passages.maximum())
+    assert box.passages.text() == "all 9 and 12 around"
+    assert view(driver).passages == -1
+    assert len([n for n in driver.window.view.actors if n.startswith("copy:")]) == (8 + 11) * 7
+    box.passages.lineEdit().setText("all 9 and 12 around")
+    assert not box.passages.fault
+
+
 def test_a_number_of_neighbours_can_be_typed(qtbot):
     box = PassagesBox()
     qtbot.addWidget(box)
-    box.set_around(41)
+    box.set_around((41,))
     assert box.maximum() == 20
     for text, wanted in (
         ("3", 3),
@@ -170,9 +185,9 @@ def test_a_number_of_neighbours_can_be_typed(qtbot):
         box.lineEdit().setText(text)
         box.interpretText()
         assert box.value() == wanted, text
-    box.set_around(None)
+    box.set_around(())
     assert box.value() <= MOST_PASSAGES
-    box.set_around(2)
+    box.set_around((2,))
     box.setValue(1)
     assert box.text() == "all 2 around"
 

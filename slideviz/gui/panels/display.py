@@ -56,7 +56,7 @@ NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbour
 MOST_PASSAGES = 9
 """Most neighbouring passages on each side for translational periodicity, which is endless."""
 
-_PASSAGES = re.compile(r"(\d{1,9})(?: on each side)?|all(?: \d+ around)?")
+_PASSAGES = re.compile(r"(\d{1,9})(?: on each side)?|all(?: [\d and]+ around)?")
 """What can be typed as a number of passages."""
 
 ONLY = "Draw only the cells whose value is within these two numbers."
@@ -72,19 +72,19 @@ class PassagesBox(NumberBox):
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("passages")
-        self.around: int | None = None
-        self.set_around(None)
+        self.around: tuple[int, ...] = ()
+        self.set_around(())
 
-    def set_around(self, around: int | None) -> None:
-        """Set the number of passages in the whole wheel; None for translational periodicity."""
+    def set_around(self, around: tuple[int, ...]) -> None:
+        """Set the passages in the wheel of each zone; () for translational periodicity."""
         self.around = around
-        self.setRange(0, MOST_PASSAGES if around is None else max(around // 2, 1))
+        self.setRange(0, max(max(around) // 2, 1) if around else MOST_PASSAGES)
 
     def textFromValue(self, value: int) -> str:
         if value == 0:
             return "0"
-        if self.around is not None and value == self.maximum():
-            return f"all {self.around} around"
+        if self.around and value == self.maximum():
+            return f"all {' and '.join(map(str, self.around))} around"
         return f"{value} on each side"
 
     def valueFromText(self, text: str) -> int:
@@ -225,26 +225,25 @@ class DisplayPanel(Panel):
         self.threshold.setEnabled(view.threshold is not None)
         self.threshold.show_value(view.threshold or _worse_half(session))
         self.points.show_value(view.points)
-        self._sync_passages(session, self._period.of(session) if opened else None)
+        self._sync_passages(session, self._period.of_zones(session))
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
             able, term = COMMANDS[name].enabled(CommandState(session)), SHOWN[name]
             box.setEnabled(able)
             box.setToolTip(wrapped(term.why_not if opened and not able else term.tip))
 
-    def _sync_passages(self, session: Session, pair: Pair | None) -> None:
+    def _sync_passages(self, session: Session, pairs: Sequence[Pair]) -> None:
         tip, count = NOT_PERIODIC, 0
-        if pair is not None:
-            self.passages.set_around(pair.around)
+        if pairs:
+            around = tuple(pair.around for pair in pairs if pair.around is not None)
+            self.passages.set_around(around if len(around) == len(pairs) else ())
             count = session.view.passages
-            tip = (
-                f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} "
-                f"repeat by {pair.describe()}."
-            )
+            by = (f"{one.first} and {one.second} repeat by {one.describe()}" for one in pairs)
+            tip = f"Neighbouring passages drawn beside the mesh: {'; '.join(by)}."
         if not self.passages.fault:
             self.passages.setValue(self.passages.maximum() if count < 0 else count)
         for widget in (self.passages, self.passages_label):
-            widget.setEnabled(pair is not None)
+            widget.setEnabled(bool(pairs))
         self.passages.set_tip(tip)
         self.passages_label.setToolTip(wrapped(tip))
 
@@ -256,7 +255,7 @@ class DisplayPanel(Panel):
         self._set(threshold=_worse_half(self.store.session) if on else None)
 
     def _passages(self, value: int) -> None:
-        whole = self.passages.around is not None and value == self.passages.maximum()
+        whole = bool(self.passages.around) and value == self.passages.maximum()
         self._set(passages=-1 if whole else value)
 
 
