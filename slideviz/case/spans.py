@@ -84,6 +84,12 @@ def span_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return ()
 
 
+def moves_over_span(case: Case) -> bool:
+    """Return whether a moving boundary has a motion over the span."""
+    over = [motion for motion in case.motions if isinstance(motion, SpanMotion)]
+    return any(applies_to(motion, name) for motion in over for name in case.markers_with("moving"))
+
+
 @dataclass(frozen=True, eq=False)
 class Blade:
     """Boundaries that motions over the span move, with all of these motions."""

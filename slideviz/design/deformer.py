@@ -38,6 +38,7 @@ from slideviz.rbf.images import FAR
 from slideviz.rbf.loops import to_points
 from slideviz.rbf.tape import Array, Tape, Variable, put, value
 from slideviz.solver.deform import Progress
+from slideviz.solver.growth import wall_warnings
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import make_setup
 
@@ -213,6 +214,7 @@ class Deformer:
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
         self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
+        self.warnings += (*wall_warnings(setup, case, mesh, points),)
         if not warn_of_error_estimate(
             self._steps, np.max([state.number("error_estimate") for state in states], axis=0)
         ):

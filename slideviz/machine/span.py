@@ -64,6 +64,7 @@ class SpanField:
     radius: float  # the largest one of the walls
     walls: tuple[ClosestPoints, ClosestPoints]
     """Hub and shroud: segments in (z, r), or triangles in (z, r, radius theta)."""
+    holes: IntArray  # (t, 4): nodes of triangles that close holes of walls contoured along theta
     start: tuple[float, float] = (0.0, 0.0)  # z and r of a node in the middle between the walls
 
     @cached_property
@@ -213,9 +214,11 @@ def _span_between(
     profiles = [wall_profile(coords, table) for table in facets]
     if all(profile is not None for profile in profiles):
         walls = [ClosestPoints(profile) for profile in profiles if profile is not None]
+        holes = facets[0][:0]
     else:
-        walls = [closed_wall(coords, table, radius, period) for table in facets]
-    field = SpanField(axis, origin, middle, radius, (walls[0], walls[1]))
+        closed = [closed_wall(coords, table, radius, period) for table in facets]
+        walls, holes = [wall for wall, _ in closed], np.concatenate([hole for _, hole in closed])
+    field = SpanField(axis, origin, middle, radius, (walls[0], walls[1]), holes)
     if hub == shroud or not _face(field, coords[nodes] / (1.0, 1.0, radius)):
         raise MeshError(
             f"{mesh.name}: the boundaries {hub!r} and {shroud!r} do not face each other, so there "

@@ -52,20 +52,23 @@ def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
 
 def closed_wall(
     coords: FloatArray, facets: IntArray, radius: float, period: float
-) -> ClosestPoints:
+) -> tuple[ClosestPoints, IntArray]:
     """Return a wall with the holes of blades closed, and with its images a period before and after.
 
+    Also the triangles (t, 4) that close the holes, by their nodes, the last of which they repeat.
     ``coords`` (n, 3): (z, r, radius theta); ``facets`` (f, 4). The period is an angle in radians.
     """
-    corners, turn = coords[facets], 2.0 * np.pi * radius
+    turn = 2.0 * np.pi * radius
+    holes = np.concatenate([facets[:0], *_patches(coords, facets, turn)])
+    corners = coords[np.concatenate([facets, holes])]
     # Facets may go across the end of theta's branch.
     corners[..., 2] -= turn * np.round((corners[..., 2] - corners[:, :1, 2]) / turn)
-    closed = np.concatenate([as_simplices(corners), *_patches(coords, facets, turn)])
-    return ClosestPoints(closed, np.array([0.0, 0.0, radius * period]))
+    shift = np.array([0.0, 0.0, radius * period])
+    return ClosestPoints(as_simplices(corners), shift), holes
 
 
-def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[FloatArray]:
-    """Yield triangles (t, 3, 3) that close each hole of a wall, such as that below a blade.
+def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntArray]:
+    """Yield triangles (t, 4) of nodes that close each hole of a wall, such as that below a blade.
 
     They are Delaunay's, of the nodes of the hole's rim in the plane that fits these best, so they
     mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The longest
@@ -82,7 +85,10 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[Floa
     )
     graph = coo_array((np.ones(len(edges), bool), edges.T), shape=(len(coords),) * 2)
     part = connected_components(graph, directed=False)[1]
-    follows, rims = dict(edges[first[count == 1]].tolist()), dict[int, list[FloatArray]]()
+    follows, rims = (
+        dict(edges[first[count == 1]].tolist()),
+        dict[int, list[tuple[FloatArray, IntArray]]](),
+    )
     while follows:
         start, node = follows.popitem()
         rim = [start]
@@ -93,15 +99,16 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[Floa
         steps[:, 2] -= turn * np.round(steps[:, 2] / turn)
         if node == start and abs(steps[:, 2].sum()) < 0.5 * turn:  # else it goes round the axis
             places = coords[start] + np.cumsum(steps, axis=0)
-            rims.setdefault(int(part[start]), []).append(places)
+            rims.setdefault(int(part[start]), []).append((places, np.array([*rim[1:], start])))
     for several in rims.values():
-        several.sort(key=lambda places: float(np.linalg.norm(np.ptp(places, axis=0))))
-        for places in several[:-1]:
+        several.sort(key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))))
+        for places, nodes in several[:-1]:
             _, size, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
             if size[1] > FLAT * size[0]:  # else the blade has no thickness
                 flat = places @ axes[:2].T
                 triangles = Delaunay(flat).simplices
-                yield places[triangles[_inside(flat, flat[triangles].mean(axis=1))]]
+                inside = _inside(flat, flat[triangles].mean(axis=1))
+                yield nodes[triangles[inside][:, [0, 1, 2, 2]]]
 
 
 def _inside(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:

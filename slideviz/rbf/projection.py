@@ -8,7 +8,7 @@ pieces are continued beyond the periodic boundaries by their own images.
 
 A blade that moves along its hub leaves the place where it stood, and nodes of the hub slide into
 that place, where the hub has no facets. So beyond the rim of a moving boundary a sliding surface
-goes on flat, in the plane of its last facet.
+goes on flat, in the plane of its last facet, or on the facets that close the hole.
 
 While the primitive that a closest point is on (facet, edge or vertex) stays the same, the closest
 point of x is ``a + P (x - a)``: P is I - n n^T on a facet, t t^T on an edge and zero at a vertex,
@@ -143,6 +143,7 @@ def find_tracks(
     roles: Mapping[str, str],
     feature_angle_deg: float,
     shift: FloatArray | None,
+    holes: IntArray,
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
 
@@ -150,6 +151,7 @@ def find_tracks(
     ``roles``: role of each marker, by its name.
     ``shift`` (d,) or None: one period, by which tracks are continued beyond periodic boundaries;
     None: they end there.
+    ``holes`` (t, 4): facets that close holes of surfaces, between nodes of these.
     """
     of_node = np.full(classes.total, -1, np.int64)
     simplices: list[tuple[FloatArray, FloatArray]] = []
@@ -168,8 +170,12 @@ def find_tracks(
         member = np.isin(labels, chosen)
         of_node[nodes] = len(simplices)
         curved |= _bends(vectors[member])
-        rim = surface_rim(boundary, member, moving, place)
-        simplices.append((as_simplices(place(boundary.facets[member])), rim))
+        facets = boundary.facets[member]
+        closing = holes[np.isin(holes, facets).all(axis=1)]
+        beside = moving.copy()
+        beside[closing] = False
+        rim = surface_rim(boundary, member, beside, place)
+        simplices.append((as_simplices(place(np.concatenate([facets, closing]))), rim))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(simplices)

@@ -12,7 +12,9 @@ from functools import reduce
 
 import numpy as np
 
+from slideviz.case.model import Case
 from slideviz.case.motion import ROUNDING
+from slideviz.case.spans import span_ends
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
 from slideviz.solver.setup import Setup
@@ -32,6 +34,8 @@ their distance is this times the largest displacement over the mesh's extent."""
 
 STRAY = 10.0
 """A node strays where it goes more than this times as far as the farthest boundary node."""
+
+OFF_WALL = 1e-3  # part of the span by which sliding nodes may leave hub or shroud
 
 HOPELESS = 0.1
 """A system was not solved where its solution misses the displacement of a control node by more than
@@ -161,6 +165,42 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
         f"beyond it; use {remedy}"
     )
     return [sentence]
+
+
+def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> list[str]:
+    """Return warnings that nodes left a sliding hub or shroud, where blades move over the span.
+
+    They may be off it as its undeformed facets are, and `OFF_WALL`. ``points`` (n, d): deformed.
+    """
+    warnings = list[str]()
+    field, boundary = setup.span, setup.boundary
+    if field is None:
+        return warnings
+    for end, name in enumerate(span_ends(case, mesh)):
+        if setup.roles.get(name) != "sliding":
+            continue
+        facets = boundary.facets[boundary.marker == boundary.names.index(name)]
+        nodes = np.unique(facets)
+        middles = 0.5 * (mesh.points[facets[:, :3]] + mesh.points[facets[:, [1, 2, 0]]])
+        coords = field.meridional(points[nodes])
+        off, of_facets = (
+            np.abs(field.span(x)[0] - end)
+            for x in (coords, field.meridional(middles.reshape(-1, 3)))
+        )
+        allowed = float(of_facets.max()) + OFF_WALL
+        if off.max(initial=0.0) > allowed:
+            k = int(np.argmax(off))
+            far = abs(float(field.distances(coords[[k]])[end][0][0]))
+            where = ", ".join(f"{value:.6g}" for value in points[nodes[k]])
+            remedy = f"refine {name}" if field.revolved else "let no periodic side cut the blade"
+            why = f"where the blade stood, its shape is not known; move the blade less, or {remedy}"
+            if nodes[k] in setup.classes.moving:
+                why = "the blade's motions do not add up to one along it; use those over the span"
+            warnings.append(
+                f"node {mesh.number(int(nodes[k]))} of {name} at ({where}) has left this boundary "
+                f"by {far:.3g}, {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
+            )
+    return warnings
 
 
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:

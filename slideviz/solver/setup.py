@@ -12,7 +12,9 @@ import numpy as np
 from slideviz.case.check import file_before_motions, idle_settings, require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
+from slideviz.case.spans import moves_over_span, span_field
 from slideviz.errors import CaseError, Note
+from slideviz.machine.span import SpanField
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.zones import require_one_zone
@@ -147,6 +149,7 @@ class Setup(Domain):
     """Settings of the greedy selection; None: all candidates are control nodes."""
     layers: float  # as of a ``Step``
     tracks: Tracks  # the edges and surfaces along which nodes slide
+    span: SpanField | None  # along which blades move; None: they do not
     solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
     zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
     fitted_radius: float  # the support radius that fits the motion, whatever the case says
@@ -242,6 +245,7 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
     reduction = find_reduction(case, mesh.extent, conditions.largest, candidates, gap)
     loose = loose_warnings(case, reduction, conditions.largest, mesh.extent, gap)
     frame, coords, axis = domain.frame, domain.coords, domain.axis
+    span = span_field(case, mesh) if moves_over_span(case) else None
     tracks = find_tracks(
         domain.boundary,
         domain.fans,
@@ -250,6 +254,7 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         roles=case.roles,
         feature_angle_deg=case.feature_angle_deg,
         shift=frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None,
+        holes=domain.boundary.facets[:0] if span is None else span.holes,
     )
     warnings = (
         *domain.warnings,
@@ -275,6 +280,7 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         reduction=reduction,
         layers=needed_by_layers(reduction, gap),
         tracks=tracks,
+        span=span,
         solve=_method(case, mesh, frame, axis),
         zone=layer_zone(case, mesh, domain, conditions.known),
         fitted_radius=fitted_radius(case, mesh, conditions.moved),

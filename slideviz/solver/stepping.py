@@ -25,7 +25,7 @@ from slideviz.rbf.operations import features
 from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, put, take, value
-from slideviz.solver.growth import farthest_node, stray_warning, unsoundness
+from slideviz.solver.growth import farthest_node, stray_warning, unsoundness, wall_warnings
 from slideviz.solver.normals import sliding_normals
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import Progress, Step, Trial
@@ -135,6 +135,7 @@ class Stepping:
                 if setup.frame.cylindrical:
                     farthest = farthest_node(mesh.points, points)
                 stray = stray_warning(setup, mesh, points, farthest)
+            left = [] if ahead else wall_warnings(setup, self.case, mesh, points)
             least = max(
                 least, (solution.error_estimate, solution.refined, index, solution.condition)
             )
@@ -148,6 +149,7 @@ class Stepping:
                     *apart,
                     *torn_interfaces(mesh, points),
                     *stray,
+                    *left,
                 ),
                 periodic_misfit=misfit,
             )

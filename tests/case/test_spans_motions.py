@@ -181,7 +181,7 @@ def test_a_blade_that_periodic_sides_cut_moves_as_one(kind, value):
     assert last.periodic_misfit < 1e-10
 
 
-@pytest.mark.parametrize(("kind", "value"), [("twist", 5.0), ("lean", 0.02), ("sweep", 0.03)])
+@pytest.mark.parametrize(("kind", "value"), [("twist", 5.0), ("lean", 0.08), ("sweep", 0.03)])
 def test_on_contoured_walls_a_blade_moves_over_where_it_stood(kind, value):
     mesh = contoured(passage((6, 12, 8)))
     motion = sv.SpanMotion("blade", kind, (0.0, 1.0), (value, 1.5 * value))
@@ -195,6 +195,7 @@ def test_on_contoured_walls_a_blade_moves_over_where_it_stood(kind, value):
     )
     assert after == pytest.approx(before, abs=1e-12)
     *_, last = sv.deform(case, mesh)
-    assert sv.quality(last.mesh, mesh).min > 0.8
+    assert sv.quality(last.mesh, mesh).min > 0.75
+    assert not last.warnings
     hub = field.meridional(last.mesh.points[mesh.marker("hub").nodes])
     assert np.abs(field.span(hub)[0]).max() < 1e-12

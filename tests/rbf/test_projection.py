@@ -144,6 +144,7 @@ def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
         roles=roles,
         feature_angle_deg=40.0,
         shift=shift,
+        holes=boundary.facets[:0],
     )
 
 

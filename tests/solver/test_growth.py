@@ -1,0 +1,57 @@
+"""Nodes that leave hub or shroud, where blades move over the span."""
+
+import pytest
+
+import slideviz as sv
+from slideviz.streaming.run import stream
+from tests.builders import cut_blade, passage
+from tests.machine.test_span import contoured
+
+ROLES = {"blade": "moving", "hub": "sliding", "shroud": "sliding", "per1": "periodic"}
+LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.08, 0.12))
+CASE = sv.Case(
+    roles=ROLES | {"per2": "periodic"},
+    motions=(LEAN,),
+    periodic_type="rotational",
+    periodic="moving",
+    sliding="ps",
+    relax="no",
+    layers="no",
+)
+
+
+def off_wall(case, mesh):
+    *_, last = sv.deform(case.change(steps=2), mesh)
+    return [text for text in last.warnings if "has left this boundary" in text]
+
+
+def test_nodes_that_leave_a_contoured_hub_where_a_cut_blade_stood_are_named(tmp_path):
+    mesh = contoured(cut_blade((6, 12, 8)))
+    (text,) = off_wall(CASE.change(repair="no"), mesh)
+    assert text.startswith("node 85 of hub at (0.459")
+    assert r"by 0.006" in text
+    assert "its shape is not known; move the blade less, or let no periodic side cut" in text
+    sv.write(tmp_path / "mesh.su2b", mesh)
+    file = CASE.change(mesh_file=tmp_path / "mesh.su2b", steps=2, repair="no")
+    assert text in stream(file, tmp_path / "out.su2b").steps[-1].warnings
+    assert text in sv.Deformer(mesh, CASE.change(steps=2, repair="no")).warnings
+    assert not off_wall(CASE.change(roles=ROLES | {"per2": "periodic", "hub": "internal"}), mesh)
+    small = sv.SpanMotion("blade", "lean", (0.0,), (0.02,))
+    assert not off_wall(CASE.change(motions=(small,)), mesh)
+
+
+def test_a_blade_that_other_motions_take_off_the_hub_is_named():
+    mesh = passage((4, 6, 8))
+    assert not off_wall(CASE, mesh)
+    turned = CASE.change(motions=(sv.Rotate("blade", 10.0, (0.0, 0.0, 0.0)), LEAN))
+    texts = off_wall(turned, mesh)
+    assert [text.split()[3] for text in texts] == ["hub", "shroud"]
+    assert "motions do not add up to one along it; use those over the span" in texts[0]
+
+
+@pytest.mark.slow
+def test_a_curved_wall_may_be_left_as_far_as_its_facets_are_off():
+    from slideviz.samples.table import sample
+
+    row = sample("impeller", 3000)
+    assert not off_wall(row.case, row.mesh)
