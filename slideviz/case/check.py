@@ -44,8 +44,9 @@ _LISTED = 12
 
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
+    case = with_marker_names(case, mesh)
     if mesh.zone_parts:
-        return tuple(_problems_of_zones(with_marker_names(case, mesh), mesh))
+        return tuple(_problems_of_zones(case, mesh))
     return (
         *key_problems(case),
         *_radius_problems(case, mesh),

@@ -18,7 +18,7 @@ from slideviz.case.model import (
     applies_to,
     named,
 )
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
 
@@ -27,9 +27,44 @@ def with_marker_names(case: Case, mesh: Mesh) -> Case:
     """Return a case that has the names of the boundaries as the mesh has them.
 
     A case may name each with the number of its zone, as ``1:blade``; a mesh does so only where
-    another zone has a boundary of that name.
+    another zone has a boundary of that name. For a mesh of one zone among several, what the case
+    has for boundaries with the numbers of others is left out, with a note.
     """
-    return renamed(case, spellings(mesh))
+    return renamed(_of_zone(case, mesh), spellings(mesh))
+
+
+def _of_zone(case: Case, mesh: Mesh) -> Case:
+    """Return a case without the boundaries that are named as ones of zones that a mesh lacks."""
+    if mesh.zone is None or mesh.zones == 1:
+        return case
+    numbers = {str(number) for number in range(1, mesh.zones + 1)} - {str(mesh.zone)}
+    moved = [name for motion in case.motions for name in named(motion.marker)]
+    limited = [limit.marker for limit in case.limits]
+    names = {*case.roles, *moved, *limited, *case.interfaces, *(case.span or ())}
+    others = {name for name in names if ":" in name and name.partition(":")[0] in numbers}
+    others -= set(mesh.marker_names)
+    if not others:
+        return case
+    motions = []
+    for motion in case.motions:
+        kept = tuple(name for name in named(motion.marker) if name not in others)
+        if kept or not motion.marker:
+            one = kept[0] if len(kept) == 1 else kept
+            motions.append(replace(motion, marker=one) if motion.marker else motion)
+    roles = {name: role for name, role in case.roles.items() if name not in others}
+    idle = "periodic" in case.roles.values() and "periodic" not in roles.values()
+    listed = ", ".join(sorted(others)[:3]) + ", ..." * (len(others) > 3)
+    plural = "boundaries" if len(others) > 1 else "boundary"
+    text = f"zone {mesh.zone} alone: {len(others)} {plural} of other zones left out ({listed})"
+    return case.change(
+        roles=roles,
+        motions=tuple(motions),
+        limits=tuple(limit for limit in case.limits if limit.marker not in others),
+        interfaces=() if others & set(case.interfaces) else case.interfaces,
+        span=None if others & set(case.span or ()) else case.span,
+        periodic="none" if idle else case.periodic,
+        warnings=(*case.warnings, Note(text)),
+    )
 
 
 def renamed(case: Case, names: Mapping[str, str]) -> Case:

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ class OpenMesh:
     """A mesh that a command reads, and the undeformed one if there is a reference."""
 
     source: MeshSource
+    case: Case | None  # with the names of the boundaries as the mesh has them
     reference: Path | None  # the file of the undeformed mesh
     read_base: Callable[[], Mesh | None]
     """Returns the undeformed mesh or, of a mesh in its file, its boundary."""
@@ -73,6 +75,8 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     for temporary files until the context ends. Raises MeshError if the mesh has a mistake or, with
     ``--stream``, is of no format that can be streamed; or ``--reference`` has other cells.
     """
+    from slideviz.case.zones import with_marker_names
+    from slideviz.cli.report import print_remarks
     from slideviz.errors import MeshError
     from slideviz.formats.files import read
     from slideviz.streaming.stream_input import open_read_only
@@ -104,7 +108,11 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
                 base = base if _same_cells(mesh, base) else None
                 reference = None if base is None else case.mesh_file
         source = _source(stack, mesh, base, skin)
-        yield OpenMesh(source, reference, lambda: None if base is None else _mesh_of(base), stack)
+        if case is not None:
+            known, case = len(case.warnings), with_marker_names(case, skin)
+            print_remarks(case.warnings[known:], quiet=False)
+        read_base = partial(_mesh_of, base) if base is not None else lambda: None
+        yield OpenMesh(source, case, reference, read_base, stack)
 
 
 def _mesh_of(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:

@@ -99,7 +99,7 @@ def quality(arguments: argparse.Namespace) -> int:
         rated = dict.fromkeys(name for name in METRICS if name in arguments.metrics)
         mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)
         values = {name: one for name, one in rated.items() if one is not None}
-        base = opened.read_base()
+        base, case = opened.read_base(), opened.case
         names = case.walls(mesh.marker_names) if case else None
         layers = _walls(mesh, base, names)
         results = check_limits(arguments.limits, MeasuredMesh(found, mesh, base, names))

@@ -171,7 +171,7 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     from slideviz.streaming.source import cut_cells, join_blocks
 
     with open_mesh(arguments, case) as opened:
-        mesh, path = opened.source.mesh, opened.reference
+        mesh, path, case = opened.source.mesh, opened.reference, opened.case
         if mesh.dim == 2 and arguments.stream:
             raise CaseError(
                 f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
@@ -230,7 +230,7 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     from slideviz.session.passages import find_periods
 
     with open_mesh(arguments, case) as opened:
-        mesh, reference = opened.source.mesh, opened.reference
+        mesh, reference, case = opened.source.mesh, opened.reference, opened.case
         base, quality = opened.read_base(), opened.quality(arguments)
     undeformed = base or mesh
     periods = find_periods(undeformed, case)

@@ -9,6 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import check_case
+from slideviz.case.limits import read_limits
 from slideviz.case.zones import zone_cases
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
@@ -80,6 +81,26 @@ def test_a_zone_without_motion_keeps_every_bit_and_zone_selects_one(tmp_path):
         CaseError, match=r"ZONE= 2, but stage\.su2 is all 2; read that zone or chang"
     ):
         last(case.change(zone=2), mesh)
+
+
+def test_one_zone_of_a_case_that_names_all(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path, alone = stage(tmp_path), sv.Case(roles=roles_of(""), motions=(turn(""),), **SLIDES)
+    limit, span = read_limits("first-height@1:BLOCK > 1, min > 0.1"), ("1:inner", "1:outer")
+    case = both().change(mesh_file=path, limits=limit, span=span, zone=2)
+    expected, step = (last(one, sv.read(path, 2)) for one in (alone.change(zone=2), case))
+    assert np.array_equal(expected.mesh.points, step.mesh.points)
+    note = "zone 2 alone: 5 boundaries of other zones left out (1:BLOCK, 1:inner, 1:outer, ...)"
+    assert note in step.warnings
+    case.change(zone=None, steps=1).write("case.cfg")
+    assert command(["run", "case.cfg", "--zone", "2", "-o", "new.su2"]) == 0
+    assert note in capsys.readouterr().err
+    assert np.array_equal(sv.read("new.su2", 1).points, sv.read(path, 1).points)
+    cut = ["section", "new.su2", "--plane", "y=0.3", "-o", "cut.svg", "--copies", "1"]
+    assert command([*cut, "--case", "case.cfg", "--zone", "2"]) == 0
+    assert note in capsys.readouterr().err
+    sv.convert(path, "single.su2", zone=2)
+    assert any("'1:BLOCK'" in text for text in check_case(case, sv.read("single.su2")))
 
 
 def test_a_name_of_several_zones_needs_its_number(tmp_path):
