@@ -21,13 +21,14 @@ from slideviz.case.model import Case, Motion, applies_to, named
 from slideviz.case.motion_text import term_of
 from slideviz.case.onto import laid_displacements
 from slideviz.case.spans import span_displacements
-from slideviz.case.zones import of_several_zones
+from slideviz.case.zones import each_zone, of_several_zones, zone_motion
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.topology import vertex_normals
+from slideviz.mesh.zones import names_in
 
 EPS = 1e-16  # what SU2 adds to coordinates of `surface_bump`
 LEVEL = 1e-12
@@ -156,11 +157,36 @@ def placed_displacements(
     ``on`` has the nodes (k,) of each moving marker. Raises CaseError where such a motion moves no
     node.
     """
+    if mesh.zone_parts:
+        return _of_zones(case, mesh, on)
     return (
         ffd_displacements(case, mesh, on)
         | bump_displacements(case, mesh, on)
         | span_displacements(case, mesh, on)
     )
+
+
+def _of_zones(case: Case, mesh: Mesh, on: Mapping[str, IntArray]) -> dict[object, Displacements]:
+    """Return what `placed_displacements` of each zone are together, by the motion of the case."""
+    parts: dict[object, list[Displacements]] = {}
+    for part, (one, zone) in zip(mesh.zone_parts, each_zone(case, mesh), strict=True):
+        names, start = names_in(mesh, part), part.points.start
+        mine = {names[name]: nodes - start for name, nodes in on.items() if name in names}
+        placed = placed_displacements(one, zone, mine)
+        for motion in dict.fromkeys(case.motions):
+            if isinstance(motion, model.PlacedMotion):
+                here = placed.get(zone_motion(case, motion, part, names, one))
+                if here is not None:
+                    moved = replace(here, nodes=here.nodes + start)
+                    parts.setdefault(motion, []).append(moved)
+    return {
+        motion: Displacements(
+            np.concatenate([one.nodes for one in several]),
+            np.concatenate([one.vectors for one in several]),
+            tuple(dict.fromkeys(text for one in several for text in one.warnings)),
+        )
+        for motion, several in parts.items()
+    }
 
 
 def reference_displacements(

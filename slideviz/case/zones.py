@@ -147,7 +147,7 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
         zone_settings=(),
         periodic=settings.periodic if periodic else "none",
     )
-    moved = [_zone_motion(case, motion, part, names, zone) for motion in case.motions]
+    moved = [zone_motion(case, motion, part, names, zone) for motion in case.motions]
     return zone.change(motions=tuple(motion for motion in moved if motion is not None))
 
 
@@ -160,7 +160,7 @@ def _zone_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
     return (hub, shroud) if {hub, shroud} <= set(names.values()) else None
 
 
-def _zone_motion(
+def zone_motion(
     case: Case, motion: Motion, part: ZonePart, names: Mapping[str, str], zone: Case
 ) -> Motion | None:
     """Return the motion of those boundaries of a zone that it moves; None if it moves none."""

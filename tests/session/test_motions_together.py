@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
-from slideviz.case.motion import displacements
+from slideviz.case.model import Case, FromFile, Rotate, Scale, SpanMotion, Translate
+from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.zones import zone_cases
+from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
 from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.run_messages import run_requirements
+from tests.builders import stage
 
 PAIR = ("bottom", "left")
 
@@ -29,6 +32,23 @@ def test_the_ghost_goes_where_the_run_takes_the_nodes(square, target, tmp_path):
     for name, points in ghosts.items():
         nodes = square.marker(name).nodes
         assert (points == square.points[nodes] + found.at(nodes)).all()
+
+
+def test_the_ghost_of_each_zone_goes_where_the_run_takes_it():
+    mesh = stage()
+    names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
+    roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
+    twist = SpanMotion("1:blade", "twist", (0.0, 1.0), (0.0, 3.0))
+    lean = SpanMotion("", "lean", (0.0, 1.0), (0.0, 0.02))
+    turn = Rotate("", 2.0)
+    case = Case(roles=roles, motions=(twist, lean, turn), periodic_type="rotational")
+    ghosts = Ghosts(mesh).moved(case)
+    cases = zone_cases(by_zone(case, mesh), mesh)
+    for number, (one, zone) in enumerate(zip(cases, zones_of(mesh), strict=True), 1):
+        nodes = zone.marker("blade").nodes
+        change = displacements(one, zone).at(nodes)
+        assert np.allclose(ghosts[f"{number}:blade"], zone.points[nodes] + change, atol=1e-14)
+        assert np.abs(change).max() > 0.01
 
 
 def test_words():
