@@ -77,6 +77,9 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     yield from _zone_problems(case, mesh)
     if not case.markers_with("periodic"):
         yield from _periodic_problems(case, mesh)
+    if unmoved := _without_motion(case):  # which zones have without the numbers of their names
+        yield from unmoved
+        return
     try:
         cases = zone_cases(case, mesh, False)
     except CaseError as problem:
@@ -178,14 +181,7 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each moving marker without motion, and each motion that is unfit."""
-    boxed = any(isinstance(motion, BoxMotion) for motion in case.motions)
-    of_all = ", or move all moving markers in the box with (*, ffd, ...)" if boxed else ""
-    found = [
-        f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
-        f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
-        for marker in case.markers_with("moving")
-        if not any(applies_to(motion, marker) for motion in case.motions)
-    ]
+    found = _without_motion(case)
     for place, motion in enumerate(case.motions, start=1):
         problems = [*_motion_problems(motion, mesh.dim)]
         if isinstance(motion, BoxMotion) and not problems:
@@ -198,6 +194,17 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
             problems += _onto_problems(case, place)
         found += [f"motion {place}: {text}" for text in problems]
     return tuple(found)
+
+
+def _without_motion(case: Case) -> list[str]:
+    boxed = any(isinstance(motion, BoxMotion) for motion in case.motions)
+    of_all = ", or move all moving markers in the box with (*, ffd, ...)" if boxed else ""
+    return [
+        f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
+        f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
+        for marker in case.markers_with("moving")
+        if not any(applies_to(motion, marker) for motion in case.motions)
+    ]
 
 
 def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:

@@ -213,11 +213,11 @@ class Limit(CheckedFields):
         ends = (low,) * (self.sign == "<") + (high,) * (self.sign == ">")  # which nothing passes
         fits = low <= self.value <= high and self.value not in ends
         if not fits or (row.counts and not float(self.value).is_integer()):
-            upper = f" and below {high:g}" if self.sign == ">" else f" to {high:g}"
+            upper = f" to {'below ' * (self.sign == '>')}{high:g}" if high < inf else ""
             raise CaseError(
                 f"{self}: expected a {'whole ' * row.counts}number "
-                f"{'above' if self.sign == '<' else 'from'} {low:g}{upper if high < inf else ''}, "
-                f"for {self.name} ({row.meaning}) is that"
+                f"{'above' if self.sign == '<' else 'from'} {low:g}{upper} for {self.name} "
+                f"({row.meaning})"
             )
 
     def __str__(self) -> str:

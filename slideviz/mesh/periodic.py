@@ -294,6 +294,8 @@ def _left_over(
             match(mesh, alone[0], alone[1], kind, axis, origin)
         except MeshError as problem:
             why = str(problem).partition(" do not match: ")[2]
+            if not why:  # a marker is not there, or is empty
+                return problem
     pairs = ", ".join(f"{p.first!r} and {p.second!r} match ({p.describe()})" for p in good)
     left = " and ".join(repr(name) for name in alone)
     return MeshError(f"{mesh.name}: the periodic markers {pairs}, but {left} do not: {why}")

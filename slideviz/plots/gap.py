@@ -23,6 +23,7 @@ def draw_gaps(
 
     Span is the vertical axis, and the chord is the horizontal one. All meshes have the same gaps.
     Zones share the plots of throat, tip gap and hub gap, and differ by the dashes of their curves.
+    The first mesh of several has wide pale ones, which are seen beneath others at the same places.
     """
     names = list(dict.fromkeys(gap.name for gap in measured[0][2]))
     for number, name in enumerate(names):
@@ -41,12 +42,15 @@ def draw_gaps(
             dash = look.dash if gap.zone is None else ZONE_DASHES[(gap.zone - 1) % 4]
             words = label if gap.zone is None else f"{label}, zone {gap.zone}"
             looks = {"color": look.color, "linestyle": dash, "linewidth": style.width}
+            if len(measured) > 1 and label == measured[0][0]:
+                looks |= {"linewidth": 2.4 * style.width, "alpha": 0.35}
             axes.plot(*(values if by_span else values[::-1]), label=words, gid=words, **looks)
             place = gap.distance, gap.place if gap.along else 0.5
             axes.plot(
                 *[[at] for at in (place if by_span else place[::-1])], "o", ms=4, color=look.color
             )
         if not any(gap.distance for _, _, gap in shown):
-            axes.set_title(TOUCHING, fontsize=style.size, color=style.scheme.text)
+            axes.set_title(TOUCHING, y=0.9, fontsize=style.size, color=style.scheme.text)
         axes.locator_params(axis="x", nbins=4)
-        add_legend(axes, style, loc="best")
+        above = {"loc": "lower center", "bbox_to_anchor": (0.45, 1.0), "ncols": 2}
+        add_legend(axes, style, **above, handlelength=2.2, columnspacing=1.0)

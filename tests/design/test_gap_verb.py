@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.gap import PLACES
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Origin
+from slideviz.plots.gap import draw_gaps
 from tests.builders import _renamed, grid, passage, ring, sector, stage
 
 ROLES = {"blade": "moving", "per1": "periodic", "per2": "periodic", "shroud": "sliding"}
@@ -180,6 +182,16 @@ def test_each_zone_has_the_gaps_that_it_has_alone(tmp_path, monkeypatch, capsys)
         [alone] = sv.gaps(case_of(), part.mesh)
         assert one.distance == alone.distance
         assert np.array_equal(one.distances, alone.distances)
+    figure = Figure(layout="constrained")
+    draw_gaps(figure, [("undeformed", 4, (front, behind)), ("deformed", 0, (front, behind))])
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    below, above = (
+        next(line for line in axes.lines if line.get_gid() == f"{name}, zone 2")
+        for name in ("undeformed", "deformed")
+    )
+    assert below.get_linewidth() > 2.0 * above.get_linewidth(), "it is seen at the same places"
+    assert axes.get_legend().get_window_extent().y0 >= axes.bbox.y1 - 1.0
     # One row only moves: the other has no blade.
     still = case.change(roles=roles | {"1:blade": "fixed"})
     assert [one.zone for one in sv.gaps(still, mesh)] == [2]

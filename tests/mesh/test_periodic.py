@@ -219,6 +219,11 @@ def test_a_marker_without_partner_gives_the_reason():
         pair_up(builders.square(6), ("x_m", "BLOCK"))
 
 
+def test_markers_that_the_mesh_lacks_are_named_beside_a_pair_that_matches():
+    with pytest.raises(MeshError, match=r"no marker '1:x_m'; the mesh has "):
+        pair_up(builders.square(6), ("x_m", "x_p", "1:x_m", "1:x_p"))
+
+
 def test_pairs_are_guessed():
     found = find_pairs(only(builders.passage((2, 4, 6)), "per1", "per2", "hub", "blade"))
     assert [(p.first, p.second, p.kind) for p in found] == [("per1", "per2", "rotational")]

@@ -103,6 +103,13 @@ def test_one_zone_of_a_case_that_names_all(tmp_path, capsys, monkeypatch):
     assert any("'1:BLOCK'" in text for text in check_case(case, sv.read("single.su2")))
 
 
+def test_a_boundary_without_motion_has_the_number_of_its_zone(tmp_path):
+    case = both().change(motions=(turn("3:"), turn("2:")))
+    wrong, unmoved = check_case(case, sv.read(stage(tmp_path)))
+    assert wrong.startswith("motion 1 names '3:BLOCK', which does not move")
+    assert unmoved.startswith("moving marker '1:BLOCK' has no motion")
+
+
 def test_a_name_of_several_zones_needs_its_number(tmp_path):
     case = sv.Case(roles={"BLOCK": "moving"}, motions=(turn(""),))
     with pytest.raises(CaseError, match="have a marker 'BLOCK'; write 1:BLOCK or 2:BLOCK"):
