@@ -147,7 +147,11 @@ def _reason(problem: str, given: list[str] | None) -> str:
     if problem in given:
         return f"[{given.index(problem) + 1}]"
     given.append(problem)
-    return f"[{len(given)}]: {' '.join(problem.split())}"
+    return f"[{len(given)}]: {_one_line(problem)}"
+
+
+def _one_line(problem: str) -> str:
+    return "; ".join(" ".join(line.split()) for line in problem.splitlines())
 
 
 def _cell(text: str, column: StudyColumn) -> str:
@@ -433,7 +437,7 @@ def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]
     """Return for each reason the combinations that have it."""
     groups: dict[str, list[Combination]] = {}
     for combination, problem in problems.items():
-        groups.setdefault(" ".join(problem.split()), []).append(combination)
+        groups.setdefault(_one_line(problem), []).append(combination)
     return groups
 
 
