@@ -26,7 +26,7 @@ from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 from slideviz.solver.steps import Trial
-from tests.builders import grid, layered
+from tests.builders import grid, layered, stage
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -766,6 +766,16 @@ def test_quality_checks_limits(square, tmp_path, capsys):
     assert run(["quality", mesh, "-o", str(tmp_path / "rated.su2")]) == 1
     assert "use .vtu, .vtkhdf or .csv" in capsys.readouterr().err
     assert not (tmp_path / "rated.su2").exists()
+
+
+def test_periodic_sides_are_no_walls_without_a_case(tmp_path, capsys):
+    mesh = str(tmp_path / "stage.su2")
+    sv.write(mesh, stage())
+    assert run(["quality", mesh, "--limits", "equal_layers@1:per1 > 0"]) == 1
+    assert "1:per1 is no wall, for it is periodic" in capsys.readouterr().err
+    # Of boundaries that match by chance, as ends of a duct, nothing is left out.
+    sv.write(mesh, grid((4, 4)))
+    assert run(["quality", mesh, "--limits", "equal_layers@x_m > 0"]) != 1
 
 
 def test_layers_are_in_reports_and_summaries(channel, tmp_path, capsys):

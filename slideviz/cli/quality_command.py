@@ -100,7 +100,7 @@ def quality(arguments: argparse.Namespace) -> int:
         mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)
         values = {name: one for name, one in rated.items() if one is not None}
         base, case = opened.read_base(), opened.case
-        names = case.walls(mesh.marker_names) if case else None
+        names = case.walls(mesh.marker_names) if case else _not_periodic(base or mesh)
         layers = _walls(mesh, base, names)
         results = check_limits(arguments.limits, MeasuredMesh(found, mesh, base, names))
         cells, points = metric_data(values, layers, arguments.metrics)
@@ -177,6 +177,27 @@ def _report(
             print(f"limits:\n{limit_lines(report['limits'])}")
     code = report_limits(report["limits"])
     return INVERTED if found.inverted else code
+
+
+def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
+    """Return the boundaries without those that match and whose names say that they are periodic.
+
+    None, which means all, where there are none such or the mesh is in a file.
+    """
+    from slideviz.errors import MeshError
+    from slideviz.mesh.periodic import find_pairs
+    from slideviz.session.opening import guess_by_name
+
+    guesses = {name: guess_by_name(name) for name in mesh.marker_names}
+    hinted = {name for name, guess in guesses.items() if guess and guess.role == "periodic"}
+    if mesh.part is not None or not hinted:
+        return None
+    try:
+        pairs = find_pairs(mesh)
+    except MeshError:
+        return None
+    periodic = hinted & {name for pair in pairs for name in (pair.first, pair.second)}
+    return [name for name in mesh.marker_names if name not in periodic] if periodic else None
 
 
 def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> Walls | None:
