@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
 
 import slideviz as sv
 from slideviz.case.model import (
     Bump,
+    Case,
     Cst,
     Ffd,
     FfdCamber,
@@ -27,11 +29,11 @@ from slideviz.gui.panels.motions import TableDialog
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.vector_field import control_point_problem
 from slideviz.samples.table import write_sample
-from slideviz.session import changes
+from slideviz.session import changes, jobs
 from slideviz.session.motions import Ghosts, TableRows, largest_prescribed
 from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
-from tests.builders import airfoil
+from tests.builders import airfoil, stage
 from tests.slow import one_of_each_fast
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -193,6 +195,37 @@ def test_a_curve_over_span_is_typed_checked_and_shown_with_its_ghost(driver, tmp
     assert "is not above 0" in form.curve.toolTip()
     driver.choose(form.change, "stagger")
     assert driver.session.case.motions == (SpanMotion("BLADE", "stagger", (0.0,), (0.0,)),)
+
+
+def test_motions_over_span_of_each_zone_have_its_walls(driver, tmp_path):
+    names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
+    roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
+    twist = SpanMotion("1:blade", "twist", (0.0, 1.0), (0.0, 3.0))
+    case = Case(roles=roles, motions=(twist,), periodic_type="rotational")
+    opened = jobs.prepare(stage(), tmp_path / "s.su2", case, lambda _: None, lambda: False)
+    window = driver.window
+    window.resize(1280, 800)
+    window.show_opened(opened)
+    driver.qtbot.waitUntil(window.motions.editor.drawn.isVisible)
+    QApplication.processEvents()
+    form = editor(driver)
+    assert form.drawn.geometry().bottom() < form.about.geometry().top()
+    hub, shroud = form.walls.ends
+    assert (hub.currentData(), shroud.currentData()) == ("1:hub", "1:shroud")
+    driver.click_row("1:blade")
+    [missing] = run_requirements(driver.session)
+    window.focus_requirement(missing)
+    assert driver.session.case.motions[1].marker == "2:blade"
+    assert driver.session.view.selected == ("2:blade",)
+    assert window.boundaries.selected() == ("2:blade",)
+    assert (hub.currentData(), shroud.currentData()) == ("2:hub", "2:shroud")
+    assert {hub.itemData(k)[:2] for k in range(hub.count())} == {"2:"}
+    window.store.change(changes.set_case, span=("1:hub", "1:shroud"))
+    assert hub.currentData() == "2:hub", "those of the other zone"
+    driver.choose(hub, "2:inflow")
+    assert driver.session.case.span == ("2:inflow", "2:shroud")
+    window.motions.list.setCurrentRow(0)
+    assert hub.currentData() == "1:hub"
 
 
 # Tables ---------------------------------------------------------------------------------------

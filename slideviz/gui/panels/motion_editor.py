@@ -38,6 +38,7 @@ from slideviz.gui.widgets.build import as_widget, grow_fields, in_row, push_butt
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
 from slideviz.gui.widgets.span_curve import SpanCurveField
+from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.vector_field import VectorField, a_direction, control_point_problem
 from slideviz.session.motions import Axis, new_motion, radial
 from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS
@@ -215,7 +216,7 @@ class MotionEditor(QWidget):
     table_wanted = Signal()
     """The user wants to edit the rows of the motion's displacement file."""
 
-    def __init__(self, walls: QWidget) -> None:
+    def __init__(self, walls: SpanWalls) -> None:
         super().__init__()
         self.walls = walls
         self.form = QFormLayout(self)
@@ -297,6 +298,7 @@ class MotionEditor(QWidget):
         if motion is None:
             return
         self._sync_targets(motion, targets)
+        self.walls.show_for(named(motion.marker))
         for kind in (FfdTwist, SpanMotion):  # a section has no span to twist along
             self.kind.set_item_enabled(kind, dim == 3)
         self.kind.show_value(type(motion))
@@ -310,8 +312,8 @@ class MotionEditor(QWidget):
             self._name_height(motion)
         if isinstance(motion, WITH_ABOUT):
             shown |= {"about"} | self._show_place(motion, dim)
-        for widget in (self.drawn, self.walls):
-            self.form.setRowVisible(widget, isinstance(motion, SpanMotion))
+        for shared in (self.drawn, self.walls):
+            self.form.setRowVisible(shared, isinstance(motion, SpanMotion))
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))

@@ -149,8 +149,7 @@ def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Pa
     return None
 
 
-HEIGHT, LEAST_HEIGHT = 300, 210
-"""Preferred height of the panel, and its least height, which the longest form needs; pixels."""
+HEIGHT = 300  # preferred height of the panel, in pixels
 
 
 class MotionPanel(Panel):
@@ -312,6 +311,7 @@ class MotionPanel(Panel):
         if self.watch.focus():
             return
         if missing.marker:
+            self.store.change(changes.select, (missing.marker,))
             self._add_for(missing.marker, type(motions[-1]) if motions else Translate)
         elif motions:
             self.list.setCurrentRow(missing.motion)
@@ -394,6 +394,3 @@ class MotionPanel(Panel):
     def sizeHint(self) -> QSize:
         # Independent of the shown form, so that the panel above does not jump.
         return QSize(super().sizeHint().width(), HEIGHT)
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(super().minimumSizeHint().width(), LEAST_HEIGHT)

@@ -55,7 +55,7 @@ class SpanCurveField(QWidget):
         self._before: Points | None = None  # the points before a drag
         self._range = self._fit()
         self._soon = single_shot(self, self._emit)
-        self.setMinimumSize(120, 110)
+        self.setMinimumSize(120, 96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setToolTip(wrapped(TIP))

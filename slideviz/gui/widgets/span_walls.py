@@ -9,6 +9,7 @@ from slideviz.errors import CaseError
 from slideviz.gui.widgets.build import in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.panel import Panel
+from slideviz.mesh.zones import names_from
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -35,17 +36,33 @@ class SpanWalls(Panel):
         row.setContentsMargins(0, 0, 0, 0)
         self.setLayout(row)
         self._by_name: tuple[str, str] | None = None
+        self._blade: tuple[str, ...] = ()
         self.follow(lambda session: (session.mesh, session.case.span))
 
+    def show_for(self, blade: tuple[str, ...]) -> None:
+        """Offer the walls of the zone that has these boundaries; where none has them, of all."""
+        if blade != self._blade:
+            self._blade = blade
+            self.sync(self.store.session)
+
     def sync(self, session: Session) -> None:
-        mesh, self._by_name = session.mesh, None
+        mesh, case, self._by_name = session.mesh, session.case, None
+        span, names = case.span, dict[str, str]()  # of boundaries in the mesh, by those in the file
         if mesh is not None:
+            zone, names = mesh, {name: name for name in mesh.marker_names}
+            for part in mesh.zone_parts if self._blade else ():
+                if {*self._blade} <= {*mesh.marker_names[part.markers]}:
+                    zone, names = part.mesh, names_from(mesh, part)
             with suppress(CaseError):  # names that do not say which
-                self._by_name = span_ends(session.case.change(span=None), mesh)
+                hub, shroud = span_ends(case.change(span=None), zone)
+                self._by_name = names[hub], names[shroud]
+        if span is not None:
+            span = names.get(span[0], span[0]), names.get(span[1], span[1])
+            span = span if {*span} <= {*names.values()} else None  # of another zone
         for k, end in enumerate(self.ends):
-            end.offer({} if mesh is None else {name: name for name in mesh.marker_names})
+            end.offer({name: name for name in names.values()})
             end.setCurrentIndex(-1)
-            end.show_value((session.case.span or self._by_name or ("", ""))[k])
+            end.show_value((span or self._by_name or ("", ""))[k])
 
     def _chosen(self, _: object) -> None:
         hub, shroud = (end.currentData() for end in self.ends)
