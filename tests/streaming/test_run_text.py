@@ -348,8 +348,8 @@ def late(what):
 output.CHUNK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
 output.write_points = late(output.write_points)
 binary_copy._write_cells = late(binary_copy._write_cells)
-from slideviz.streaming import stream_input
-stream_input.moved_rows = late(stream_input.moved_rows)
+from slideviz.formats.su2 import write
+write._moved_rows = late(write._moved_rows)
 run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
 """
 
