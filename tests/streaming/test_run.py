@@ -77,13 +77,27 @@ def bits(points):
     return points.view(np.int64)
 
 
+def require_same(done, steps, mesh):
+    """Check quality, folded cells and steps of a streamed run against those of one in memory."""
+    found = sv.quality(steps[-1].mesh, mesh)
+    ids = found.inverted_cells(100)
+    assert done.quality.summary() == found.summary()
+    assert np.array_equal(done.quality.values, found.values)
+    assert done.undeformed.summary() == sv.quality(mesh).summary()
+    when = {cell: step for cell, (_, step) in done.folded.items()}
+    assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
+    for one, other in zip(steps, done.steps, strict=True):
+        for field in ("index", "total", "part", "max_error", "control_nodes", "node_counts"):
+            assert getattr(one, field) == getattr(other, field)
+        for field in ("warnings", "tried", "safe", "periodic_misfit", "candidates"):
+            assert getattr(one, field) == getattr(other, field)
+
+
 @pytest.mark.parametrize(("name", "size", "sets"), RUNS)
 def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, sets):
     case = made(tmp_path, name, size, sets)
     mesh = sv.read(case.mesh_file)
     steps = list(sv.deform(case, mesh, certify=True))
-    found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
-    ids = found.inverted_cells(100)
     for chunk in (37, 1 << 20):
         monkeypatch.setattr(output, "CHUNK", chunk)
         monkeypatch.setattr(repair, "CELLS", chunk)
@@ -91,15 +105,8 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
         moved = sv.read(tmp_path / "out.su2b")
         assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
         assert moved.cells.same_as(mesh.cells)
-        assert done.quality.summary() == found.summary()
-        assert np.array_equal(done.quality.values, found.values)
-        assert done.undeformed.summary() == before.summary()
-        when = {cell: step for cell, (_, step) in done.folded.items()}
-        assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
+        require_same(done, steps, mesh)
         for one, other in zip(steps, done.steps, strict=True):
-            for field in ("max_error", "control_nodes", "node_counts", "warnings", "tried", "safe"):
-                assert getattr(one, field) == getattr(other, field)
-            assert one.periodic_misfit == other.periodic_misfit
             if one.repaired is not None:
                 assert len(one.repaired.nodes)
                 assert one.repaired.report() == other.repaired.report()
@@ -241,6 +248,19 @@ def killed_at(move, point):
     def moving(*arguments):
         if arguments[-1][0] >= point:
             raise KilledError
+        return move(*arguments)
+
+    return moving
+
+
+def killed_after(move, count):
+    """Return what writes ``count`` parts, and not the next one."""
+    calls = []
+
+    def moving(*arguments):
+        if len(calls) == count:
+            raise KilledError
+        calls.append(1)
         return move(*arguments)
 
     return moving

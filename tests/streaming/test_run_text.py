@@ -27,7 +27,7 @@ from slideviz.streaming import converting, output, resources
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import stream
 from tests.builders import grid
-from tests.streaming.test_run import RUNS, KilledError, flip, killed_at
+from tests.streaming.test_run import RUNS, KilledError, flip, killed_after, killed_at
 
 
 def made(folder, name, size, sets=()):
@@ -248,19 +248,12 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in (-1, 0, 3, parts - 1, *([parts] if ending == "su2" else [])):
-        calls = []
-
-        def stopping(*arguments, stop=stop, calls=calls):
-            if len(calls) == stop:
-                raise KilledError
-            calls.append(1)
-            return move(*arguments)
 
         def killed(*_, **__):
             raise KilledError
 
         with monkeypatch.context() as patch:
-            patch.setattr(output, "write_points", stopping)
+            patch.setattr(output, "write_points", killed_after(move, stop))
             if stop == -1:
                 patch.setattr(binary_copy, "_write_points", killed)
             if stop == parts:

@@ -8,14 +8,13 @@ import pytest
 import slideviz as sv
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.zones import join_zones
-from slideviz.solver.deform import folded_at
 from slideviz.streaming import output, repair
 from slideviz.streaming.run import stream
 from tests.builders import grid, passage
 from tests.mesh.test_interfaces import zones as core_in_a_square
 from tests.solver.test_zones import both, roles_of, turn
 from tests.solver.test_zones import stage as rows
-from tests.streaming.test_run import KilledError, bits
+from tests.streaming.test_run import KilledError, bits, killed_after, require_same
 
 
 def sliding_pair(folder):
@@ -92,10 +91,9 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
         path = path.with_suffix(".su2b")
     mesh = sv.read(path)
     steps = list(sv.deform(case, mesh, certify=True))
-    found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
+    found = sv.quality(steps[-1].mesh, mesh)
     sv.write(tmp_path / f"memory.{ending}", steps[-1].mesh)
-    ids = found.inverted_cells(100)
-    assert len(ids) or name not in ("folded", "repaired")
+    assert len(found.inverted_cells(100)) or name not in ("folded", "repaired")
     monkeypatch.setattr(output, "CHUNK", 37)
     monkeypatch.setattr(repair, "CELLS", 37)
     done = stream(case.change(mesh_file=path), tmp_path / f"out.{ending}", worst=5)
@@ -104,17 +102,9 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
     assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
     out, memory = ((tmp_path / f"{one}.{ending}").read_bytes() for one in ("out", "memory"))
     assert out == memory
-    assert done.quality.summary() == found.summary()
-    assert np.array_equal(done.quality.values, found.values)
+    require_same(done, steps, mesh)
     assert np.array_equal(done.quality.totals.worst, found.worst(5))
-    assert done.undeformed.summary() == before.summary()
-    when = {cell: step for cell, (_, step) in done.folded.items()}
-    assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
     for one, other in zip(steps, done.steps, strict=True):
-        for field in ("index", "total", "part", "max_error", "control_nodes", "node_counts"):
-            assert getattr(one, field) == getattr(other, field)
-        for field in ("warnings", "tried", "safe", "periodic_misfit", "candidates"):
-            assert getattr(one, field) == getattr(other, field)
         whole, part = one.repaired, other.repaired
         assert (whole is None) == (part is None)
         if whole is not None:
@@ -144,15 +134,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, endi
     whole, move = out.read_bytes(), output.write_points
     parts = sum(-(-len(sv.read(path, zone).points) // 20) for zone in (1, 2))
     for stop in (2, parts - 1):
-        calls = []
-
-        def stopping(*arguments, stop=stop, calls=calls):
-            if len(calls) == stop:
-                raise KilledError
-            calls.append(1)
-            return move(*arguments)
-
-        monkeypatch.setattr(output, "write_points", stopping)
+        monkeypatch.setattr(output, "write_points", killed_after(move, stop))
         with pytest.raises(KilledError):
             stream(case, out)
         again, told = [], []
