@@ -9,6 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
+from slideviz.design.su2 import gradients
 from tests.builders import cube, square
 
 DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
@@ -447,16 +448,25 @@ def heard(extra, values, points, weights, capsys):
     return code, lines
 
 
-def test_a_badly_conditioned_system_is_told_by_the_command_itself(case, capsys):
+def test_a_badly_conditioned_system_is_told_by_the_command_itself(case, capsys, monkeypatch):
     points, weights = case
     extra = "RBF_KERNEL= gaussian\nINFLUENCE_FACTOR= 20\nDATA_REDUCTION= NO\n"
     code, lines = heard(extra, "0.0, 0.0", sv.read("mesh.su2").points, weights, capsys)
     assert code == 0
     assert any("the condition number of the system is" in line for line in lines)
     points = written(simple() + extra)
+    # By how much the two differ, if at all, is rounding times a condition number of 2e18.
+    monkeypatch.setattr(gradients, "CLOSE", -1.0)
     code, lines = heard(extra, "0.05, 0.02", points, weights, capsys)
     assert code == 0
     assert any("of a deformation whose points differ by up to" in line for line in lines)
+
+
+def test_points_that_differ_from_those_written_are_told():
+    points = np.array([[2.0, 0.0], [0.0, 1.0]])
+    assert gradients._difference(points + 0.4 * gradients.CLOSE, points) == []
+    (said,) = gradients._difference(points + 3.0 * gradients.CLOSE, points)
+    assert "whose points differ by up to 3e-08 from those that `slideviz def` writes" in said
 
 
 def test_control_nodes_that_do_not_suffice_are_told(case, capsys):

@@ -38,9 +38,10 @@ def solved(system, right):
 
 
 def interpolated(points, controls, values, radius, kernel="wendland-c2"):
-    """The interpolant at points (N, d) of values (n, m) at controls (n, d), rounded."""
+    """The interpolant (N, m) at points of values (n, m) at controls, and its weights, rounded."""
     with localcontext() as context:
         context.prec = 50
         system = matrix(controls, controls, radius, kernel)
         weights = solved(system, EXACT(values))
-        return (matrix(points, controls, radius, kernel) @ weights).astype(float)
+        field = matrix(points, controls, radius, kernel) @ weights
+        return field.astype(float), weights.astype(float)
