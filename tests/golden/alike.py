@@ -17,6 +17,10 @@ RELATIVE, ABSOLUTE = 1e-8, 1e-11
 ROUGH = {"condition": 0.5}
 """Words that lines begin with whose numbers may be further apart: it is estimated by chance."""
 
+DIFFERENCES = {".angle.change.": 1e-6}
+"""Parts of lines whose number is a difference of larger ones, with its rounding: `RELATIVE` of them,
+here of angles of about 90 degrees."""
+
 SHORT = 6
 """Significant digits from which on the last one of a printed number may be another by one."""
 
@@ -78,18 +82,22 @@ def lines_alike(old: str, now: str) -> bool:
     # Columns are as wide as their numbers are.
     words = (" ".join(_NUMBER.sub("#", line).split()) for line in (old, now))
     relative = ROUGH.get(old.partition(" ")[0], RELATIVE)
+    absolute = max([ABSOLUTE, *(value for part, value in DIFFERENCES.items() if part in old)])
     pairs = zip(first, second, strict=True)
-    return next(words) == next(words) and all(numbers_alike(*pair, relative) for pair in pairs)
+    same = all(numbers_alike(*pair, relative, absolute) for pair in pairs)
+    return same and next(words) == next(words)
 
 
-def numbers_alike(old: str, now: str, relative: float = RELATIVE) -> bool:
+def numbers_alike(
+    old: str, now: str, relative: float = RELATIVE, absolute: float = ABSOLUTE
+) -> bool:
     """Return whether two numbers differ by no more than rounding; whole ones must not at all."""
     if old == now:
         return True
     if not any(set(text) & set(".e") for text in (old, now)):
         return False
     a, b = float(old), float(now)
-    allowed = max(ABSOLUTE, relative * max(abs(a), abs(b)))
+    allowed = max(absolute, relative * max(abs(a), abs(b)))
     mantissa, _, power = old.partition("e")
     if len(mantissa.lstrip("-+0.").replace(".", "")) >= SHORT:
         unit = 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))

@@ -120,6 +120,9 @@ def test_a_picture_of_another_size_is_told():
         ("wendland-c2", "wendland-c4", False),
         ("condition = [131.5]", "condition = [140.5]", True),
         ("condition = [131.5]", "condition = [1315.0]", False),
+        ("walls.a.angle.change.min = 0.00973202743", "walls.a.angle.change.min = 0.00973202", True),
+        ("walls.a.angle.change.min = 0.00973202743", "walls.a.angle.change.min = 0.009742", False),
+        ("walls.a.angle.after.min = 80.0000000001", "walls.a.angle.after.min = 80.00001", False),
         ("1 2", "1 2 3", False),
     ],
 )
