@@ -13,7 +13,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test test-all lint format docs golden smoke bench laws shots study clean
+.PHONY: help setup upgrade demo test test-all test-processors lint format docs golden smoke bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -34,11 +34,15 @@ test: setup ## fast tests (ARGS="-k name": only some)
 test-all: setup ## all tests, slow reproductions too
 	$(PYTEST) $(PARALLEL) --ignore=tests/benchmarks $(ARGS)
 
-lint: setup ## style, types, and the direction of imports
+test-processors: setup ## fast tests with the arithmetic of other processors (nightly)
+	@PYTEST="$(PYTEST) $(PARALLEL)" tools/test_processors.sh $(ARGS)
+
+lint: setup ## style, types, the direction of imports, and the number of tokens
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python tools/size.py
 
 format: setup ## let ruff put right what it can
 	$(BIN)/ruff check --fix .
