@@ -18,8 +18,8 @@ ROUGH = {"condition": 0.5}
 """Words that lines begin with whose numbers may be further apart: it is estimated by chance."""
 
 DIFFERENCES = {".angle.change.": 1e-6}
-"""Parts of lines whose number is a difference of larger ones, with its rounding: `RELATIVE` of them,
-here of angles of about 90 degrees."""
+"""Parts of lines whose number is a difference of larger ones, and its rounding: `RELATIVE` of
+these, here angles of about 90 degrees."""
 
 SHORT = 6
 """Significant digits from which on the last one of a printed number may be another by one."""
