@@ -230,6 +230,22 @@ def stage(angles=(40.0, 30.0), lengths=(1.0, 0.75)) -> Mesh:
     return join_zones([replace(zone, zone=k, zones=2) for k, zone in enumerate(zones, 1)])
 
 
+def zones_in_a_row(count: int, shape: Sequence[int], bend: float = 0.0) -> Mesh:
+    """Unit squares or cubes of ``shape`` cells, side by side along x, as the zones of one mesh.
+
+    What is x_p of one is x_m of the next. ``bend``: depth of the waves in these interfaces.
+    """
+
+    def zone(k: int) -> Mesh:
+        def place(p: np.ndarray) -> np.ndarray:
+            at = p / np.array(shape, float)
+            return at + [[k, *[0.0] * (len(shape) - 1)]] + bend * np.sin(np.pi * at[:, ::-1])
+
+        return replace(grid(shape, place=place), zone=k + 1, zones=count)
+
+    return join_zones([zone(k) for k in range(count)])
+
+
 def _renamed(shape, names) -> list[Rule]:
     rules = box_rules(shape)
     return [*((n, r[1]) for n, r in zip(names, rules, strict=False)), rules[-1]]

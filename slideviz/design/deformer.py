@@ -28,7 +28,7 @@ from slideviz.design.checks import (
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
-from slideviz.design.zones import ZoneDesign, zone_designs
+from slideviz.design.zones import Work, ZoneDesign, over_zones, zone_designs
 from slideviz.errors import CaseError, DeformError, Note, not_one_of
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
@@ -36,7 +36,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR
 from slideviz.rbf.loops import to_points
-from slideviz.rbf.tape import Array, Tape, Variable, put, value
+from slideviz.rbf.tape import Array, Tape, Variable, value
 from slideviz.solver.deform import Progress
 from slideviz.solver.growth import wall_warnings
 from slideviz.solver.prescribed import displaced, support_radius
@@ -246,7 +246,7 @@ class Deformer:
         design = self.displacement if displacement is None else displacement
         design = self._checked(design, "displacement")
         if self._zones:
-            return value(self._joined(lambda zone: zone.deformer.deform(value(zone.of(design)))))
+            return value(self._joined(design, lambda zone, moved: zone.deform(value(moved))))
         points, errors, error_estimate = self._deformed(design)
         warn_of_error_estimate(self._steps, error_estimate)
         reduced = self._setup.reduction is not None
@@ -266,10 +266,17 @@ class Deformer:
         """
         design = self._checked(displacement, "displacement")
         if self._zones:
-            each = (zone.deformer.max_error(value(zone.of(design))) for zone in self._zones)
-            largest: float | FloatArray = reduce(np.maximum, each)
-            return largest
-        error = self._deformed(design)[1]
+            errors = list[FloatArray]()
+
+            def deformed(zone: Deformer, moved: Array) -> FloatArray:
+                points, error, _ = zone._deformed(value(moved))
+                errors.append(error)
+                return points
+
+            self._joined(design, deformed)
+            error = reduce(np.maximum, errors)
+        else:
+            error = self._deformed(design)[1]
         return float(error) if error.ndim == 0 else error
 
     @check_types
@@ -358,11 +365,13 @@ class Deformer:
         Of several zones, nodes that follow others are equal to them up to rounding.
         """
         if self._zones:
-            runs = ((zone.number, zone.deformer.as_run()) for zone in self._zones)
-            known = {number: points for number, points in runs if points is not None}
-            if len(known) < len(self._zones):
-                return None
-            return value(self._joined(lambda zone: known[zone.number]))
+            out = self.mesh.points.copy()
+            for zone in self._zones:
+                points = zone.deformer.as_run()
+                if points is None:
+                    return None
+                out[zone.points] = points
+            return out
         return self._as_run
 
     @check_types
@@ -439,17 +448,13 @@ class Deformer:
             self._checks.require_alike(points)
         return np.stack([errors, np.broadcast_to(state.number("error_estimate"), errors.shape)])
 
-    def _joined(self, points_of: Callable[[ZoneDesign], Array]) -> Array:
-        """Return the points (..., n, d) of all zones; those of a zone that stays are undeformed."""
-        out: Array = self.mesh.points
-        for zone in self._zones:
-            out = put(out, zone.points, points_of(zone))
-        return out
+    def _joined(self, design: Array, work: Work) -> Array:
+        return over_zones(self._zones, self.mesh.points, design, work)
 
     def _points(self, design: Array) -> Array:
         """Return the points (n, d) of a design (m, d)."""
         if self._zones:
-            return self._joined(lambda zone: zone.deformer._points(zone.of(design)))
+            return self._joined(design, Deformer._points)
         return self._run(self._input.target(design))[-1].points
 
     def _taped(self, displacement: FloatArray) -> tuple[Variable, Variable]:

@@ -57,11 +57,12 @@ class InterfaceMotion:
         self._alone = tuple(self.cases)
         self._names: list[set[str]] = [set() for _ in self.cases]
         self._zone = {n: k for k, part in enumerate(mesh.zone_parts) for n in names_in(mesh, part)}
+        asked = [each for each in self.interfaces if self.roles.get(each.marker) == "moving"]
         for index in self.moving(range(len(self.cases))):
             moved = displacements(self._alone[index], mesh.zone_parts[index].mesh)
             shift = np.zeros_like(mesh.points)
             shift[mesh.zone_parts[index].points][moved.nodes] = moved.vectors
-            self._lead(index, shift, ("moving",), range(len(self.cases)))
+            self._lead(index, shift, asked, range(len(self.cases)))
 
     def moving(self, zones: Collection[int]) -> list[int]:
         """Return those of some zones that move."""
@@ -81,21 +82,43 @@ class InterfaceMotion:
 
         return min(zones, key=led)
 
-    def slid(self, index: int, points: FloatArray, zones: Collection[int]) -> None:
-        """Let ``zones`` follow a zone that has come to ``points`` (m, d)."""
+    def in_order(self) -> Iterator[tuple[int, set[int]]]:
+        """Return each zone that moves, in the order to deform them, and those that come after it.
+
+        Before the next one, `slid` says where the zone has come to.
+        """
+        ahead = set(range(len(self.cases)))
+        while moving := self.moving(sorted(ahead)):
+            index = self.first(moving)
+            ahead.remove(index)
+            yield index, ahead
+
+    def slid(self, index: int, shift: FloatArray, moving: IntArray, zones: Collection[int]) -> None:
+        """Let ``zones`` follow a zone whose points have moved by ``shift`` (m, d).
+
+        Those boundaries of it lead that have nodes which are among its ``moving`` points (k,).
+        """
         part = self.mesh.zone_parts[index]
-        shift = np.zeros_like(self.mesh.points)
-        shift[part.points] = points - part.mesh.points
-        self._lead(index, shift, ("fixed", "sliding", "internal", "periodic"), zones)
+        moved = np.zeros_like(self.mesh.points)
+        moved[part.points] = shift
+        leading = [
+            each
+            for each in self.interfaces
+            if self.roles.get(each.marker, "fixed") != "moving"
+            and np.isin(each.nodes, moving + part.points.start).any()
+        ]
+        self._lead(index, moved, leading, zones)
 
     def _lead(
-        self, index: int, shift: FloatArray, roles: Collection[str], zones: Collection[int]
+        self,
+        index: int,
+        shift: FloatArray,
+        leading: Iterable[ZoneInterface],
+        zones: Collection[int],
     ) -> None:
-        for each in self.interfaces:
-            mine, other = (self.roles.get(name, "fixed") for name in (each.marker, each.other))
-            moves = mine in roles and (mine == "moving" or shift[each.nodes].any())
-            concerned = self._zone[each.marker] == index and each.zone - 1 in zones
-            if concerned and moves and other in FOLLOWING:
+        for each in leading:
+            follows = self.roles.get(each.other, "fixed") in FOLLOWING
+            if follows and self._zone[each.marker] == index and each.zone - 1 in zones:
                 self._follow(each, shift)
 
     def _follow(self, each: ZoneInterface, shift: FloatArray) -> None:
@@ -149,15 +172,13 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
 def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
     """Return the motion of interfaces, and the steps of those zones that move."""
     require_valid(case, mesh)
-    motion = InterfaceMotion(case, mesh)
-    ahead, runs = set(range(len(motion.cases))), Runs()
-    while moving := motion.moving(sorted(ahead)):
-        index = motion.first(moving)
-        ahead.remove(index)
+    motion, runs = InterfaceMotion(case, mesh), Runs()
+    for index, ahead in motion.in_order():
         done, part = len(runs), mesh.zone_parts[index]
+        count = 1 + len(motion.moving(ahead))
 
         def zone_report(
-            now: Progress, done: int = done, count: int = len(moving), zone: int = index + 1
+            now: Progress, done: int = done, count: int = count, zone: int = index + 1
         ) -> None:
             step, total = done * now.total + now.step, (done + count) * now.total
             report(replace(now, step=step, total=total, zone=zone))
@@ -167,7 +188,8 @@ def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[Interfa
         except SlidevizError as problem:
             problem.args = (f"zone {index + 1}: {problem}",)
             raise
-        motion.slid(index, runs[index][-1].mesh.points, ahead)
+        shift = runs[index][-1].mesh.points - part.mesh.points
+        motion.slid(index, shift, np.flatnonzero(shift.any(axis=1)), ahead)
     return motion, runs
 
 
