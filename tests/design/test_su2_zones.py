@@ -15,6 +15,7 @@ from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.zones import zones_of
+from tests.builders import zones_in_a_row
 from tests.mesh.test_interfaces import zones as square_and_core
 from tests.solver.test_zones import stage
 
@@ -341,3 +342,46 @@ def test_one_box_moves_boundaries_of_two_zones(tmp_path, monkeypatch, capsys):
     (new,) = boxes_of(sv.read("out.su2"))
     assert np.array_equal(new.points, after.points)
     assert new.embedded.keys() == after.embedded.keys()
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize(
+    ("first", "second", "held"),
+    [
+        ("FFD_CONTINUITY= NO_DERIVATIVE\n", "FFD_CONTINUITY= NO_DERIVATIVE\n", 3),
+        ("FFD_CONTINUITY= NO_DERIVATIVE\n", "", 3),
+        ("", "FFD_CONTINUITY= USER_INPUT\nFFD_FIX_J= (0, 1)\n", 6),
+        ("", "", 0),
+    ],
+)
+def test_what_continuity_holds_in_one_zone_is_held_in_all(
+    tmp_path, monkeypatch, capsys, first, second, held, degree
+):
+    """Here y_m of zone 1 leaves the box that the interface of both zones lies in."""
+    monkeypatch.chdir(tmp_path)
+    sv.write("stage.su2", zones_in_a_row(2, (4, 4)))
+    one, _, two = Path("stage.su2").read_text().partition("IZONE= 2")
+    Path("stage.su2").write_text(f"{one}IZONE= 2{two.replace('_TAG= ', '_TAG= b_')}")
+    mesh = sv.read("stage.su2")
+    main = MAIN[: MAIN.index("MARKER_SYM")]
+    box = f"""FFD_DEFINITION= (BOX, 0.6, -0.5, 0, 1.4, -0.5, 0, 1.4, 1.5, 0, 0.6, 1.5, 0, \\
+  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+FFD_DEGREE= ({degree}, 2, 0)
+"""
+    points = [(i, j) for i in range(degree + 1) for j in range(3)]
+    kinds = f"DV_KIND= {', '.join(['FFD_CONTROL_POINT_2D'] * len(points))}\n"
+    places = "; ".join(f"(BOX, {i}, {j}, 0.5, 1)" for i, j in points)
+    values = ", ".join(["0.01"] * len(points))
+    main += f"{box}{kinds}DV_PARAM= {places}\nDV_VALUE= {values}\n"
+    write(main, f"DV_MARKER= (x_p, y_m)\n{first}", f"DV_MARKER= (b_x_m)\n{second}")
+    assert run(["def", "main.cfg", "--force", "--json", "r.json", "-q"]) == 0
+    said = capsys.readouterr().err
+    assert "no longer fits" not in said
+    assert ("will do nothing" in said) == (held > 0)
+    assert ("SU2 would hold" in said) == (held == 0)
+    moved = sv.read("out.su2").points
+    for each in mesh.interfaces:
+        assert np.abs(moved[each.nodes] - moved[each.partners]).max() < 1e-12
+    assert np.abs(moved - mesh.points)[mesh.interfaces[0].nodes].max() > 1e-4
+    surface = make_surface(on_mesh(read_config(Path("main.cfg")), mesh), mesh)
+    assert sum(surface.idle) == (held if held < 6 else 2 * (degree + 1))

@@ -128,13 +128,15 @@ def held_by_continuity(
 ) -> tuple[dict[str, Planes], list[str]]:
     """Return the planes of each box that are held, and warnings about what they do.
 
-    None are where FFD_CONTINUITY is not given, but a warning says which ones SU2 would hold.
+    What is held in one zone is held in all, so that boundaries which they share stay together. None
+    are where no zone has FFD_CONTINUITY, but a warning says which ones SU2 would hold.
     """
-    asked = config.words["FFD_CONTINUITY"].upper()
-    continuity = asked or SU2_CONTINUITY
     every, warnings = {}, []
     for name, box in boxes.items():
-        every[name] = held = held_planes(config, mesh, box, continuity)
+        zones = [config, *(zone for zone in config.beside if name in _boxes_moved(zone))]
+        asking = [zone for zone in zones if zone.words["FFD_CONTINUITY"]]
+        held = _held_in(asking or zones, mesh, box)
+        every[name] = held if asking else NONE
         stuck, partly = [], []
         for place, variable in enumerate(config.variables, 1):
             if variable.box != name:
@@ -144,7 +146,8 @@ def held_by_continuity(
             stuck += [place] * (left == 0 < free)
             partly += [place] * (0 < left < free)
         effects = [(stuck, "do nothing"), (partly, "leave the control points there")]
-        if asked:
+        if asking:
+            asked = asking[0].words["FFD_CONTINUITY"].upper()
             note = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
             warnings += [f"{note}{places_words(at)} will {effect}" for at, effect in effects if at]
         elif stuck or partly:
@@ -153,11 +156,25 @@ def held_by_continuity(
             )
             warnings.append(
                 f"SU2 would hold {_words(held)} of the box {name}, since the surface leaves it "
-                f"there, by its default FFD_CONTINUITY= {continuity}, so that {done}; here they "
-                "move. Write that key to hold them, or FFD_CONTINUITY= USER_INPUT to hold what "
-                "FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
+                f"there, by its default FFD_CONTINUITY= {SU2_CONTINUITY}, so that {done}; here "
+                "they move. Write that key to hold them, or FFD_CONTINUITY= USER_INPUT to hold "
+                "what FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
             )
-    return (every if asked else dict.fromkeys(boxes, NONE)), warnings
+    return every, warnings
+
+
+def _boxes_moved(config: Su2Config) -> set[str]:
+    return {variable.box for variable in config.variables}
+
+
+def _held_in(zones: list[Su2Config], mesh: Mesh, box: Box) -> Planes:
+    """Return the planes of a box that any zone holds, by axis."""
+    each = [
+        held_planes(zone, mesh, box, zone.words["FFD_CONTINUITY"].upper() or SU2_CONTINUITY)
+        for zone in zones
+    ]
+    i, j, k = (frozenset[int]().union(*planes) for planes in zip(*each, strict=True))
+    return i, j, k
 
 
 def _words(held: Planes) -> str:
@@ -282,7 +299,7 @@ def limits_of(config: Su2Config) -> Limits:
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
     """Return the boxes that the variables deform, with the nodes (m,) inside; or CaseError."""
-    known, names = boxes_for(config.case, mesh), {each.box for each in config.variables}
+    known, names = boxes_for(config.case, mesh), _boxes_moved(config)
     nested = {name for box in known.values() if box.parent for name in (box.name, box.parent)}
     order = [box.name for box in boxes_of(mesh, system_of(config.case))]
     boxes, inside, warnings = [], {}, []

@@ -194,6 +194,8 @@ class Su2Config:
     zone: int | None = None  # of a configuration in CONFIG_LIST: the number of its zone, from 1
     zones: tuple[Su2Config, ...] = ()
     """The configurations in CONFIG_LIST; (): it has none, and is that of all zones of the mesh."""
+    beside: tuple[Su2Config, ...] = ()
+    """Of a configuration in CONFIG_LIST: those of the other zones."""
 
     def of_zone(self, index: int) -> Su2Config:
         """Return the configuration that holds for a zone, from 0."""

@@ -152,7 +152,9 @@ def joined(config: Su2Config, zones: tuple[Su2Config, ...]) -> Su2Config:
         variables=tuple(chain(*dict.fromkeys(each.variables for each in moving))),
         words=(checked or moving)[0].words,
         named={name: key for each in zones for name, key in each.named.items()},
-        zones=zones,
+        zones=tuple(
+            replace(each, beside=tuple(one for one in zones if one is not each)) for each in zones
+        ),
     )
 
 
