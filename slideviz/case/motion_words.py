@@ -12,6 +12,7 @@ from slideviz.terms import AXES, SPAN_KINDS
 
 ALONG = 1e-12
 """A direction is along an axis where the cosine of their angle differs from 1 by less than this."""
+MOST_NAMED = 4  # most markers of a motion whose names are all in its words
 NOTHING = 1e-10
 """A coordinate smaller than this part of the mesh's extent is written as 0: it is rounding."""
 
@@ -26,8 +27,12 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
 
 
 def target_words(target: Target) -> str:
-    """Return the markers that a motion moves, in words."""
-    return " + ".join(named(target)) or "all moving"
+    """Return the markers that a motion moves, in words: of many the first ones, and a number."""
+    names = named(target)
+    more = len(names) - MOST_NAMED + 1
+    if more > 1:
+        names = (*names[: MOST_NAMED - 1], f"{more} more")
+    return " + ".join(names) or "all moving"
 
 
 def _in_full(motion: Motion, dim: int, extent: float) -> str:

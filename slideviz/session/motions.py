@@ -152,14 +152,20 @@ def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] |
 
 
 def new_target(session: Session) -> Target:
-    """Return the moving boundaries of a new motion: selected, else without motion, else all."""
+    """Return the moving boundaries of a new motion: selected, else without motion, else all.
+
+    They are named, so that a boundary that moves later does not join.
+    """
     case = session.case
     moving = case.markers_with("moving")
     without = [n for n in moving if not any(applies_to(motion, n) for motion in case.motions)]
     names = tuple(name for name in moving if name in session.view.selected) or tuple(without)
-    if len(names) == 1:
-        return names[0]
-    return names if names and names != moving else "" if len(moving) > 1 else "".join(moving)
+    return _target(names or moving)
+
+
+def _target(names: tuple[str, ...]) -> Target:
+    """Return the target with some boundaries; a single one is a name, not a tuple."""
+    return names[0] if len(names) == 1 else names or ""
 
 
 def new_motion(
@@ -197,11 +203,11 @@ def new_motion(
 
 
 def targets(session: Session) -> tuple[Target, ...]:
-    """Return the targets that a motion can have: each moving boundary, selected ones, all."""
+    """Return the targets that a motion can have: each moving boundary, selected ones, all now."""
     moving = session.case.markers_with("moving")
     selected = tuple(name for name in moving if name in session.view.selected)
-    several = (selected,) if 1 < len(selected) < len(moving) else ()
-    return (*moving, *several, *(("",) if len(moving) > 1 else ()))
+    together = (names for names in (selected, moving) if len(names) > 1)
+    return (*moving, *dict.fromkeys(together))
 
 
 def machine_pair(session: Session) -> Pair | None:

@@ -220,12 +220,12 @@ def test_a_new_motion_is_for_the_boundary_without_one_or_for_all_about_their_cen
     opened.role("outflow", "moving")
     opened.window.store.change(changes.select, ())
     opened.add_motion(Translate)
-    assert opened.session.case.motions[0].marker == ""
+    assert opened.session.case.motions[0].marker == ("airfoil", "outflow")
     opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),))
     opened.add_motion(Translate)
     assert opened.session.case.motions[1].marker == "outflow"
     opened.add_motion(Translate)
-    assert opened.session.case.motions[2].marker == ""
+    assert opened.session.case.motions[2].marker == ("airfoil", "outflow")
     opened.role("outflow", "moving")
     opened.window.store.change(changes.set_case, motions=(Rotate("", 1.0),))
     opened.choose(opened.window.motions.editor.about, "point")
@@ -250,12 +250,13 @@ def test_a_motion_is_for_all_that_are_selected(opened):
     assert opened.session.case.motions == (Rotate(("airfoil", "outflow"), 0.0),)
     editor = opened.window.motions.editor
     assert words(editor.marker) == [
-        "airfoil", "inflow", "outflow", "airfoil + outflow", "all moving",
+        "airfoil", "inflow", "outflow", "airfoil + outflow",
+        "airfoil + inflow + outflow",
     ]  # fmt: skip
     assert editor.marker.currentText() == "airfoil + outflow"
     assert editor.about.currentText() == "their centroid"
-    opened.choose(editor.marker, words(editor.marker).index("all moving"))
-    assert opened.session.case.motions[0].marker == ""
+    opened.choose(editor.marker, words(editor.marker).index("airfoil + inflow + outflow"))
+    assert opened.session.case.motions[0].marker == ("airfoil", "inflow", "outflow")
     opened.choose(editor.marker, words(editor.marker).index("inflow"))
     assert opened.session.case.motions[0].marker == "inflow"
 

@@ -2,14 +2,25 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from slideviz.case.model import Case, FromFile, Rotate, Scale, SpanMotion, Translate
+from slideviz.case.model import (
+    Case,
+    FromFile,
+    Rotate,
+    Scale,
+    SpanMotion,
+    Translate,
+    applies_to,
+    named,
+)
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.zones import zone_cases
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
-from slideviz.session.motions import Ghosts, TableRows
+from slideviz.session.motions import Ghosts, TableRows, new_target, targets
 from slideviz.session.run_messages import run_requirements
 from tests.builders import stage
 
@@ -49,6 +60,36 @@ def test_the_ghost_of_each_zone_goes_where_the_run_takes_it():
         change = displacements(one, zone).at(nodes)
         assert np.allclose(ghosts[f"{number}:blade"], zone.points[nodes] + change, atol=1e-14)
         assert np.abs(change).max() > 0.01
+
+
+@settings(max_examples=40)
+@given(
+    first=st.sets(st.sampled_from(["bottom", "left", "right", "top"]), min_size=1, max_size=3),
+    data=st.data(),
+)
+def test_a_boundary_that_moves_later_does_not_join_a_motion(session, first, data):
+    before = changes.set_role(session, tuple(first), "moving")
+    selected = data.draw(st.sets(st.sampled_from(sorted(first))))
+    before = changes.select(before, tuple(selected))
+    offered = {new_target(before), *targets(before)}
+    later = data.draw(st.sampled_from(sorted({*session.mesh.marker_names} - first)))
+    for target in offered:
+        asked = changes.add_motion(before, Translate(target, (1.0, 0.0)))
+        after = changes.set_role(asked, (later,), "moving")
+        (motion,) = after.case.motions
+        assert not applies_to(motion, later)
+        assert set(named(motion.marker)) <= first
+        assert any(missing.marker == later for missing in run_requirements(after))
+    # All that move now are offered together.
+    assert any(set(named(target)) == first for target in offered)
+
+
+def test_words_of_many_boundaries_are_short():
+    names = tuple(f"wall{k}" for k in range(1, 21))
+    assert describe(Translate(names, (1.0, 0.0))) == (
+        "wall1 + wall2 + wall3 + 17 more: translate by (1, 0)"
+    )
+    assert describe(Translate(names[:4], (1.0, 0.0))).startswith("wall1 + wall2 + wall3 + wall4:")
 
 
 def test_words():

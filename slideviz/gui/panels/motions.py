@@ -372,7 +372,8 @@ class MotionPanel(Panel):
         assert mesh is not None
         beside = case.source or session.path
         folder = beside.parent if beside is not None else folder_of(self)
-        default = folder / f"displacement_{'_'.join(named(marker)) or 'all'}.txt"
+        names = named(marker)
+        default = folder / f"displacement_{names[0] if len(names) == 1 else 'moving'}.txt"
         try:
             rows = TableRows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
