@@ -31,6 +31,7 @@ from slideviz.export.titles import (
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
 from slideviz.session.pieces import CheckCancelled, InThread, not_cancelled, run_inline
+from slideviz.session.results import planned_steps
 from slideviz.session.state import Session, StepFrame
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
@@ -246,16 +247,17 @@ def film_steps(
             raise SlidevizError("there are no steps to make a film of; run the case first")
         check_film(file, film_options, frames=len(one.frames), overwrite=overwrite)
     write = titles or _titles(runs[0], options)
-    count = max(len(one.frames) for one in runs)
+    longest = max(runs, key=lambda one: len(one.frames))
     yield from aim_at_largest(renderer, options)
 
     def draw(position: float) -> Generator[object, Any, Pixels]:
         film_frames = []
         for one in runs:
             at = position
-            if len(one.frames) < count:  # as far deformed
-                part = (len(one.frames) - 1) / (count - 1)
-                at = round(position * part, 9 if film_options.between else 0)
+            if one is not longest:  # as far deformed
+                far = position * one.planned / longest.planned
+                at = round(far, 9 if film_options.between else 0)
+                at = min(at, len(one.frames) - 1)
             film_frames.append((yield InThread(partial(film_frame_at, one.frames, at))))
         shown = [
             _showing(one, film_frame.frame)
@@ -263,7 +265,7 @@ def film_steps(
         ]
         return (yield from renderer.draw_panes(shown, options, write(film_frames)))
 
-    yield from render_frames(count, file, film_options, draw)
+    yield from render_frames(len(longest.frames), file, film_options, draw)
 
 
 def aim_at_largest(
@@ -296,10 +298,11 @@ def film_frame_at(
 
     ``position`` is the number of the step, 0 the undeformed mesh; ``frames`` are all of these.
     """
-    step, steps = int(position), len(frames) - 1
+    step = int(position)
     place = frame_words(frames, position)
     if position == step:
-        return FilmFrame(frames[step], place or f"step {step} of {steps}", place)
+        full = place or f"step {step} of {planned_steps(frames[1:])}"
+        return FilmFrame(frames[step], full, place)
     frame = _blend(frames[step], frames[step + 1], position - step, frames[0], going_on)
     return FilmFrame(frame, place, place)
 
@@ -308,7 +311,7 @@ def frame_words(frames: Sequence[StepFrame], position: float) -> str:
     """Return what is shown at a position in words, as `place_words`, by the labels of frames."""
     last, following = frames[int(position)], frames[min(int(position) + 1, len(frames) - 1)]
     if not following.label:
-        return place_words(position, len(frames) - 1)
+        return place_words(position, planned_steps(frames[1:]))
     if position == int(position):
         return last.label or "undeformed"
     return f"{last.label or 'undeformed'} to {following.label}"
@@ -340,7 +343,7 @@ def _showing(session: Session, frame: StepFrame) -> Session:
 def _titles(session: Session, options: PictureOptions) -> Titles:
     """Return a function that writes the title of each frame: run, step and quality."""
     letters = options.size[0] / (LETTER_WIDTH * options.scale)
-    longest = LONGEST.format(len(session.frames) - 1)
+    longest = LONGEST.format(session.planned)
 
     def write(film_frames: Sequence[FilmFrame]) -> tuple[Sequence[str], float]:
         (film_frame,) = film_frames

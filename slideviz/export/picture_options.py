@@ -134,10 +134,10 @@ def title_of(session: Session, options: PictureOptions) -> str:
     """Return the title of a picture: run, step and quality; shortened to fit its width."""
     frame: StepFrame | None = session.frame
     assert frame is not None
-    steps = len(session.frames) - 1
-    at, letters = min(session.view.frame, steps), options.size[0] / (LETTER_WIDTH * options.scale)
-    longest = LONGEST.format(steps) if options.film else ""
-    return title_words(session, frame, place_words(at, steps), letters, longest)
+    at = min(session.view.frame, len(session.frames) - 1)
+    letters = options.size[0] / (LETTER_WIDTH * options.scale)
+    longest = LONGEST.format(session.planned) if options.film else ""
+    return title_words(session, frame, place_words(at, session.planned), letters, longest)
 
 
 def headings(shown: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:

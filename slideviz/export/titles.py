@@ -127,13 +127,13 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
     names = pair_names(pair)
     if not quality:
         return names
-    several = any(len(one.frames) > 2 for one in pair)
+    several = any(one.planned > 1 for one in pair)
     titles = []
     for one, name in zip(pair, names, strict=True):
-        frame, steps = one.frame, len(one.frames) - 1
+        frame = one.frame
         assert frame is not None
-        at = min(one.view.frame, steps)
-        place = (f"step {at} of {steps}" if several else "") if at else "undeformed"
+        at = min(one.view.frame, len(one.frames) - 1)
+        place = (f"step {at} of {one.planned}" if several else "") if at else "undeformed"
         place = "" if name == "Undeformed" else place
         numbers = caption(place, frame.quality, one.view.color_by).removeprefix(": ")
         titles.append(f"{name}\n{numbers}")

@@ -21,6 +21,7 @@ from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.session import changes, jobs
+from slideviz.session.run_messages import stopped_words
 from slideviz.session.saving import Unsaved, files_beside, view_to_case
 from slideviz.system.atomic import atomic_write
 
@@ -200,23 +201,28 @@ class Files(QObject):
         frame = session.frames[-1] if last and session.frames else session.frame
         if frame is None or self.window.runner.busy:
             return
-        step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
+        run, whole = session.run_shown, frame is session.frames[-1]
+        stopped = stopped_words(run) if whole else ""
+        step = f"_step{session.view.frame}"
+        if whole:
+            step = f"_step{len(run.frames)}of{run.planned}" if stopped else "_deformed"
         assert session.mesh is not None
         default = self.folder() / f"{self.stem()}{step}{usual_ending(session.mesh)}"
         filters = questions.mesh_filters(session.mesh)
-        path = questions.ask_save(self.window, "Save mesh", default, filters)
+        title = f"Save mesh: {run.progress_words}" if stopped else "Save mesh"
+        path = questions.ask_save(self.window, title, default, filters)
         if path is None:
             return
         overwrite = is_source(path, session.mesh)
         if overwrite and not questions.ask_overwrite_input(self.window, path):
             return
         self.settings.setValue("folder", str(path.parent))
-        last = frame is session.frames[-1]
         torn = torn_interfaces(session.mesh, frame.mesh.points)
+        said = (stopped, *(f"{each[0].upper()}{each[1:]}." for each in torn))
         self.saving, self.after_save = True, then
         self.window.running.start_job(
             f"Saving {path.name}",
-            lambda saved: self._mesh_saved(saved, last, torn),
+            lambda saved: self._mesh_saved(saved, whole, said),
             partial(jobs.save_mesh, base=session.mesh),
             path,
             frame,
@@ -240,14 +246,14 @@ class Files(QObject):
         )
         return None
 
-    def _mesh_saved(self, path: Path, last: bool, torn: tuple[str, ...]) -> None:
+    def _mesh_saved(self, path: Path, last: bool, remarks: tuple[str, ...]) -> None:
         if last:
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
         self.window.show_status(f"Saved {path}")
         mesh = self.window.store.session.mesh
         said = [left_out(path, mesh)] if mesh is not None else []
-        said += [f"{each[0].upper()}{each[1:]}." for each in torn]
+        said += remarks
         if any(said):
             self.window.banner.show_message(" ".join(["Saved.", *filter(None, said)]))
         if self.after_save is not None:

@@ -24,12 +24,13 @@ from slideviz.session.run_messages import (
     remedy_for,
     repair_words,
     run_requirements,
+    stopped_words,
     to_mend,
     warnings_of,
     with_field_labels,
 )
 from slideviz.session.runs_words import method_words
-from slideviz.session.state import Run, Session, StepFrame
+from slideviz.session.state import Run, Session, StepFrame, result_settings
 from slideviz.session.store import Store
 from slideviz.session.walls_table import heights_words
 from slideviz.terms import PERIODIC_MODES
@@ -118,13 +119,15 @@ class Running(QObject):
         self.start_job("Repairing", self._run_done, jobs.repair, case, session.mesh, frames)
 
     def show_design(self, case: Case, name: str) -> bool:
-        """Show the run of a design, started first unless there is one already.
+        """Show the run of a design, started first unless there is one already, done or going on.
 
         The run of another design is cancelled. Return False if a job of another kind is running.
         """
+        wanted = result_settings(case)
         for run in self.store.session.runs:
-            if run.name == name and run.case == case and run.end == "done":
-                self.store.change(changes.show_design, run.number)
+            known = run.panels is not None and result_settings(run.case) == wanted
+            if known and (run.end == "done" or (not run.end and self._next is None)):
+                self.store.change(changes.show_design, run.number, name)
                 return True
         if self.runner.busy:
             if self._shows_design:
@@ -184,13 +187,20 @@ class Running(QObject):
             finish(value)
 
     def _cancelled(self) -> None:
-        steps = len(self.store.session.frames) - 1
-        steps_kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
-        self.status_changed.emit(f"Cancelled{steps_kept}")
-        log.info("cancelled%s", steps_kept)
-        if self._deforms:
-            self._log_remarks(self.store.session.runs[-1])
+        last = self.store.session.runs[-1] if self._deforms else None
+        if last is not None:
+            self._log_remarks(last)
+        another = self._next is not None
         self._end("cancelled")
+        run = None if last is None else self.store.session.run(last.number)
+        words = stopped_words(run)
+        log.info("cancelled%s", f": {words}" if words else "")
+        if another:
+            return
+        self.status_changed.emit(words or "Cancelled")
+        if run is not None and words:
+            self.banner.show_message(words)
+            self._about = run.number
 
     @staticmethod
     def _log_remarks(run: Run) -> list[str]:

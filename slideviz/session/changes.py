@@ -396,9 +396,9 @@ def show_run(session: Session, number: int) -> Session:
     return show_frame(session, len(run.frames))
 
 
-def show_design(session: Session, number: int) -> Session:
-    """Show the last step of a design's run, and remember the panels' settings for it."""
-    return show_run(_with_run(session, number, panels=session.case), number)
+def show_design(session: Session, number: int, name: str) -> Session:
+    """Show the last step of a design's run, and remember its name and the panels' settings."""
+    return show_run(_with_run(session, number, name=name, panels=session.case), number)
 
 
 def show_beside(session: Session, number: int | None) -> Session:
@@ -470,10 +470,9 @@ def second_view(session: Session) -> Session:
     run, other = session.run_shown, session.run(session.view.beside)
     if other is None:
         return session
-    last = len(run.frames) if run is not None else 0
-    at = session.view.frame
+    planned, at = run.planned if run is not None else 0, session.view.frame
     # The step at about the same part of the displacement, where numbers of steps differ.
-    frame = round(at * len(other.frames) / last) if last else 0
+    frame = round(at * other.planned / planned) if planned else 0
     if at:
         frame = max(frame, 1)
     return show_frame(replace(session, shown=other.number), frame)

@@ -76,7 +76,7 @@ def _lead(session: Session, number: int | None) -> Session:
     """Return the session with another run in the first view, at the step that matches best."""
     if number is None or number == session.shown:
         return session
-    steps, at = len(session.frames) - 1, session.view.frame
+    planned, at = session.planned, session.view.frame
     session = show_run(session, number)
-    frame = round(at * (len(session.frames) - 1) / steps) if steps > 0 else 0
+    frame = round(at * session.planned / planned) if planned else 0
     return show_frame(session, max(frame, 1) if at else frame)

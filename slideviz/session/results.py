@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -162,6 +163,15 @@ class CheckedLimits:
     problem: str = ""  # why others could not
 
 
+def planned_steps(frames: Sequence[StepFrame]) -> int:
+    """Return the number of steps of a run, with those after the last of its ``frames``.
+
+    ``frames`` are without the undeformed mesh.
+    """
+    step = frames[-1].step if frames else None
+    return len(frames) + (0 if step is None else step.total - step.index)
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A deformation that was computed: its case and its steps."""
@@ -188,6 +198,21 @@ class Run:
     def last(self) -> StepFrame | None:
         """Return the frame of the last step, or None."""
         return self.frames[-1] if self.frames else None
+
+    @property
+    def planned(self) -> int:
+        """Return the number of its steps, with those that it has not made, or never made."""
+        return planned_steps(self.frames)
+
+    @property
+    def incomplete(self) -> bool:
+        """Return whether it ended with a part of its motion, as a cancelled run does."""
+        return bool(self.end) and len(self.frames) < self.planned
+
+    @property
+    def progress_words(self) -> str:
+        """Return how far it came, as ``step 3 of 5``."""
+        return f"step {len(self.frames)} of {self.planned}"
 
     @cached_property
     def safe(self) -> SafeFraction | None:

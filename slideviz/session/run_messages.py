@@ -58,9 +58,9 @@ def end_parts(run: Run) -> tuple[str, str]:
     heights = heights_words(run.last, run.case)
     heights = f"first heights {heights}" if heights else ""
     bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
-    if step.index < step.total:
+    if len(run.frames) < run.planned:
         bad = f": {bad}" if bad else ""
-        return f"Stopped after step {step.index} of {step.total}{bad}.", ""
+        return f"Stopped after {run.progress_words}{bad}.", ""
     done, reach = "; ".join(filter(None, (bad, repair_words(run)))), ""
     if run.safe is not None and run.safe.fraction > 0:
         reach = f"the motion {reach_words(run.safe.fraction)}"
@@ -71,6 +71,16 @@ def end_parts(run: Run) -> tuple[str, str]:
     if done:
         return (f"Done: {done}; ", f"{reach}.") if reach else (f"Done: {done}.", "")
     return ("Done. ", f"{reach[:1].upper()}{reach[1:]}.") if reach else ("Done.", "")
+
+
+def stopped_words(run: Run | None) -> str:
+    """Return a sentence on a run that ended with a part of its motion; "" for others."""
+    if run is None or not run.incomplete or run.last_step is None:
+        return ""
+    name = run.name.capitalize() if run.panels is not None else f"Run {run.number}"
+    how = "was cancelled" if run.end == "cancelled" else "ended"
+    part = f"{100.0 * run.last_step.part:.3g} % of its motion"
+    return f"{name} {how} after {run.progress_words}: the mesh has {part}."
 
 
 def path_ending(run: Run) -> str:

@@ -49,12 +49,13 @@ def reduction_words(case: Case) -> str:
 
 def steps_words(run: Run) -> str:
     """Return the number of steps of a run in words; of a run not done, how many of all it made."""
-    made = len(run.frames)
-    total = run.last_step.total if run.last_step is not None else run.case.steps
+    made, planned = len(run.frames), run.planned
+    if run.end != "done":
+        planned = planned or run.case.steps
     auto = ", automatic" if not run.case.steps else ""
-    if run.end == "done" or made == total:
+    if made == planned:
         return f"{made} step{'' if made == 1 else 's'}{auto}"
-    return f"{made} of {total} steps{auto}" if total else f"{made} steps{auto}"
+    return f"{made} of {planned} steps{auto}"
 
 
 def seconds_words(seconds: float) -> str:

@@ -45,7 +45,8 @@ class Unsaved:
         if session.unsaved_mesh and run is not None and run.panels is None:
             # A run that goes on has no last step to save.
             name = "mesh" if run.end and not busy else "run"
-            lost[name] = f"the deformed mesh of run {run.number}"
+            part = f" ({run.progress_words})" if run.incomplete else ""
+            lost[name] = f"the deformed mesh of run {run.number}{part}"
         if designs:
             lost["table"] = designs
         return cls(session, lost)
@@ -121,7 +122,8 @@ def title_of(session: Session) -> str:
     comes_again = session.repeatable or (run is not None and run.panels is not None)
     lost = session.unsaved_mesh and not comes_again
     star = "*" if session.unsaved_case or unsaved_sections(session) or lost else ""
-    return f"{star}{file.name} – slideviz" if file else "slideviz"
+    part = f" – {run.progress_words}" if run is not None and run.incomplete else ""
+    return f"{star}{file.name}{part} – slideviz" if file else "slideviz"
 
 
 Camera = tuple[float, ...]

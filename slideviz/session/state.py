@@ -175,6 +175,12 @@ class Session:
         return (() if first is None else (first,)) + (() if run is None else run.frames)
 
     @property
+    def planned(self) -> int:
+        """Return the number of steps of the run that is shown, with those that it never made."""
+        run = self.run_shown
+        return 0 if run is None else run.planned
+
+    @property
     def frame(self) -> StepFrame | None:
         """Return the frame that is shown; None before a mesh is open."""
         frames = self.frames

@@ -121,6 +121,43 @@ def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, 
     driver.settle()
 
 
+def test_a_design_is_shown_only_when_it_is_whole_and_computed_once(window, passage, driver, qtbot):
+    panel, status = passage, passage.status.label
+    fill(panel, "STEPS", "3, 400")
+    panel.show_design(1)
+    assert status.text() == "Design 1 is being computed."
+    driver.settle()
+    assert status.text() == "Design 1 is shown."
+    panel.show_design(2)
+    qtbot.waitUntil(lambda: len(window.store.session.frames) > 2, timeout=60_000)
+    # A second click, as of a double click, does not begin it anew.
+    panel.show_design(2)
+    assert len(window.store.session.frames) > 2
+    assert status.text() == "Design 2 is being computed."
+    # Meanwhile another one is looked at, which is not computed again.
+    panel.show_design(1)
+    assert status.text() == "Design 1 is shown."
+    assert window.runner.busy
+    panel.show_design(2)
+    window.running.cancel()
+    driver.settle()
+    made = len(window.store.session.frames) - 1
+    assert 0 < made < 400
+    said = f"Design 2 was cancelled after step {made} of 400: the mesh has"
+    assert status.text().startswith(said)
+    assert window.banner.text.text().startswith(said)
+    assert window.player.step_text.text() == f"Step {made} of 400"
+    assert len(window.store.session.runs) == 2
+    # It has another number where a row before it is removed; and a name of the user's.
+    panel.rows.view.selectRow(1)
+    QTest.mouseClick(panel.remove, LEFT)
+    window.store.change(changes.rename_run, 1, "mine")
+    panel.show_design(1)
+    driver.settle()
+    assert len(window.store.session.runs) == 2
+    assert status.text() == "Design 1 is shown."
+
+
 def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     passage, qtbot, in_a_thread, window, tmp_path
 ):

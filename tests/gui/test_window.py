@@ -14,6 +14,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Rotate, Scale, Translate
 from slideviz.errors import Note
+from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
@@ -695,7 +696,7 @@ def test_numbers_without_room_are_shorter_and_a_narrow_player_leaves_out_speed_b
     assert all(form[1:3] == full[1:3] for form in short)
 
 
-def test_cancel_keeps_the_steps_that_are_done(ready):
+def test_cancel_keeps_the_steps_that_are_done(ready, answers, tmp_path):
     window = ready.window
     window.store.change(changes.set_case, steps=2000)
     ready.click(window.run_panel.run)
@@ -708,8 +709,28 @@ def test_cancel_keeps_the_steps_that_are_done(ready):
     assert 3 < count < 2000
     assert ready.session.deformed.step.index == count - 1
     assert window.run_panel.run.isVisible()
-    assert "kept" in window.statusBar().currentMessage()
     assert ready.session.unsaved_mesh
+    # What it shows is a part of the motion, and everything says so.
+    words = f"step {count - 1} of 2000"
+    told = f"Run 1 was cancelled after {words}: the mesh has {100 * (count - 1) / 2000:.3g} % of"
+    assert window.statusBar().currentMessage().startswith(told)
+    assert window.banner.text.text().startswith(told)
+    assert window.player.step_text.text().lower() == words
+    assert window.windowTitle() == f"*passage.cfg – {words} – slideviz"
+    assert window.run_panel.text.text().startswith(f"Stopped after {words}")
+    options = PictureOptions((1600, 1000), title=True)
+    assert f", {words}:" in headings([ready.session], options)[0][0]
+    asked = answers("ask_save", tmp_path / "part.su2")
+    window.files.save_mesh()
+    ready.settle()
+    assert asked[0][0] == f"Save mesh: {words}"
+    assert asked[0][1].name == f"passage_step{count - 1}of2000.su2"
+    assert told in window.banner.text.text()
+    # Another step is saved as before, by its number.
+    window.player.go(2)
+    window.files.save_mesh()
+    ready.settle()
+    assert asked[1][1].name == "passage_step2.su2"
 
 
 def test_a_run_that_fails_says_why_and_leaves_the_window_usable(ready, monkeypatch):

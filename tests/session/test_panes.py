@@ -1,6 +1,7 @@
 """What two views side by side show."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,7 +10,11 @@ from slideviz.session import changes
 from slideviz.session.changes import UNDEFORMED
 from slideviz.session.opening import open_mesh
 from slideviz.session.panes import choices, close_pane, panes, show_in
+from slideviz.session.run_messages import stopped_words
+from slideviz.session.runs_words import steps_words
+from slideviz.session.saving import Unsaved, title_of
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver.deform import deform
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +56,40 @@ def test_a_pane_shows_what_was_chosen_and_never_the_same_as_the_other(
     session = changes.set_view(session, swapped=before[0] == UNDEFORMED)
     assert panes(session) == before
     assert panes(show_in(session, pane, number)) == after
+
+
+@pytest.fixture(scope="module")
+def computed(passage):
+    """A step of the passage."""
+    return next(deform(passage.case, passage.mesh))
+
+
+@pytest.mark.parametrize("end", ["cancelled", "failed"])
+@pytest.mark.parametrize(("made", "planned"), [(1, 1), (1, 2), (3, 5), (31, 100), (8, 8), (1, 9)])
+def test_a_run_that_ended_early_says_how_far_it_came(session, computed, made, planned, end):
+    frame = session.frames[-1]
+    frames = [
+        replace(frame, step=replace(computed, index=k, total=planned, part=k / planned))
+        for k in range(1, made + 1)
+    ]
+    run = Run(3, session.case, tuple(frames), end)
+    opened = replace(session, path=Path("mesh.su2"), runs=(*session.runs, run))
+    both = changes.show_run(opened, 3)
+    assert run.planned == planned
+    assert run.incomplete == (made < planned)
+    assert not replace(run, end="").incomplete
+    early = made < planned
+    words = f"step {made} of {planned}"
+    assert (words in title_of(both)) == early
+    assert (words in stopped_words(run)) == early
+    assert (f"({words})" in Unsaved.of(both, busy=False).question("closing")) == early
+    assert (f"{made} of {planned} steps" in steps_words(run)) == early
+    # Beside it is the step of another run that is as far, not that run's last one.
+    beside = changes.second_view(changes.show_beside(both, 2))
+    assert beside.view.frame == max(round(made * 4 / planned), 1)
+    assert show_in(changes.show_beside(both, 1), 0, 2).view.frame == max(
+        round(made * 4 / planned), 1
+    )
 
 
 def test_the_step_stays_as_a_part_of_the_displacement(session):

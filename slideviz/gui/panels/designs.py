@@ -41,6 +41,7 @@ from slideviz.session.design_table import (
     write_results,
 )
 from slideviz.session.jobs import JobProgress
+from slideviz.session.run_messages import stopped_words
 from slideviz.session.state import Session
 
 EMPTY = "This plot shows curves of quality: add designs, and run them."
@@ -183,6 +184,11 @@ class DesignsJob(QObject):
         self._ended(text, wrong)
 
 
+def _end_shown(session: Session) -> tuple[object, ...]:
+    run = session.run_shown
+    return () if run is None else (run.number, run.end)
+
+
 RUN = "Run the designs that have no result yet, or failed."
 
 
@@ -227,6 +233,7 @@ class DesignsPanel(Panel):
         self._connect()
         self.follow(lambda session: session.mesh, self._clear)
         self.follow(lambda session: (session.mesh, session.case))
+        self.follow(_end_shown, self._say_shown)
 
     def sizeHint(self) -> QSize:
         return QSize(600, 330)
@@ -439,8 +446,22 @@ class DesignsPanel(Panel):
             return
         self.services.viewing.refit()  # no job ends if the design was shown before
         self.shown = number
-        self._show_status(f"Design {number} is shown.")
+        self._show_status(f"Design {number} is being computed.")
+        self._say_shown(self.store.session)
         self._sync()
+
+    def _say_shown(self, session: Session) -> None:
+        """Say that the design asked for is shown, once it is; or how far its run came."""
+        run = session.run_shown
+        if run is None or run.panels is None or run.name != f"design {self.shown}":
+            return
+        name = run.name.capitalize()
+        if run.end == "done":
+            self._show_status(f"{name} is shown.")
+        elif run.end and run.frames:
+            self._show_status(f"{stopped_words(run)} Click it again for all of it.", wrong=True)
+        elif run.end:
+            self._show_status(f"{name} was not computed: its run has no step.", wrong=True)
 
     # The job ---------------------------------------------------------------------------
     def start(self) -> None:

@@ -14,6 +14,7 @@ from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes
+from slideviz.session.run_messages import stopped_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.session.walls_table import heights_words
@@ -129,9 +130,11 @@ class Player(QWidget):
             enabled = last > 0 and (always or (at < last if ahead else at > 0))
             button.setEnabled(enabled)
         # The slider keeps its length, whatever the text says.
-        widest = max(self._advance(self._step_words(step, last)) for step in (0, last))
+        planned = session.planned
+        widest = max(self._advance(self._step_words(step, planned)) for step in (0, planned))
         self.step_text.setFixedWidth(widest + 4)
-        self.step_text.setText("" if session.mesh is None else self._step_words(at, last))
+        self.step_text.setText("" if session.mesh is None else self._step_words(at, planned))
+        self.step_text.setToolTip(stopped_words(session.run_shown))
         self.speed_button.setEnabled(last > 0)
         self.result.show_parts(result_parts(session))
         # Inverted cells are shown in the narrowest window, too.
@@ -139,11 +142,11 @@ class Player(QWidget):
         if not last:
             self.stop()
 
-    def _step_words(self, step: int, last: int) -> str:
-        """Return the text for a step of ``last``, shortened where the player is narrow."""
-        if self._narrow and last:
-            return f"{step}/{last}"
-        return f"Step {step} of {last}" if step else "Undeformed"
+    def _step_words(self, step: int, planned: int) -> str:
+        """Return the text for a step of ``planned``, shortened where the player is narrow."""
+        if self._narrow and planned:
+            return f"{step}/{planned}"
+        return f"Step {step} of {planned}" if step else "Undeformed"
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
