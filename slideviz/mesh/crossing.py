@@ -21,6 +21,7 @@ import numpy as np
 
 from slideviz.mesh.model import column_bounds, ranges, sorted_nodes
 from slideviz.mesh.planes import FacetSimplices, Planes, line_normals, normals
+from slideviz.system.threads import ordered_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -155,12 +156,15 @@ def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
         return None
     planes = Planes.of(points, surface, _margin(points, surface, surface))
     pairs = list(combinations(range(points.shape[1]), 2))
-    for part in _chunks(len(surface)):
-        nodes = surface.nodes[part]
-        i, j = planes.near(points[nodes], normals(points[nodes])[:, None])
-        away = (nodes[i][:, :, None] != surface.nodes[j][:, None]).all(axis=(1, 2))
-        i, j = i[away], j[away]
-        at = points[nodes[i]]
+
+    def near(part: IntArray) -> tuple[IntArray, IntArray]:
+        corners = points[surface.nodes[part]]
+        away = surface.nodes[part], surface.nodes
+        return planes.near(corners, normals(corners)[:, None], away)
+
+    parts = list(_chunks(len(surface)))
+    for part, (i, j) in zip(parts, ordered_map(near, parts), strict=True):
+        at = points[surface.nodes[part[i]]]
         height = planes.heights(at, j)
         for pair in pairs:
             hit = _strike(planes, at[:, pair], height[:, pair], i, j)

@@ -17,6 +17,7 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import column_bounds
+from slideviz.system.jit_cache import OPTIONS, njit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -99,9 +100,10 @@ class BoxTree:
     """A complete binary tree over axis-parallel boxes, the *items*."""
 
     order: IntArray  # (s,): indices of the items in the order of the leaves, filled up with -1
-    levels: tuple[tuple[FloatArray, FloatArray], ...]
-    """tuple of ((k, d), (k, d)): low and high corners of the boxes of each level, from the root (k
-    = 1) to the items (k = s)."""
+    low: FloatArray
+    high: FloatArray
+    """`low`, `high` (k, d): corners of the boxes of the nodes, level by level from the root: node i
+    has the children 2 i + 1 and 2 i + 2. After them those of the items, `LEAF` for each leaf."""
 
     @classmethod
     def of(cls, low: FloatArray, high: FloatArray) -> BoxTree:
@@ -118,43 +120,96 @@ class BoxTree:
             along = np.take_along_axis(at, axis[:, None, None], axis=2)[..., 0]
             order = np.take_along_axis(block, along.argsort(axis=1, kind="stable"), axis=1).ravel()
         filler = (order < 0)[:, None]
-        levels = [(np.where(filler, np.inf, low[order]), np.where(filler, -np.inf, high[order]))]
+        lows, highs = (
+            [np.where(filler, np.inf, low[order])],
+            [np.where(filler, -np.inf, high[order])],
+        )
         for size in [LEAF] + depth * [2]:
-            below, above = levels[0]
-            levels.insert(
-                0, (below.reshape(-1, size, d).min(axis=1), above.reshape(-1, size, d).max(axis=1))
-            )
-        return cls(order, tuple(levels))
+            lows.append(lows[-1].reshape(-1, size, d).min(axis=1))
+            highs.append(highs[-1].reshape(-1, size, d).max(axis=1))
+        return cls(order, np.concatenate(lows[::-1]), np.concatenate(highs[::-1]))
 
     def near(
-        self, corners: FloatArray, axes: FloatArray, margin: float
+        self,
+        corners: FloatArray,
+        axes: FloatArray,
+        margin: float,
+        nodes: tuple[IntArray, IntArray] | None = None,
     ) -> tuple[IntArray, IntArray]:
         """Return indices (p,), (p,) of queries and items: the pairs that may touch.
 
         Their bounding boxes touch, and the item's box touches the planes that the query lies in.
+        They are sorted by query, then item.
         ``corners`` (q, k, d): points whose convex hull is the query.
         ``axes`` (q, c, d): unit normals of the planes that a query lies in, through its first
         corner. A box off such a plane is not near, which shortens the search for large queries that
         are oblique to the coordinate axes.
         ``margin``: length up to which what lies apart counts as touching.
+        ``nodes`` (q, k), (s, k): the nodes of queries and items; pairs with a common one are left
+        out.
         """
+        none = np.empty((0, 0), np.int64)
         low, high = boxes(corners)
-        low, high = low - margin, high + margin
-        query, node = np.arange(len(low)), np.zeros(len(low), np.int64)
-        for depth, (below, above) in enumerate(self.levels):
-            if depth:
-                size = len(below) // len(self.levels[depth - 1][0])
-                query = np.repeat(query, size)
-                node = (node[:, None] * size + np.arange(size)).ravel()
-            meets = (low[query] <= above[node]) & (high[query] >= below[node])
-            query, node = query[meets.all(axis=1)], node[meets.all(axis=1)]
-            middle = 0.5 * (above[node] + below[node])
-            half = 0.5 * (above[node] - below[node])
-            offset = np.einsum("pcd,pd->pc", axes[query], middle - corners[query, 0])
-            reach = np.einsum("pcd,pd->pc", np.abs(axes[query]), half) + margin
-            meets = ~(np.abs(offset) > reach)
-            query, node = query[meets.all(axis=1)], node[meets.all(axis=1)]
-        return query, self.order[node]
+        tree = self.order, self.low, self.high
+        query = low - margin, high + margin, np.ascontiguousarray(corners[:, 0]), axes
+        i, j = _find_near(tree, query, margin, *(nodes or (none, none)))
+        order = np.lexsort((j, i))
+        return i[order], j[order]
+
+
+@njit(inline="always", **OPTIONS)
+def _meets(query, q, below, above, box, margin):  # type: ignore[no-untyped-def]
+    """Return whether a box touches that of a query, and its planes; one with a NaN touches all."""
+    low, high, start, axes = query
+    meets = True
+    for axis in range(low.shape[1]):
+        meets &= low[q, axis] <= above[box, axis] and high[q, axis] >= below[box, axis]
+    for plane in range(axes.shape[1] if meets else 0):
+        offset, reach = 0.0, margin
+        for axis in range(low.shape[1]):
+            normal = axes[q, plane, axis]
+            offset += normal * (0.5 * (above[box, axis] + below[box, axis]) - start[q, axis])
+            reach += abs(normal) * (0.5 * (above[box, axis] - below[box, axis]))
+        meets &= not abs(offset) > reach
+    return meets
+
+
+@njit(**OPTIONS)
+def _find_near(tree, query, margin, nodes, nodes_of_items):  # type: ignore[no-untyped-def]
+    """Return the pairs (p,), (p,) of `BoxTree.near`, sorted by query only."""
+    order, below, above = tree
+    first, queries = len(below) - len(order), len(query[0])  # the first item's box
+    pairs, count = np.empty((2, 4 * queries + 64), np.int64), 0
+    stack = np.empty(128, np.int64)
+    for q in range(queries):
+        stack[0], top = 0, 1
+        while top:
+            top -= 1
+            k = stack[top]
+            if not _meets(query, q, below, above, k, margin):
+                continue
+            if k < first // 2:
+                stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
+                top += 2
+                continue
+            begin = (k - first // 2) * LEAF
+            for place in range(begin, begin + LEAF):
+                item, box = order[place], first + place
+                if not _meets(query, q, below, above, box, margin):
+                    continue
+                common = False
+                for a in range(nodes.shape[1]):
+                    for b in range(nodes_of_items.shape[1]):
+                        common = common or nodes[q, a] == nodes_of_items[item, b]
+                if common:
+                    continue
+                if count == pairs.shape[1]:
+                    more = np.empty((2, 2 * count), np.int64)
+                    more[:, :count] = pairs
+                    pairs = more
+                pairs[0, count], pairs[1, count] = q, item
+                count += 1
+    return pairs[0, :count], pairs[1, :count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +236,14 @@ class Planes:
         tree = BoxTree.of(*boxes(corners))
         return cls(corners, upright, _unit(inwards), tree, margin)
 
-    def near(self, corners: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray]:
-        """Return the pairs of `BoxTree.near` with this margin, sorted by query, then simplex."""
-        i, j = self.tree.near(corners, axes, self.margin)
-        order = np.lexsort((j, i))
-        return i[order], j[order]
+    def near(
+        self,
+        corners: FloatArray,
+        axes: FloatArray,
+        nodes: tuple[IntArray, IntArray] | None = None,
+    ) -> tuple[IntArray, IntArray]:
+        """Return the pairs of `BoxTree.near` with this margin."""
+        return self.tree.near(corners, axes, self.margin, nodes)
 
     def heights(self, x: FloatArray, j: IntArray) -> FloatArray:
         """Return signed distances (p, k) of points (p, k, d) from the planes ``j`` (p,)."""

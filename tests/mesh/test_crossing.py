@@ -439,6 +439,9 @@ def test_tree_finds_all_that_overlap(d, n):
     }
     none = np.zeros((20, 1, d))
     assert set(zip(*map(list, tree.near(queries, none, 0.0)), strict=True)) == overlap
+    nodes = rng.integers(0, 3 * n, (20, d)), rng.integers(0, 3 * n, (n, d))
+    apart = {(q, i) for q, i in overlap if not set(nodes[0][q]) & set(nodes[1][i])}
+    assert list(zip(*tree.near(queries, none, 0.0, nodes), strict=True)) == sorted(apart)
     near = set(zip(*map(list, tree.near(queries, normals(queries)[:, None], 0.0)), strict=True))
     assert near <= overlap
     corner_ids = list(itertools.product((0, 1), repeat=d))
