@@ -246,6 +246,26 @@ def zones_in_a_row(count: int, shape: Sequence[int], bend: float = 0.0) -> Mesh:
     return join_zones([zone(k) for k in range(count)])
 
 
+def nested_zones() -> Mesh:
+    """Unit square of three zones: a frame, a frame in it, and a square in that.
+
+    The boundaries of each are outer and inner.
+    """
+
+    def zone(k: int) -> Mesh:
+        n = 10 - 4 * (k - 1)
+        rules = [("outer", lambda p: bool((p[:, 0] % n == 0).all() or (p[:, 1] % n == 0).all()))]
+        mesh = grid(
+            (n, n),
+            [(2, n - 2)] * 2 if k < 3 else None,
+            place=lambda p: (p + 2.0 * (k - 1)) / 10.0,
+            rules=[*rules, ("inner", lambda p: True)],
+        )
+        return replace(mesh, zone=k, zones=3)
+
+    return join_zones([zone(k) for k in (1, 2, 3)])
+
+
 def _renamed(shape, names) -> list[Rule]:
     rules = box_rules(shape)
     return [*((n, r[1]) for n, r in zip(names, rules, strict=False)), rules[-1]]

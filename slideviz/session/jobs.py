@@ -19,7 +19,6 @@ import numpy as np
 from slideviz.case.check import check_case
 from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile, Onto
-from slideviz.case.motion import by_zone, displacements
 from slideviz.case.spans import prepare_span
 from slideviz.case.zones import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
@@ -41,7 +40,7 @@ from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
 from slideviz.session.state import Session, StepFrame
-from slideviz.solver.intersection import folding_message, intersection_message, jump_message
+from slideviz.solver.zones import check_motions
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
 from slideviz.system.file_checks import require_regular_file
@@ -127,7 +126,7 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     """Return the values on which the check depends: its result holds while they are the same."""
     case = session.case
     roles = tuple(sorted(case.roles.items()))
-    around = case.span, case.periodic_type, case.axis, case.origin
+    around = case.span, case.periodic_type, case.axis, case.origin, case.interfaces
     return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around)
 
 
@@ -144,13 +143,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         ready = case.motions and not check_case(case, mesh) and not stopped()
         if not ready or not all(path.is_file() for path in files):
             return "", ""
-        found = folded = None
-        for one, zone in each_zone(by_zone(case, mesh), mesh):
-            if found is None and one.markers_with("moving"):
-                moved = displacements(one, zone)
-                asked = one, zone, moved.nodes, moved.vectors
-                found = intersection_message(*asked) or jump_message(*asked)
-                folded = folded or (None if found else folding_message(*asked))
+        found, folded = check_motions(case, mesh)
     except SlidevizError as error:
         first, *others = str(error).splitlines()
         for path in files:  # without their folders

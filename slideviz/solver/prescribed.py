@@ -16,7 +16,7 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.rbf.images import ImageDisplacements, require_free
-from slideviz.solver.domain import Domain, find_classes
+from slideviz.solver.domain import Domain, find_classes, roles_of_copies
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
 
 APART = 100.0
@@ -101,6 +101,22 @@ def largest_of(vectors: FloatArray) -> float:
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
+def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str | None, str | None]:
+    """Return why a motion of boundaries is impossible, and where cells will overlap; or None.
+
+    ``case`` has the roles of a ``Domain``. ``moved``: as `displaced` returns it.
+    """
+    asked = case, mesh, moved.nodes, moved.vectors
+    problem = intersection_message(*asked) or jump_message(*asked)
+    return problem, None if problem else folding_message(*asked)
+
+
+def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
+    """Return the `motion_messages` of a case of one zone before it runs."""
+    moved = displaced(displacements(case, mesh), mesh)
+    return motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
+
+
 def prescribe(
     case: Case, mesh: Mesh, domain: Domain, moved: Displacements | None = None
 ) -> BoundaryConditions:
@@ -114,8 +130,8 @@ def prescribe(
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
     moved = moved or displaced(displacements(case, mesh), mesh)
     classes, frame = domain.classes, domain.frame
-    asked = case.change(roles=domain.roles), mesh, moved.nodes, moved.vectors
-    problem = intersection_message(*asked) or jump_message(*asked)
+    case = case.change(roles=domain.roles)
+    problem, folded = motion_messages(case, mesh, moved)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
     known = np.concatenate([classes.moving, classes.fixed])
@@ -130,10 +146,9 @@ def prescribe(
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):
         alone = find_classes(
-            asked[0], mesh, domain.boundary, domain.fans, frame, np.arange(len(mesh.points))
+            case, mesh, domain.boundary, domain.fans, frame, np.arange(len(mesh.points))
         )
         require_free(spread, follow, alone, domain.normals, allowed)
-    folded = folding_message(*asked)
     warnings = (*moved.warnings, *([f"{folded}; move it less"] if folded else []))
     return BoundaryConditions(known, spread.at(known), moved, warnings)
 

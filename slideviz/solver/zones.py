@@ -24,6 +24,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, ZoneInterface,
 from slideviz.mesh.zones import join_zones, names_from, names_in, with_zones
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Relaxed
+from slideviz.solver.prescribed import check_motion
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.terms import Role
 
@@ -152,6 +153,22 @@ class InterfaceMotion:
         out = points.copy()
         out[nodes[alike]] = points[leaders[alike]]
         return now.with_points(sealed(out))
+
+
+def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
+    """Return `check_motion` of the first zone that its motion cannot be made in, else of any.
+
+    Zones follow others here as far as these move by their motions, before sliding is known.
+    """
+    if not mesh.zone_parts:
+        return check_motion(case, mesh)
+    motion, folded = InterfaceMotion(case, mesh), None
+    for index, _ in motion.in_order():
+        problem, overlap = check_motion(motion.cases[index], mesh.zone_parts[index].mesh)
+        if problem:
+            return problem, folded
+        folded = folded or overlap
+    return None, folded
 
 
 Runs = dict[int, list[Step]]

@@ -1,11 +1,16 @@
+from collections import deque
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from slideviz.case import spans
 from slideviz.case.model import Case, FromFile, SpanMotion, Translate
 from slideviz.case.motion import displacements
+from slideviz.errors import CaseError, DeformError
 from slideviz.machine import span
 from slideviz.mesh.quality import quality
 from slideviz.sections import span as sections
@@ -15,7 +20,8 @@ from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import StepFrame
-from tests.builders import cube
+from slideviz.solver.deform import deform
+from tests.builders import cube, nested_zones
 from tests.builders import passage as wheel_passage
 
 
@@ -125,3 +131,40 @@ def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
     told = set_intersection(session, (text, folding), intersection_key(session))
     assert told.folding == folding
     assert not run_requirements(told)
+
+
+ANY = "moving", "fixed", "sliding", "internal"
+PAIRS = [*product(("moving",), ANY), *product(ANY, ("moving",)), ("fixed", "fixed")]
+"""Roles of an interface of which nothing moves that depends on the result of a run."""
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.sampled_from(PAIRS), min_size=2, max_size=2),
+    st.lists(st.tuples(*[st.integers(-5, 5)] * 2), min_size=4, max_size=4),
+    st.sampled_from([(), ("1:inner", "2:outer")]),
+    st.booleans(),
+)
+def test_the_verdict_is_that_of_the_run(kinds, steps, interfaces, alike):
+    """A square in a frame in a frame: what moves one boundary takes along that of the next zone."""
+    mesh = nested_zones()
+    names = ("1:inner", "2:outer", "2:inner", "3:outer")
+    roles = dict(zip(names, chain(*kinds), strict=True))
+    assume("moving" in roles.values())
+    shifts = [steps[0]] * 4 if alike else steps
+    motions = tuple(
+        Translate(name, (0.06 * x, 0.05 * y))
+        for name, (x, y) in zip(names, shifts, strict=True)
+        if roles[name] == "moving"
+    )
+    case = Case(roles=roles, motions=motions, interfaces=interfaces, relax="no", layers="no")
+    text, _ = find_intersection(case, mesh, lambda _: None, lambda: False)
+    refusal = ""
+    try:
+        deque(deform(case, mesh), 0)
+    except CaseError as problem:
+        refusal = str(problem)
+    except DeformError:  # of what can only be seen in a result
+        pass
+    assert bool(text) == bool(refusal)
+    assert text.casefold().removesuffix(".") in refusal.casefold()
