@@ -159,9 +159,18 @@ class Files(QObject):
         if self._answered or not unsaved.lost:
             return True
         can_save = unsaved.can_save
-        answer = questions.ask_unsaved(
-            window, unsaved.question(before), can_save, lambda: self._unsaved().question(before)
-        )
+
+        def now() -> str:
+            """Return the question as it is now; "" where it is another one, as a run has ended."""
+            present = self._unsaved()
+            return present.question(before) if present.can_save == can_save else ""
+
+        answer = questions.ask_unsaved(window, unsaved.question(before), can_save, now)
+        if answer == "again":
+            return self.ask_about_unsaved(again, before)
+        if answer == "run":  # what its end leaves unsaved is asked about then
+            window.running.cancel(lambda: QTimer.singleShot(0, again))
+            return False
         # The question named everything unsaved: nothing is asked about again.
         wanted = can_save if answer == "all" else [answer]
         savers = {"case": self.save_case, "table": designs.save_table}

@@ -160,8 +160,10 @@ class Running(QObject):
             return
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 
-    def cancel(self) -> None:
+    def cancel(self, follow: Callable[[], object] | None = None) -> None:
+        """Ask the running job to stop; ``follow`` is called when it has ended."""
         if self.runner.busy:
+            self._next = follow or self._next
             self.cancelling.emit()
             self.runner.cancel()
 

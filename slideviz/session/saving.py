@@ -14,7 +14,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.sections.model import Section
 from slideviz.sections.span import find_walls
-from slideviz.session.state import Session, ViewState
+from slideviz.session.state import Run, Session, ViewState
 from slideviz.terms import SHOWN
 
 
@@ -24,8 +24,10 @@ class Unsaved:
 
     session: Session
     lost: Mapping[str, str]
-    """The words for what would be lost, by its kind: ``case``; ``mesh``, the deformed mesh of the
-    run shown, or ``run`` while that goes on; ``table``, a sentence on the table of designs."""
+    """The words for what would be lost, by its kind: ``run``, a question on the run that goes on;
+    ``case``; ``mesh``, the deformed mesh of the run shown; ``table``, a sentence on the table of
+    designs."""
+    named: Run | None = None  # the run that `lost` is about, whose mesh or steps would be lost
 
     @classmethod
     def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
@@ -35,49 +37,50 @@ class Unsaved:
         be lost; "" for none.
         """
         lost = {}
+        # The mesh of a design is computed again at a click.
+        last = session.runs[-1] if session.runs else None
+        going = busy and last is not None and not last.end and last.panels is None
+        run = last if going else session.run_shown
+        if going and run is not None:
+            lost["run"] = _stop_question(run)
         cut, source = unsaved_sections(session), session.case.source
         if session.unsaved_case or cut:
-            last = ", method and sections" if session.view.sections else " and method"
-            new = f"roles, motions{last} as a case"
-            lost["case"] = f"the changes to {source.name}" if source else new
-        run = session.run_shown
-        # The mesh of a design is computed again at a click.
-        if session.unsaved_mesh and run is not None and run.panels is None:
-            # A run that goes on has no last step to save.
-            name = "mesh" if run.end and not busy else "run"
+            more = ", method and sections" if session.view.sections else " and method"
+            lost["case"] = f"the changes to {source.name}" if source else f"roles, motions{more}"
+        if not going and session.unsaved_mesh and run is not None and run.panels is None:
             part = f" ({run.progress_words})" if run.incomplete else ""
-            lost[name] = f"the deformed mesh of run {run.number}{part}"
+            lost["mesh"] = f"the deformed mesh of run {run.number}{part}"
         if designs:
             lost["table"] = designs
-        return cls(session, lost)
+        return cls(session, lost, run)
 
     @property
     def can_save(self) -> list[str]:
-        """Return the kinds of lost work that can be saved now: ``case``, ``mesh``, ``table``."""
-        return [name for name in self.lost if name != "run"]
+        """Return the kinds of lost work that can be saved now: ``case``, ``mesh``, ``table``.
+
+        While a run goes on, only ``run``, to be stopped first.
+        """
+        return ["run"] if "run" in self.lost else list(self.lost)
 
     def question(self, before: str) -> str:
         """Return the question to the user, with what else to know in further lines.
 
         ``before``: the action that would lose the work, such as "closing".
         """
-        number = self.session.shown
-        if "table" in self.lost:
-            rest = self._without("table")
-            what = "Save the table of designs"
-            question = rest.question(before) if rest.lost else f"{what} before {before}?"
-            return f"{question}\n{self.lost['table']}"
+        table = self.lost.get("table", "")
+        kept = [self.lost[name] for name in ("case", "mesh") if name in self.lost]
         if "run" in self.lost:
-            if len(self.lost) == 1:
-                return f"Run {number} goes on. Lose its steps?"
-            lost = "Its steps are lost, for it goes on; cancel it to save what there is."
-            return f"{self._without('run').question(before)}\nRun {number} goes on. {lost}"
-        text = f"Save {' and '.join(self.lost.values())} before {before}?"
-        more = " ".join(filter(None, (self._repeats(), self._others())))
-        return f"{text}\n{more}" if more else text
-
-    def _without(self, gone: str) -> Unsaved:
-        return replace(self, lost={name: self.lost[name] for name in self.lost if name != gone})
+            case = f"Not saved either: {kept[0]}." if kept else ""
+            lines = [self.lost["run"], " ".join(filter(None, (case, self._others())))]
+        elif kept:
+            source = self.session.case.source
+            if "case" in self.lost and source is None:
+                kept[0] += " as a case"
+            lines = [f"Save {' and '.join(kept)} before {before}?"]
+            lines.append(" ".join(filter(None, (self._repeats(), self._others()))))
+        else:
+            lines = [f"Save the table of designs before {before}?"]
+        return "\n".join(filter(None, (*lines, table)))
 
     def _repeats(self) -> str:
         run = self.session.run_shown
@@ -86,18 +89,23 @@ class Unsaved:
         return ""
 
     def _others(self) -> str:
-        """Return a sentence about the runs that are not shown and whose meshes are not saved."""
+        """Return a sentence about the other runs whose meshes are not saved."""
         runs = [
             run for run in self.session.runs if run.frames and not run.saved and run.panels is None
         ]
-        others = [str(run.number) for run in runs if run is not self.session.run_shown]
-        several = len(others) > 1
-        return (
-            f"The mesh{'es' * several} of run{'s' * several} {', '.join(others)} "
-            f"{'are' if several else 'is'} not saved either."
-            if others
-            else ""
-        )
+        others = [str(run.number) for run in runs if run is not self.named]
+        if len(others) == 1:
+            return f"The mesh of run {others[0]} is not saved either."
+        return f"The meshes of runs {', '.join(others)} are not saved either." if others else ""
+
+
+def _stop_question(run: Run) -> str:
+    """Return the question whether a run that goes on is to be stopped, and what is kept of it."""
+    count = len(run.frames)
+    if not count:
+        return f"Run {run.number} is still running, and has no finished step yet. Stop it?"
+    steps = "finished step" if count == 1 else f"{count} finished steps"
+    return f"Run {run.number} is still running. Stop it and keep its {steps}?"
 
 
 def unsaved_sections(session: Session) -> bool:

@@ -465,6 +465,23 @@ def test_the_question_offers_what_can_be_saved(qtbot, monkeypatch, can_save, wor
     assert answer == (can_save[0] if can_save else "discard")
 
 
+def test_the_question_about_a_run_is_asked_again_when_it_has_ended(make, qtbot, monkeypatch):
+    window = make()
+    monkeypatch.undo()
+    said = iter(["Stop it and keep its 2 finished steps?"] * 2 + [""] * 100)
+    seen = []
+
+    def look(box):
+        seen.append([button.text() for button in box.buttons()])
+        qtbot.waitUntil(lambda: box.text().startswith("Stop it and keep its 2"))
+        qtbot.waitUntil(lambda: not box.text())
+
+    monkeypatch.setattr(QMessageBox, "exec", look)
+    words = "Stop it and keep its finished step?"
+    assert questions.ask_unsaved(window, words, ["run"], lambda: next(said)) == "again"
+    assert sorted(seen[0]) == sorted(["&Stop it", "&Don’t save", "Let it &run"])
+
+
 def test_the_question_tells_how_far_a_sweep_is_meanwhile(make, qtbot, monkeypatch):
     window = make()
     monkeypatch.undo()

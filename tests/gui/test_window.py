@@ -18,6 +18,7 @@ from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.rbf.reduction import AUTO, Reduction
@@ -875,6 +876,33 @@ def test_closing_while_running_ends_the_run(ready, answers):
     assert len(asked) == 1
     assert not ready.window.isVisible()
     assert not ready.window.runner.alive
+
+
+def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkeypatch, answers):
+    window = ready.window
+    window.store.change(changes.set_case, steps=2000)
+    ready.click(window.run_panel.run)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 2, timeout=60_000)
+    replies, asked = iter(["cancel", "again", "run", "cancel", "discard"]), []
+
+    def reply(_parent, question, can_save, now):
+        asked.append((question.splitlines()[0], can_save, now()))
+        return next(replies)
+
+    monkeypatch.setattr(questions, "ask_unsaved", reply)
+    assert not window.close()
+    assert window.runner.busy
+    # Where the question has become another one, it is asked anew.
+    assert not window.close()
+    ready.qtbot.waitUntil(lambda: len(asked) == 4)
+    count = len(ready.session.runs[-1].frames)
+    assert all(can_save == ["run"] for _, can_save, _ in asked[:3])
+    assert asked[0][0].startswith("Run 1 is still running. Stop it and keep its ")
+    case, mesh = "the changes to passage.cfg", f"the deformed mesh of run 1 (step {count} of 2000)"
+    assert asked[3][:2] == (f"Save {case} and {mesh} before closing?", ["case", "mesh"])
+    assert window.isVisible()
+    assert ready.session.run_shown.end == "cancelled"
+    assert window.close()
 
 
 # Saving -----------------------------------------------------------------------------------

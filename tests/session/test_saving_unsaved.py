@@ -42,16 +42,34 @@ def test_a_mesh_is_asked_about_with_the_runs_that_are_not_shown(session):
     assert "\n" not in Unsaved.of(saved(session, 1), busy=False).question("closing")
 
 
-def test_the_steps_of_a_run_that_goes_on_cannot_be_saved(session):
-    unsaved = Unsaved.of(saved(session, 1), busy=True)
-    assert not unsaved.can_save
-    assert unsaved.question("closing") == "Run 2 goes on. Lose its steps?"
-    changed = Unsaved.of(saved(changes.set_case(session, steps=7), 1), busy=True)
-    assert changed.can_save == ["case"]
+@pytest.mark.parametrize("count", [0, 1, 3])
+@pytest.mark.parametrize("shown", [1, 2, 3])
+def test_a_run_that_goes_on_is_to_be_stopped_first_and_the_others_are_named(session, count, shown):
+    goes_on = Run(3, session.case, session.runs[0].frames * count)
+    session = replace(session, runs=(*session.runs, goes_on), shown=shown)
+    asked = {
+        0: "Run 3 is still running, and has no finished step yet. Stop it?",
+        1: "Run 3 is still running. Stop it and keep its finished step?",
+        3: "Run 3 is still running. Stop it and keep its 3 finished steps?",
+    }[count]
+    for done, others in (
+        ((1, 2), []),
+        ((2,), ["The mesh of run 1 is not saved either."]),
+        ((), ["The meshes of runs 1, 2 are not saved either."]),
+    ):
+        unsaved = Unsaved.of(saved(session, *done), busy=True)
+        assert unsaved.can_save == ["run"]
+        assert unsaved.question("closing").splitlines() == [asked, *others]
+    changed = Unsaved.of(saved(changes.set_case(session, steps=7), 1, 2), busy=True)
+    assert changed.can_save == ["run"]
     assert changed.question("closing").splitlines() == [
-        "Save roles, motions and method as a case before closing?",
-        "Run 2 goes on. Its steps are lost, for it goes on; cancel it to save what there is.",
-    ]
+        asked, "Not saved either: roles, motions and method.",
+    ]  # fmt: skip
+    # Another job is none of these, and a design's run is computed again at a click.
+    ended = replace(session, runs=(*session.runs, replace(goes_on, end="done")))
+    assert "run" not in Unsaved.of(ended, busy=True).lost
+    looked_at = replace(session, runs=(*session.runs, replace(goes_on, panels=session.case)))
+    assert "run" not in Unsaved.of(looked_at, busy=True).lost
 
 
 def test_a_case_is_asked_about_by_the_name_of_its_file(session):

@@ -80,43 +80,53 @@ def ask_unsaved(
 ) -> str:
     """Ask what to do with unsaved changes when they would be lost.
 
-    Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``discard`` or ``cancel``. Called
-    by `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
+    Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``run`` to stop the run first,
+    ``discard``, ``cancel``, or ``again`` where the question has become another one. Called by
+    `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
     `slideviz.session.saving`. ``what``: the question; the text after a line break is shown in
     smaller letters. ``can_save``: what can be saved now. ``now``: returns the question as it is
-    now, for what goes on meanwhile.
+    now, for what goes on meanwhile; "" where it is to be asked again.
     """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle("Unsaved changes")
     box.setTextFormat(Qt.TextFormat.PlainText)
-    question, _, more = what.partition("\n")
-    box.setText(question)
-    box.setInformativeText(more)
+
+    def show(text: str) -> None:
+        question, _, more = text.partition("\n")
+        box.setText(question)
+        box.setInformativeText(more)
+        if not text:
+            box.done(0)
+
+    show(what)
     if now is not None:
         tick = QTimer(box)
-        tick.timeout.connect(lambda: box.setInformativeText(now().partition("\n")[2]))
+        tick.timeout.connect(lambda: show(now()))
         tick.start(ROWS_MS)
-    several = len(can_save) > 1
+    several, going = len(can_save) > 1, "run" in can_save
     words = {"case": "Save &case…", "mesh": "Save &mesh…", "table": "Save &table…"}
+    words["run"] = "&Stop it"
     words["all"] = "Save &both…" if len(can_save) == 2 else "Save a&ll…"
     offered = [*can_save, "all"] if several else list(can_save)
     role = QMessageBox.ButtonRole
     buttons = {
         # “Save” is enough for a single case or mesh; the table may be in a hidden dock.
         name: box.addButton(
-            words[name] if several or name == "table" else "&Save…", role.AcceptRole
+            words[name] if several or name in ("table", "run") else "&Save…", role.AcceptRole
         )
         for name in offered
     }
     buttons["discard"] = box.addButton("&Don’t save", role.DestructiveRole)
     # Not &Cancel: Alt+C saves the case.
-    buttons["cancel"] = box.addButton("C&ancel", role.RejectRole)
+    buttons["cancel"] = box.addButton("Let it &run" if going else "C&ancel", role.RejectRole)
     box.setEscapeButton(buttons["cancel"])
     box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
     box.exec()
     clicked = box.clickedButton()
     answer = next((name for name, button in buttons.items() if button is clicked), "cancel")
+    if now is not None and not now():
+        answer = "again"
     # Its parent would keep it, and the timer would go on asking `now`.
     box.deleteLater()
     return answer
