@@ -25,7 +25,7 @@ from slideviz.export.offscreen import (
     resize,
     write_title,
 )
-from slideviz.export.picture_options import PictureOptions, headings, panes
+from slideviz.export.picture_options import PictureOptions, headings, line_between, panes
 from slideviz.export.titles import DETAIL, caption, label_marked_cell
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
@@ -179,8 +179,27 @@ class OffscreenRenderer:
         first, second = panes(options, options.gap)
         left = yield from self._pane(sessions[0], first, words[0], size)
         right = yield from self._pane(sessions[1], second, words[1], size)
-        between = np.repeat(left[:, -1:], options.gap, axis=1)
+        between = self._between(options)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
+
+    def _between(self, options: PictureOptions) -> Pixels:
+        """Return the pixels between two pictures: background, with a line in the middle."""
+        from pyvista import Color
+
+        scheme, height = self._scene.scheme, options.size[1]
+        down = np.linspace(0.0, 1.0, height)[:, None, None]
+        top, bottom, line = (
+            np.array(Color(name).int_rgb)
+            for name in (scheme.background_top, scheme.background, scheme.edge)
+        )
+        drawn = np.repeat(top + down * (bottom - top), options.gap, axis=1).round()
+        columns = line_between(options)
+        drawn[:, columns] = line
+        if options.background == "transparent":
+            opacity = np.zeros((height, options.gap, 1))
+            opacity[:, columns] = 255.0
+            drawn = np.concatenate([drawn, opacity], axis=2)
+        return drawn.astype(np.uint8)
 
     def aim(self, options: PictureOptions, frame: int | None = None) -> Scene:
         """Aim the camera as for a picture of a step, by default the shown one; return the scene."""

@@ -130,6 +130,13 @@ def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOpt
     return replace(left, legend=False), right
 
 
+def line_between(options: PictureOptions) -> slice:
+    """Return the columns of the line between two pictures, from the end of the left one."""
+    wide = max(round(options.scale), 1)
+    start = (options.gap - wide) // 2
+    return slice(start, start + wide)
+
+
 def title_of(session: Session, options: PictureOptions) -> str:
     """Return the title of a picture: run, step and quality; shortened to fit its width."""
     frame: StepFrame | None = session.frame

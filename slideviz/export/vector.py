@@ -12,7 +12,7 @@ from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import CAPTION_AT, TITLE
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.picture_options import PictureOptions, headings, panes
+from slideviz.export.picture_options import PictureOptions, headings, line_between, panes
 from slideviz.export.titles import draw_marked_cell
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -75,6 +75,7 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
     if len(sessions) == 2:
         left, right = panes(options, options.gap)
         parts = [(left, 0), (right, left.size[0] + options.gap)]
+        _line_between(figure, options, left.size[0])
     # Both have the same scale.
     (x, _), y = renderer.window(parts[0][0])
     unit = (y[1] - y[0]) / height
@@ -88,6 +89,16 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
     if options.legend:
         _legend(figure, renderer.session, options)
     return figure
+
+
+def _line_between(figure: Any, options: PictureOptions, start: int) -> None:
+    """Draw the line between two pictures; the left one ends at the pixel ``start``."""
+    from matplotlib.lines import Line2D
+
+    line = line_between(options)
+    x = (start + (line.start + line.stop) / 2.0) / options.size[0]
+    wide = (line.stop - line.start) * 72.0 / figure.dpi
+    figure.add_artist(Line2D([x, x], [0.0, 1.0], color=PAPER.edge, linewidth=wide, gid="between"))
 
 
 @dataclass(frozen=True, eq=False)
