@@ -37,7 +37,7 @@ def sample(arguments: argparse.Namespace) -> int:
 
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")
-        print(table([(name, row.about) for name, row in SAMPLES.items()]))
+        print(table([(name, row.words()) for name, row in SAMPLES.items()]))
         print("variants (--variant):")
         print(table([(name, ", ".join(row.variants)) for name, row in SAMPLES.items()]))
         return DONE

@@ -46,7 +46,8 @@ class Files(QObject):
         super().__init__(window)
         self.window = window
         self.settings = settings
-        self.samples = {name: row.about for name, row in SAMPLES.items()}
+        self.sizes = {name: jobs.SIZES.get(name, row.size) for name, row in SAMPLES.items()}
+        self.samples = {name: row.words(self.sizes[name]) for name, row in SAMPLES.items()}
         self._saved_to: Path | None = None
         self.saving = False
         self._answered = False
@@ -78,7 +79,12 @@ class Files(QObject):
         return here if here != Path(here.anchor) and os.access(here, os.W_OK) else Path.home()
 
     def ask_and_open(self) -> None:
-        if path := questions.ask_open(self.window, self.folder()):
+        """Ask for a mesh or case, first in the folder of the open one, and open it."""
+        session = self.window.store.session
+        folder, here = self.folder(), session.case.source or session.path
+        if here is not None and here.parent.is_dir() and sample_folder() not in here.parents:
+            folder = here.parent
+        if path := questions.ask_open(self.window, folder):
             self.open_path(path)
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
@@ -108,10 +114,7 @@ class Files(QObject):
 
     def ask_and_open_sample(self) -> None:
         """Ask for a sample and its size, and open it."""
-        from slideviz.samples.table import SAMPLES
-
-        sizes = {name: jobs.SIZES.get(name, SAMPLES[name].size) for name in self.samples}
-        if found := questions.ask_sample(self.window, self.samples, sizes):
+        if found := questions.ask_sample(self.window, self.samples, self.sizes):
             self.open_sample(found[0], size=found[1])
 
     def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:

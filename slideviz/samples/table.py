@@ -46,6 +46,7 @@ class SampleKind:
     """A kind of sample, a row of ``SAMPLES``."""
 
     about: str  # what it is, in words for users
+    counts: str  # what its size counts
     size: int  # the default size
     make: Callable[[str, int, str], Sample]  # returns the sample of a name, a size and a variant
     variants: tuple[str, ...] = ("motion",)
@@ -56,11 +57,16 @@ class SampleKind:
     stream: Callable[[str, int, str], StreamedSample] | None = None
     """Returns the same as a `StreamedSample`; None if that is not possible."""
 
+    def words(self, size: int | None = None) -> str:
+        """Return what it is, and a size of it; None: the default size."""
+        return f"{self.about}; size: {self.counts} ({size or self.size})"
+
 
 def _thesis(about: str, variants: tuple[str, ...]) -> SampleKind:
     """Return the row of a case of the thesis."""
     return SampleKind(
         about,
+        "cells along a side",
         25,
         lambda name, size, variant: Sample(name, *thesis_case(name, size, variant)),
         variants,
@@ -83,7 +89,7 @@ def _streamed_stator(_name: str, size: int, _variant: str) -> StreamedSample:
 
 SAMPLES: Mapping[str, SampleKind] = {
     "square": _thesis(
-        "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
+        "2D: turned block in a square, periodic in y (thesis 4.1.1, of 25 or 200)",
         ("file", "motion", "translate"),
     ),
     "polar": _thesis(
@@ -96,36 +102,41 @@ SAMPLES: Mapping[str, SampleKind] = {
         "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)", ("file",)
     ),
     "passage": SampleKind(
-        "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
+        "2D: turbine blade in a periodic passage",
+        "cells along the inflow",
         36,
         lambda name, size, _: Sample(name, passage_mesh(size), passage_case()),
     ),
     "airfoil": SampleKind(
-        "2D: airfoil turned in a far field of 50 chords; size: cells around it (96)",
+        "2D: airfoil turned in a far field of 50 chords",
+        "cells around it",
         96,
         lambda name, size, variant: Sample(name, airfoil_mesh(size, variant), airfoil_case()),
         ("motion", "layers"),
     ),
     "turbine-row": SampleKind(
-        "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
-        "size: cells (224180)",
+        "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3)",
+        "cells, about",
         224_180,
         lambda name, size, _: Sample(name, row_mesh(size), row_case(size)),
     ),
     "turbine-row-3d": SampleKind(
-        "3D: that vane from hub to shroud, twisted; hexahedra and prisms; size: cells (25000)",
+        "3D: that vane from hub to shroud, twisted; hexahedra and prisms",
+        "cells, about",
         25_000,
         lambda name, size, _: Sample(name, extruded_row(size), extruded_case(size)),
     ),
     "stator": SampleKind(
-        "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
+        "3D: stator passage, 41 around, hexahedra (thesis 4.2.3)",
+        "cells, about",
         240_000,
         _stator,
         ("file",),
         _streamed_stator,
     ),
     "impeller": SampleKind(
-        "3D: centrifugal compressor passage, 13 around, twisted over its span; size: cells (12000)",
+        "3D: centrifugal compressor passage, 13 around, twisted over its span",
+        "cells, about",
         12_000,
         lambda name, size, _: Sample(name, impeller_mesh(size), impeller_case()),
     ),

@@ -221,7 +221,7 @@ def tell_dialogs(desk: Desk, window, place: Path) -> None:
     with answered(desk):
         questions.ask_sample(
             window,
-            {name: row.about for name, row in SAMPLES.items()},
+            {name: row.words() for name, row in SAMPLES.items()},
             {name: row.size for name, row in SAMPLES.items()},
         )
         questions.ask_replace(window, here[:1])

@@ -2,16 +2,19 @@
 
 import pytest
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QLabel, QMessageBox
+from qtpy.QtWidgets import QFileDialog, QLabel, QMessageBox
 
+from slideviz.gui.panels.run import _shortened
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
 NAME = '<b>wing</b><img src="a.png">'
 ask_replace = questions.ask_replace
+ask_save = questions.ask_save
 ask_overwrite_input = questions.ask_overwrite_input
 
 
@@ -36,6 +39,43 @@ def test_questions_show_names_as_they_are(window, tmp_path, monkeypatch, ask):
     ((form, text),) = shown
     assert form == Qt.TextFormat.PlainText
     assert path.name in text
+
+
+@pytest.mark.parametrize(
+    ("filters", "chosen", "typed", "expected"),
+    [
+        ("Table (*.csv)", "Table (*.csv)", "mesh.su2", "mesh.su2.csv"),
+        ("Table (*.csv)", "Table (*.csv)", "runs", "runs.csv"),
+        ("Table (*.csv)", "Table (*.csv)", "v1.5", "v1.5.csv"),
+        ("Table (*.csv)", "Table (*.csv)", "runs.CSV", "runs.CSV"),
+        ("Case (*.cfg)", "Case (*.cfg)", "a.su2", "a.su2.cfg"),
+        (PLOT_FILTERS, "SVG drawing (*.svg)", "plot.pdf", "plot.pdf"),
+        (PLOT_FILTERS, "SVG drawing (*.svg)", "plot.cfg", "plot.cfg.svg"),
+        ("SU2 (*.su2);;VTK (*.vtu)", "VTK (*.vtu)", "a.su2", "a.su2"),
+    ],
+)
+def test_a_file_is_never_saved_under_the_suffix_of_another_kind(
+    monkeypatch, tmp_path, filters, chosen, typed, expected
+):
+    name = str(tmp_path / typed)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (name, chosen))
+    asked = []
+    monkeypatch.setattr(questions, "ask_replace", lambda _, paths: asked.append(paths) or True)
+    found = ask_save(None, "Save", tmp_path / "default.csv", filters)
+    assert found == tmp_path / expected
+    # The dialog has asked only about the name that was typed.
+    assert not asked
+    found.touch()
+    assert ask_save(None, "Save", tmp_path / "default.csv", filters) == found
+    assert asked == [] if expected == typed else [[found]]
+
+
+@pytest.mark.parametrize("inside", ["(hub: none; shroud: none)", "(a (b; c); d)", ""])
+def test_a_sentence_is_not_cut_within_brackets(inside):
+    begin = f"The names of boundaries do not say between which the span goes {inside}".strip()
+    text = f"{begin}; name two of {', '.join(f'wall{k}' for k in range(20))}."
+    assert _shortened(text) == f"{begin}."
+    assert _shortened("a; b.") == "a; b."
 
 
 def test_labels_do_not_guess(window, tmp_path):

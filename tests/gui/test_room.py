@@ -247,7 +247,7 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
         for name in ("square", "stator"):
             choice.setCurrentIndex(choice.findData(name))
             told = " ".join(label.text() for label in dialog.findChildren(QLabel))
-            seen.append((box.value(), "one side" in told, "all cells" in told))
+            seen.append((box.value(), "cells along a side (25)" in told, "about (20000)" in told))
         (buttons,) = dialog.findChildren(QDialogButtonBox)
         for text, able in (("2.5", False), ("20000", True)):
             box.lineEdit().setText(text)

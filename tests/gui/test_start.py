@@ -12,6 +12,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.errors import Cancelled
 from slideviz.gui import files, start
 from slideviz.gui.start import COLUMNS, RECENT, SIZE, StartPage, card, when_changed
+from slideviz.samples import table
 from slideviz.samples.table import SAMPLES
 from slideviz.session import jobs
 from slideviz.terms import ROLES
@@ -52,9 +53,37 @@ def test_a_card_opens_its_sample_and_deforms_nothing(driver, small, key):
     assert not driver.session.runs
 
 
-def test_large_samples_open_small():
+def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(driver, monkeypatch):
     assert max(jobs.SIZES.values()) <= 50_000
     assert {"stator", "turbine-row"} <= set(jobs.SIZES)
+    made, window = [], driver.window
+    monkeypatch.setattr(
+        table, "write_sample", lambda name, _folder, size, **_: made.append((name, size)) or []
+    )
+    for name, words in window.files.samples.items():
+        with pytest.raises(StopIteration):  # as nothing was written
+            jobs.open_sample(name, Path("nowhere"), lambda _: None, lambda: False)
+        size = made[-1][1] or SAMPLES[name].size
+        assert words.endswith(f"({size})")
+        assert window.start.sample_buttons[name].toolTip() == words
+        assert window.files.sizes[name] == size
+    assert [name for name, _ in made] == list(SAMPLES)
+
+
+def test_open_begins_in_the_folder_of_the_mesh(driver, sample_folder, answers, settings, small):
+    settings.setValue("folder", str(small))
+    asked = answers("ask_open", None)
+    driver.window.files.ask_and_open()
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    settings.setValue("folder", str(small))  # as after an export
+    driver.window.files.ask_and_open()
+    assert [folder for (folder,) in asked] == [small, sample_folder / "passage"]
+    # Those that come with the program are in a cache, which is of no interest.
+    driver.window.files.open_sample("hexahedron")
+    driver.settle()
+    settings.setValue("folder", str(sample_folder))
+    driver.window.files.ask_and_open()
+    assert asked[-1][0] == sample_folder
 
 
 def test_a_sample_can_be_cancelled_while_it_is_made(small):

@@ -209,5 +209,15 @@ def _checked(session: Session) -> object:
 
 
 def _shortened(text: str) -> str:
-    """Return a text short enough to stand beside the button: a long one only up to its ``;``."""
-    return text if len(text) <= LONGEST_TEXT else text.partition("; ")[0].removesuffix(".") + "."
+    """Return a text short enough to stand beside the button: a long one only up to its ``;``.
+
+    One within brackets does not end it.
+    """
+    if len(text) <= LONGEST_TEXT:
+        return text
+    ends = (end for end, letter in enumerate(text) if letter == ";" and _is_closed(text[:end]))
+    return text[: next(ends, len(text))].removesuffix(".") + "."
+
+
+def _is_closed(text: str) -> bool:
+    return text.count("(") == text.count(")")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -47,7 +48,10 @@ def ask_table(parent: QWidget, folder: Path) -> Path | None:
 
 
 def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
-    """Return the file to write, with a suffix, or None; the dialog asks before replacing a file."""
+    """Return the file to write, or None; a file is not replaced without a question.
+
+    Its suffix is one of the ``filters``: another one, as that of the mesh, gets it behind.
+    """
     return _save_name(parent, title, default, filters, QFileDialog.Option(0))
 
 
@@ -62,14 +66,25 @@ def _save_name(
 ) -> Path | None:
     """Return the chosen name, with the suffix of the chosen filter if it has none; or None."""
     call = QFileDialog.getSaveFileName
-    name, chosen = call(parent, title, str(default), filters, options=option)
-    if not name:
-        return None
-    path = Path(name)
-    if not path.suffix:
-        suffix = chosen.rpartition("*")[2].partition(")")[0].strip() if "*" in chosen else ""
-        path = path.with_suffix(suffix or default.suffix)
-    return path
+    while True:
+        name, chosen = call(parent, title, str(default), filters, options=option)
+        if not name:
+            return None
+        path = Path(name)
+        if path.suffix.lower() in _suffixes(filters):
+            return path
+        suffix = next(iter(_suffixes(chosen)), default.suffix)
+        path = path.with_name(f"{path.name.rstrip('.')}{suffix}")
+        # The dialog has asked about the name without the suffix.
+        asks = option != QFileDialog.Option.DontConfirmOverwrite and path.exists()
+        if not asks or ask_replace(parent, [path]):
+            return path
+        default = path
+
+
+def _suffixes(filters: str) -> list[str]:
+    """Return the suffixes of the filters of a file dialog, such as ``.csv``."""
+    return re.findall(r"\*(\.\w+)", filters)
 
 
 def ask_unsaved(
@@ -153,9 +168,7 @@ def ask_sample(
 
     def show(chosen: str) -> None:
         size.setValue(sizes[chosen])
-        large = sizes[chosen] > 1000
-        what = "of all cells, about" if large else "of cells along one side"
-        about.setText(f"{samples[chosen]}. Size: number {what}.")
+        about.setText(f"{samples[chosen]}.")
 
     name.currentIndexChanged.connect(lambda _: show(name.currentData()))
     show(name.currentData())
