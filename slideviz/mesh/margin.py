@@ -21,7 +21,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import CORNERS, LANES, LEVELS, gather, write_coefficients
+from slideviz.mesh.jacobians import (
+    CORNERS,
+    LANES,
+    LEVELS,
+    NODE,
+    add3,
+    cross3,
+    dot3,
+    edge,
+    gather,
+    half_sum,
+    minus3,
+    write_coefficients,
+)
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import FARTHEST
@@ -41,6 +54,19 @@ ROUNDING = 64 * np.finfo(float).eps
 simple) size of the cell."""
 
 THIRD = 1 / 3  # a multiplication with it is faster than a division
+
+
+BOUNDED = np.array([1 / 8, 1 / 4, 1 / 2, 1])
+"""Parts of the largest margin that is looked for, up to which margins are bounded from below."""
+
+ALONG = np.array(
+    [
+        [[NODE[0, j, k], NODE[1, j, k]] for j in range(2) for k in range(2)],
+        [[NODE[j, 0, k], NODE[j, 1, k]] for j in range(2) for k in range(2)],
+        [[NODE[j, k, 0], NODE[j, k, 1]] for j in range(2) for k in range(2)],
+    ]
+)
+"""(3, 4, 2): nodes of the four edges of a hexahedron along each direction."""
 
 
 def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
@@ -161,6 +187,40 @@ def path_margins(mesh: Mesh, reference: Mesh, signs_of: Mesh | None = None) -> F
     return margins(reference.points, mesh.points - reference.points, mesh.cells, FARTHEST, signs)
 
 
+def least_margin(
+    before: Mesh, after: Mesh, cap: float, signs: NDArray[np.int8]
+) -> tuple[float, int]:
+    """Return the least margin, up to ``cap``, of all cells without the halo's, and its first cell.
+
+    It is that of `margins`, which are found only of cells that may have the least one: of a
+    hexahedron a bound costs less (`_write_bounds`).
+    """
+    cells, ends = after.cells, cap * BOUNDED
+    bounded = np.zeros(len(cells), np.int8)
+
+    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+        if vtk == 12:
+            values = np.empty(len(ids), np.int8)
+            _write_bounds(before.points, after.points, nodes, signs[ids], ends, values)
+            bounded[ids] = values
+
+    cells.in_parts(of_part)
+    if after.halo is not None:
+        bounded[after.halo.cells] = len(ends)
+    least, cell = cap, 0
+    for level, end in enumerate(ends):
+        ids = np.flatnonzero(bounded == level)
+        some = cells.take(ids)
+        motion = np.zeros_like(before.points)
+        motion[some.nodes] = after.points[some.nodes] - before.points[some.nodes]
+        found = margins(before.points, motion, some, cap, signs[ids])
+        if len(found) and (found.min(), ids[found.argmin()]) < (least, cell):
+            least, cell = float(found.min()), int(ids[found.argmin()])
+        if least < end:
+            break  # all others have larger ones
+    return least, cell
+
+
 def step_safety(
     before: Mesh,
     after: Mesh,
@@ -176,16 +236,13 @@ def step_safety(
     first, length = part[0], part[1] - part[0]
     signs, cells = reference_of(undeformed)[1], after.cells
     cap = (FARTHEST - first) / length
-    found = margins(before.points, after.points - before.points, cells, cap, signs)
-    if after.halo is not None:
-        found[after.halo.cells] = cap
-    cell = int(found.argmin())
-    if found[cell] >= cap:
+    margin, cell = least_margin(before, after, cap, signs)
+    if margin >= cap:
         return SafeFraction(FARTHEST, step=step)
     nodes = cells.connectivity[cells.offsets[cell] : cells.offsets[cell + 1]]
     where = tuple(undeformed.points[nodes].mean(axis=0).tolist())
     kind = ELEMENTS[int(cells.types[cell])].name
-    return SafeFraction(first + float(found[cell]) * length, cell, kind, where, step)
+    return SafeFraction(first + margin * length, cell, kind, where, step)
 
 
 def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
@@ -197,6 +254,101 @@ def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
         if safe.fraction < end:
             break
     return safe
+
+
+@njit(**OPTIONS)
+def _write_bounds(before, after, nodes, turn, ends, found):  # type: ignore[no-untyped-def]
+    """Write how many of the ascending ``ends`` the margins of hexahedra surely reach, (m,).
+
+    Of the four edges along each direction take the mean, U + s F, and the largest distance from it,
+    r + s q. All coefficients of the proof are means of triple products of such edges, so they
+    differ from det(U + s F, V + s G, W + s H) by at most ∏(aᵢ + rᵢ + s qᵢ) - ∏aᵢ with
+    a₁ = |U| + s |F|, which is largest at the end of an interval.
+    """
+    start, stop = np.empty((2, 3, 8, LANES))
+    mean, off = np.empty((2, 3, 3, LANES)), np.empty((2, 3, LANES))
+    errors, level = np.empty((2, 2, LANES)), np.empty(LANES, np.int8)
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(before, nodes, first, count, start)
+        gather(after, nodes, first, count, stop)
+        for axis in range(3):
+            for j in range(8):
+                for c in range(count):
+                    stop[axis, j, c] -= start[axis, j, c]
+        _write_sizes(start, count, errors[0])
+        _write_sizes(stop, count, errors[1])
+        _write_means(start, count, mean[0], off[0])
+        _write_means(stop, count, mean[1], off[1])
+        level[:count], open_ = 0, count
+        for k in range(len(ends) - 1, -1, -1):
+            if open_ == 0:
+                break
+            open_ = 0
+            for c in range(count):
+                reaches = _is_bounded(mean, off, errors, turn[first + c], ends[k], c)
+                level[c] = max(level[c], k + 1 if reaches else 0)
+                open_ += level[c] == 0
+        found[first : first + count] = level[:count]
+
+
+@njit(**OPTIONS)
+def _write_sizes(at, count, sizes):  # type: ignore[no-untyped-def]
+    """Write the largest coordinate, and the largest difference from the first node, (2, ...)."""
+    sizes[:] = 0.0
+    for axis in range(3):
+        for j in range(8):
+            for c in range(count):
+                x = at[axis, j, c]
+                sizes[0, c] = max(sizes[0, c], abs(x))
+                sizes[1, c] = max(sizes[1, c], abs(x - at[axis, 0, c]))
+
+
+@njit(**OPTIONS)
+def _write_means(at, count, mean, off):  # type: ignore[no-untyped-def]
+    """Write the mean (3, 3, ...) of the edges along each direction, and the largest distance."""
+    for along in range(3):
+        for c in range(count):
+            a = edge(at, ALONG[along, 0, 0], ALONG[along, 0, 1], c)
+            b = edge(at, ALONG[along, 1, 0], ALONG[along, 1, 1], c)
+            d = edge(at, ALONG[along, 2, 0], ALONG[along, 2, 1], c)
+            e = edge(at, ALONG[along, 3, 0], ALONG[along, 3, 1], c)
+            squared = 0.0
+            middle = half_sum(half_sum(a, b), half_sum(d, e))
+            for each in (a, b, d, e):
+                away = minus3(each, middle)
+                squared = max(squared, dot3(away, away))
+            mean[along, 0, c], mean[along, 1, c], mean[along, 2, c] = middle
+            off[along, c] = np.sqrt(squared)
+
+
+@njit(inline="always", **OPTIONS)
+def _is_bounded(mean, off, errors, turn, end, c):  # type: ignore[no-untyped-def]
+    """Return whether all coefficients of a cell are surely positive up to ``end``."""
+    u = mean[0, 0, 0, c], mean[0, 0, 1, c], mean[0, 0, 2, c]
+    v = mean[0, 1, 0, c], mean[0, 1, 1, c], mean[0, 1, 2, c]
+    w = mean[0, 2, 0, c], mean[0, 2, 1, c], mean[0, 2, 2, c]
+    f = end * mean[1, 0, 0, c], end * mean[1, 0, 1, c], end * mean[1, 0, 2, c]
+    g = end * mean[1, 1, 0, c], end * mean[1, 1, 1, c], end * mean[1, 1, 2, c]
+    h = end * mean[1, 2, 0, c], end * mean[1, 2, 1, c], end * mean[1, 2, 2, c]
+    uv, fg, mixed = cross3(u, v), cross3(f, g), add3(cross3(u, g), cross3(f, v))
+    one, two = dot3(uv, h) + dot3(mixed, w), dot3(fg, w) + dot3(mixed, h)
+    # Bernstein coefficients of the cubic on the interval.
+    first = turn * dot3(uv, w)
+    second = first + turn * one * THIRD
+    third = first + turn * (2 * one + two) * THIRD
+    last = first + turn * (one + two + dot3(fg, h))
+    low = min(first, second, third, last)
+    a = np.sqrt(dot3(u, u)) + np.sqrt(dot3(f, f))
+    b = np.sqrt(dot3(v, v)) + np.sqrt(dot3(g, g))
+    d = np.sqrt(dot3(w, w)) + np.sqrt(dot3(h, h))
+    p = off[0, 0, c] + end * off[1, 0, c]
+    q = off[0, 1, c] + end * off[1, 1, c]
+    r = off[0, 2, c] + end * off[1, 2, c]
+    change = p * (b + q) * (d + r) + a * q * (d + r) + a * b * r
+    far = errors[0, 0, c] + end * errors[1, 0, c]
+    size = errors[0, 1, c] + end * errors[1, 1, c]
+    return change + 2 * ROUNDING * far * size * size < low < np.inf
 
 
 @njit(**OPTIONS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.jacobians import VALID, coefficients
-from slideviz.mesh.margin import GAP, first_root, margins
+from slideviz.mesh.margin import BOUNDED, GAP, _write_bounds, first_root, least_margin, margins
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.system.threads import PART, core_limit
@@ -124,6 +124,40 @@ def test_the_bits_depend_neither_on_threads_nor_on_other_cells():
         assert np.array_equal(margins(points, motion, mesh.cells, CAP), found)
     ids = np.arange(5, PART + 70, 3)
     assert np.array_equal(margins(points, motion, mesh.cells.take(ids), CAP), found[ids])
+
+
+@pytest.mark.parametrize("vtk", oracle.IDEAL)
+@pytest.mark.parametrize("scale", [1e-3, 0.1, 1.0])
+@pytest.mark.parametrize(("flat", "offset"), [(1.0, 0.0), (1e-4, 1e3)])
+def test_the_least_margin_is_that_of_all_cells_to_the_bit(vtk, scale, flat, offset):
+    mesh, points, motion = random_cells(vtk, 500, seed=3, flat=flat, offset=offset)
+    before = mesh.with_points(points)
+    after = mesh.with_points(points + scale * motion)
+    signs = np.ones(500, np.int8)
+    for some in (np.arange(500), np.arange(0, 500, 50), np.arange(7)):
+        cells = mesh.cells.take(some)
+        one, other = (Mesh(each.points, cells) for each in (before, after))
+        found = margins(before.points, after.points - before.points, cells, CAP, signs[some])
+        valid = found > 0
+        for keep in (slice(None), valid):
+            left = found[keep]
+            if not len(left):
+                continue
+            part = [
+                Mesh(each.points, cells.take(np.arange(len(some))[keep])) for each in (one, other)
+            ]
+            expected = (left.min(), left.argmin()) if left.min() < CAP else (CAP, 0)
+            assert least_margin(*part, CAP, signs[some][keep]) == expected
+
+
+def test_a_bound_never_exceeds_the_margin_of_a_cell():
+    mesh, points, motion = random_cells(12, 20_000, seed=4)
+    after, levels = points + 0.02 * motion, np.empty(20_000, np.int8)
+    nodes, turn = mesh.cells.by_type[12][1], np.ones(20_000, np.int8)
+    _write_bounds(points, after, nodes, turn, CAP * BOUNDED, levels)
+    found = margins(points, after - points, mesh.cells, CAP)
+    assert (found >= np.append(0.0, CAP * BOUNDED)[levels]).all()
+    assert (np.bincount(levels, minlength=5) > 100).all()  # neither all nor none are bounded
 
 
 @pytest.mark.parametrize(
