@@ -91,13 +91,13 @@ class Stepping:
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, timer, part)
-            if self.mend is not None and self.case.repair_steps:
-                step = self.mend(step)
-                points = step.mesh.points
-                moved = mended_coords(setup, step, moved)
             farthest = farthest_node(setup.coords, moved)
             unsound = unsoundness(setup, mesh, solution, moved, part=part, farthest=farthest.length)
             failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
+            if self.mend is not None and self.case.repair_steps and not failure:
+                step = self.mend(step)
+                points = step.mesh.points
+                moved = mended_coords(setup, step, moved)
             if halve:
                 try:
                     now = self.quality_of([*made, step]).inverted
@@ -127,7 +127,7 @@ class Stepping:
                 remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             if step.repaired is not None:
-                warnings += step.repaired.warnings
+                warnings += [text for text in step.repaired.warnings if text not in warnings]
             if solution.relaxed is not None and solution.relaxed.limited:
                 warnings.append(_limited_note(solution.relaxed.limited, len(coords), index))
             stray = []

@@ -54,7 +54,6 @@ class FileRegions:
         self.before = np.empty((0, skin.dim))
         """`nodes`, `before` (m,), (m, d): nodes in regions that were moved, and where they were."""
         self.warnings: tuple[str, ...] = ()
-        self.bad: Cells | None = None  # the cells of which the first region was asked for
 
     def near(self, cells: IntArray, rings: int) -> Region | None:
         """Return a region with all cells at the nodes of some cells (k,) and rings around them.
@@ -81,13 +80,19 @@ class FileRegions:
         types = np.concatenate([block.types for block in blocks])
         order = np.argsort(ids, kind="stable")
         ids, table = ids[order], Cells.from_types(types, connectivity).take(order)
-        if self.bad is None:
-            some = table.take(np.searchsorted(ids, cells))
-            self.bad = Cells.from_types(some.types, nodes[some.connectivity])
         assert self._source.base is not None
         mesh = Mesh(self._source.points.at(nodes), table, name=self._source.file.name)
         reference = mesh.with_points(self._source.base.at(nodes))
         return Region(ids, nodes, mesh, reference, self._freedom_of(nodes, near[nodes], reference))
+
+    def cells(self, which: IntArray) -> Cells:
+        """Return the cells with some numbers (k,), ascending."""
+        blocks = list(self._blocks(lambda block, _: np.isin(block.ids, which)))
+        every = Cells.from_types(
+            np.concatenate([block.types for block in blocks]),
+            np.concatenate([block.nodes for block in blocks]),
+        )
+        return every.take(np.argsort(np.concatenate([block.ids for block in blocks])))
 
     def move(self, region: Region, points: FloatArray) -> None:
         """Write the points (n, d) of the nodes of a region that were moved."""
@@ -173,13 +178,15 @@ def mend_file(
     freedom = find_freedom(case, skin, points, setup)
     facets = setup.boundary.facets
     regions = FileRegions(source, file, skin, freedom, facets, lambda: tick(done))
-    left, still, impossible = mend_cells(regions, bad, below, case.quality_metric, report)
-    if regions.bad is None:
+    ratings = np.where(np.isin(bad, folded), -1.0, after.values[bad])
+    left, still, impossible = mend_cells(regions, bad, ratings, below, case.quality_metric, report)
+    if regions.warnings and not len(regions.nodes):
         none = bad[:0]
         same = bad, bad, folded, folded
         return MeshRepair(skin, *same, none, points[none], 0.0, warnings=regions.warnings)
-    nodes = np.union1d(regions.bad.nodes, regions.nodes)
-    cells = Cells.from_types(regions.bad.types, np.searchsorted(nodes, regions.bad.connectivity))
+    cells = regions.cells(bad)
+    nodes = np.union1d(cells.nodes, regions.nodes)
+    cells = Cells.from_types(cells.types, np.searchsorted(nodes, cells.connectivity))
     part = Part(sealed(nodes), sealed(bad), source.n_points, count)
     mesh = Mesh(source.points.at(nodes), cells, name=skin.name, part=part)
     moved = np.searchsorted(nodes, regions.nodes)

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.mesh.jacobians import VALID
@@ -15,8 +17,8 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.repair.energy import targets
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.lift import lift_energy
-from slideviz.mesh.repair.patches import Patch
-from slideviz.mesh.repair.repair import repair
+from slideviz.mesh.repair.patches import Patch, find_patches
+from slideviz.mesh.repair.repair import WORTH, repair
 from slideviz.samples.table import sample
 from slideviz.system.threads import core_limit
 from tests.builders import grid
@@ -356,3 +358,71 @@ def test_an_undeformed_mesh_that_is_folded_itself_makes_no_infinite_target(kind)
         targets_folded = mesh.with_points(points[0])
         result = repair(mesh.with_points(points[1]), Freedom.within(3, held), targets_folded)
     assert len(result.bad_after) < len(result.bad_before)
+
+
+def squeezed(seed):
+    """A grid, and the same with some smooth bumps and noise, whose sides partly slide."""
+    rng = np.random.default_rng(seed)
+    shape, kind = [
+        ((9, 8), "plain"),
+        ((8, 7), "simplex"),
+        ((9, 7), "mixed"),
+        ((4, 4, 4), "plain"),
+        ((4, 4, 3), "mixed"),
+    ][rng.integers(5)]
+    mesh = grid(shape, kind=kind)
+    x, way = mesh.points, np.zeros_like(mesh.points)
+    for _ in range(rng.integers(1, 4)):
+        length = np.linalg.norm(x - rng.random(mesh.dim), axis=1) / rng.uniform(0.1, 0.4)
+        push = rng.normal(size=mesh.dim) * rng.uniform(0.05, 0.35)
+        way += push * np.exp(-(length[:, None] ** 2))
+    way += rng.normal(size=x.shape) * rng.choice([0.0, 0.01, 0.03])
+    bad = x + way * np.sqrt(np.prod(4 * x * (1 - x), axis=1, keepdims=True))
+    sliding = [name for name in mesh.marker_names if rng.random() < 0.4]
+    return mesh, mesh.with_points(bad), sliding
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=25)
+def test_a_stricter_limit_never_gives_a_worse_mesh(seed):
+    """The lowest quality may be lower by 0.01, or where the weaker limit was met."""
+    mesh, bad, sliding = squeezed(seed)
+    start, before = quality(bad, mesh), None
+    for below in (0.0, 0.1, 0.2, 0.3, 0.5, 0.7):
+        done = sv.repair(bad, mesh, sliding=sliding, below=below)
+        after = quality(done.mesh, mesh)
+        folded = len(mesh.cells) - after.valid
+        if before is not None:
+            assert folded <= before[0]
+            assert after.min >= min(before[1:]) - 0.01
+        if len(done.left) > len(done.cells):  # not without reason
+            assert folded < len(done.folded) or after.min > WORTH * start.min
+        assert "-" not in done.words()
+        before = folded, after.min, below
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20)
+def test_numbers_of_nodes_and_cells_change_no_bit_of_a_repair(seed):
+    mesh, bad, sliding = squeezed(seed)
+    rng = np.random.default_rng(seed)
+    old = rng.permutation(len(mesh.points))  # numbers of nodes before, by those after
+    new = np.argsort(old)
+
+    def numbered(cells):
+        return Cells.from_types(cells.types, new[cells.connectivity])
+
+    markers = tuple(replace(marker, cells=numbered(marker.cells)) for marker in mesh.markers)
+    cells = numbered(mesh.cells).take(rng.permutation(len(mesh.cells)))
+    other = sv.Mesh(mesh.points[old], cells, markers)
+    first = sv.repair(bad, mesh, sliding=sliding, below=0.3)
+    second = sv.repair(other.with_points(bad.points[old]), other, sliding=sliding, below=0.3)
+    assert np.array_equal(first.mesh.points[old], second.mesh.points)
+
+
+def test_bad_cells_that_share_no_node_are_patches_of_their_own():
+    mesh = grid((9, 2))
+    bad = np.zeros(len(mesh.cells), bool)
+    bad[[0, 8, 17]] = True
+    patches, _ = find_patches(mesh.cells, Freedom.within(2, held_boundary(mesh)), bad, 0)
+    assert [patch.tolist() for patch in patches] == [[0], [8], [17]]

@@ -9,9 +9,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.errors import CaseError, MeshError, Note
+from slideviz.errors import CaseError, MeshError, Note, UnsoundError
 from slideviz.mesh.quality import VALID
 from slideviz.solver.repair import find_freedom, repair_case
+from slideviz.solver.steps import MeshRepair
 from tests import builders
 
 MOTIONS = (sv.Translate("", (0.25, 0.1)), sv.Rotate("", 50.0))
@@ -85,6 +86,33 @@ def test_each_step_is_mended_on_request_and_each_trial_is_not():
     assert all(not sv.quality(step.mesh, mesh).inverted for step in (each[-1], alone[-1]))
     auto = list(sv.deform(case.change(repair="yes", steps=0), mesh))
     assert [step.repaired is not None for step in auto] == [False] * (len(auto) - 1) + [True]
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+@pytest.mark.parametrize("values", [{"repair": "no"}, {"repair": "yes", "repair_steps": True}])
+def test_repair_does_not_hide_nodes_that_run_away(values, steps):
+    heights = np.array([0.0, 5e-4, 2e-3, 6e-3, 0.017, 0.048, 0.13, 0.36, 1.0])
+    mesh = builders.grid(
+        (8, 8), place=lambda p: np.stack([p[:, 0] / 8, heights[p[:, 1].astype(int)]], 1)
+    )
+    case = sv.Case(
+        roles={"y_m": "moving", "y_p": "sliding", "x_m": "internal"},
+        motions=(sv.Translate("y_m", (0.0, -0.036)),),
+        sliding="ds",
+        relax="no",
+        **values,
+    )
+    with pytest.raises(UnsoundError, match=r"would move by .*, more than 5 times the"):
+        list(sv.deform(case.change(steps=steps), mesh))
+
+
+def test_a_report_counts_no_cells_that_became_poor_as_mended():
+    none = np.empty(0, np.int64)
+    few, more = np.arange(30), np.arange(41)
+    done = MeshRepair(
+        builders.square(2, block=False), few, more, none, none, none, np.empty((0, 2)), 0.0
+    )
+    assert done.words() == "lowest quality raised, 41 cells are poor instead of 30"
 
 
 @pytest.mark.parametrize("role", ["sliding", "internal"])

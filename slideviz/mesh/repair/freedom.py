@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 
 Project = Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""Takes nodes (k,) that slide on curved boundaries, with all images and copies of each, ascending,
-and their points (k, d). Returns the points on the boundary (k, d), images where they belong, and
+"""Takes nodes (k,) that slide on curved boundaries, with all images and copies of each, and
+their points (k, d). Returns the points on the boundary (k, d), images where they belong, and
 the maps T (k, d, d) there."""
 
 
@@ -29,9 +29,9 @@ class Freedom:
 
     place: IntArray
     """(n,): the block of each node, from 0; -1 for a node that is held (moving, fixed)."""
-    bound: IntArray  # (m,): the nodes of blocks, ascending, whose map is not the identity
+    bound: IntArray  # (m,): the nodes of blocks whose map is not the identity
     maps: FloatArray  # (m, d, d): their maps T_i
-    curved: IntArray  # (s,): the nodes, ascending, that slide on a boundary that may be curved
+    curved: IntArray  # (s,): the nodes that slide on a boundary that may be curved
     project: Project | None = None
     """Puts them back after each outer round; None if no boundary is curved."""
 
@@ -43,7 +43,7 @@ class Freedom:
         return cls(sealed(place), none, np.empty((0, dim, dim)), none)
 
     def of_part(self, nodes: IntArray) -> Freedom:
-        """Return the freedom of some nodes (k,), ascending, in that order, as of a mesh of its own.
+        """Return the freedom of some nodes (k,), in that order, as of a mesh of its own.
 
         Blocks keep their numbers. `project` of the whole gets the numbers of the whole.
         """
@@ -56,9 +56,9 @@ class Freedom:
 
         return Freedom(
             sealed(self.place[nodes]),
-            np.searchsorted(nodes, self.bound[bound]),
+            places(nodes, self.bound[bound]),
             self.maps[bound],
-            np.searchsorted(nodes, self.curved[np.isin(self.curved, nodes)]),
+            places(nodes, self.curved[np.isin(self.curved, nodes)]),
             None if whole is None else project,
         )
 
@@ -97,3 +97,9 @@ class Freedom:
             self.curved[moves[self.curved]],
             self.project,
         )
+
+
+def places(nodes: IntArray, some: IntArray) -> IntArray:
+    """Return where ``some`` of the nodes (k,), which may be in any order, are among these."""
+    order = np.argsort(nodes)
+    return order[np.searchsorted(nodes, some, sorter=order)]

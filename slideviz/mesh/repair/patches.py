@@ -74,7 +74,8 @@ def _with_representative(place: IntArray, label: IntArray) -> IntArray:
     first[place[own[::-1]]] = own[::-1]
     count = len(label)
     pairs = first[place[own]]
-    return components(count, np.r_[label, own], np.r_[np.arange(count), pairs])
+    a, b = np.r_[np.arange(count), own], np.r_[count + label, pairs]
+    return components(2 * count, a, b)[:count]
 
 
 class Patch:

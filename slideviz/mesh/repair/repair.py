@@ -2,13 +2,13 @@
 
 Patches of bad cells and their surroundings (`slideviz.mesh.repair.patches`) are unfolded by the
 energy of `slideviz.mesh.repair.energy`, whose epsilon falls from round to round. Nothing else
-changes a bit. A patch keeps the best state by (cells not proved, lowest quality), so that no cell
-count or lowest quality is worse than before.
+changes a bit. A patch keeps the best state by (cells not proved, lowest quality), so that neither
+is worse than before. In rounds the limit rises to the one that is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, VALID
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, cell_quality, checked_reference, quality
 from slideviz.mesh.repair.descent import descend
 from slideviz.mesh.repair.energy import targets
-from slideviz.mesh.repair.freedom import Freedom
+from slideviz.mesh.repair.freedom import Freedom, places
 from slideviz.mesh.repair.lift import lift_energy
 from slideviz.mesh.repair.patches import Patch, find_patches
-from slideviz.system.threads import cores
+from slideviz.system.threads import cores, equal_shares
 from slideviz.terms import SkewMetric
 
 RINGS = 3, 5, 8, 13, 21  # rings of cells around bad ones; a patch that fails grows to the next
@@ -50,11 +50,18 @@ TREND = 5  # rounds of a lift after which it ends if it will not reach the limit
 SHAPE = 10.0
 """Weight of the energy of shape beside that of the lift, which does not see short edges."""
 
+WORTH = 1.02
+"""Factor by which the lowest quality must rise if more cells are below the limit afterwards."""
+
 FLAT_SIDE = 1e-6
 """Sine of the angle between the normals of a side's corners, up to which it is flat. In a flat side
 that folds on itself the Jacobian vanishes, wherever the other nodes are."""
 
 BELOW = 0.1  # cells of a lower quality are mended, too
+
+LIMITS = tuple(k / 20 for k in range(2, 20))
+"""Limits of the rounds that come before the last one: not below the default, so that its repairs
+take a single round."""
 
 Report = Callable[[float], object]
 """Called with the fraction that is done; what it raises ends the repair."""
@@ -146,9 +153,10 @@ def repair(
     ``report``: called with the fraction that is done; may raise, to cancel.
     """
     shapes = None if reference is None else checked_reference(reference, mesh)
-    before = np.flatnonzero(is_bad(quality(mesh, shapes, metric), below))
+    ratings = rated(quality(mesh, shapes, metric))
+    before = np.flatnonzero(ratings < below)
     whole = _Whole(mesh, shapes, freedom)
-    after, folded, impossible = mend_cells(whole, before, below, metric, report)
+    after, folded, impossible = mend_cells(whole, before, ratings[before], below, metric, report)
     points = whole.points
     way = np.linalg.norm(points - mesh.points, axis=1)
     return Repaired(
@@ -179,48 +187,105 @@ class _Whole:
 
 
 def mend_cells(
-    regions: Regions, bad: IntArray, below: float, metric: SkewMetric, report: Report
+    regions: Regions,
+    bad: IntArray,
+    ratings: FloatArray,
+    below: float,
+    metric: SkewMetric,
+    report: Report,
 ) -> tuple[IntArray, IntArray, tuple[Impossible, ...]]:
-    """Mend the bad cells (k,) of a mesh.
+    """Mend the bad cells (k,) of a mesh, in rounds whose limit rises to ``below``.
+
+    Each round begins with the mesh of the one before. So a limit that cannot be reached loses
+    nothing, and a stricter one ends with no worse mesh.
 
     Return those that are bad then, those that are not proved valid, and those that cannot be
-    mended. The rest as of `repair`.
+    mended.
+    ``ratings`` (k,): of the bad cells, as of `rated`.
+    The other arguments are as of `repair`.
     """
     report(0.0)
-    after, folded, impossible = bad, bad, tuple[Impossible, ...]()
+    first, *others = [*(limit for limit in LIMITS if limit < below), below]
+    begin, smaller, *ticks = equal_shares(report, len(others) + 2)
     with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
-        for stage, rings in enumerate(RINGS):
-            if not len(bad):
-                break
+        mending = _Rounds(regions, bad, ratings, below, metric, pool)
+        mending.mend(first, begin)
+        if not mending.reached and first > 0.0:
+            # The worst cells alone have smaller patches, whose energy they determine more.
+            again = equal_shares(smaller, 3)
+            for limit, tick in zip((0.0, 0.5 * first, first), again, strict=True):
+                mending.mend(limit, tick)
+        for limit, tick in zip(others, ticks, strict=True):
+            if limit == below or mending.reached:
+                mending.mend(limit, tick)
+    impossible = tuple(sorted(mending.impossible.values(), key=lambda one: one.cell))
+    return mending.cells, mending.cells[mending.ratings < 0.0], impossible
 
-            def staged(fraction: float, stage: int = stage) -> None:
-                report((stage + fraction) / len(RINGS))
 
-            region = regions.near(bad, rings)
+class _Rounds:
+    """The rounds of a repair.
+
+    ``cells`` (k,): the cells that are rated below ``below``, ascending, with ``ratings`` (k,).
+    ``impossible``: those that cannot be mended, by number.
+    """
+
+    def __init__(
+        self,
+        regions: Regions,
+        cells: IntArray,
+        ratings: FloatArray,
+        below: float,
+        metric: SkewMetric,
+        pool: ThreadPoolExecutor,
+    ) -> None:
+        self.regions, self.cells, self.ratings = regions, cells, ratings
+        self.below, self.metric, self.pool = below, metric, pool
+        self.impossible = dict[int, Impossible]()
+        self.reached = True  # whether no cell that can be mended is below the limit of the round
+
+    def mend(self, limit: float, report: Report) -> None:
+        """Mend the cells that are rated below a limit, in patches that grow."""
+        bad = self.cells[self.ratings < limit]
+        for stage, tick in enumerate(equal_shares(report, len(RINGS))):
+            region = self.regions.near(bad, RINGS[stage]) if len(bad) else None
             if region is None:
-                break
+                return
             mesh, reference = region.mesh, region.reference
             sums, signs = reference_of(mesh if reference is None else reference)
             wanted, points = np.isin(region.cells, bad), np.array(mesh.points)
             if not stage:
-                impossible = _impossible(region, wanted, signs, sums, metric)
-            hopeless = np.isin(region.cells, [one.cell for one in impossible])
+                for one in _impossible(region, wanted, signs, sums, self.metric):
+                    self.impossible[one.cell] = one
+            hopeless = np.isin(region.cells, list(self.impossible))
             wanted &= ~hopeless
-            settings = region.freedom, sums, signs, metric, below, staged, hopeless, pool
-            _mend_patches(_Work(mesh, reference, *settings), wanted, rings, points)
-            regions.move(region, points)
-            found = quality(mesh.with_points(points), reference, metric)
-            still = is_bad(found, below)
-            after = np.union1d(np.setdiff1d(after, region.cells), region.cells[still])
-            unproved = region.cells[found.status != VALID]
-            folded = np.union1d(np.setdiff1d(folded, region.cells), unproved)
-            bad = region.cells[wanted & (still if stage + 1 < POOR else found.status != VALID)]
-    return after, folded, impossible
+            settings = region.freedom, sums, signs, self.metric, limit, tick, hopeless, self.pool
+            _mend_patches(_Work(mesh, reference, *settings), wanted, RINGS[stage], points)
+            now = rated(quality(mesh.with_points(points), reference, self.metric))
+            if self._rate(region.cells, now):
+                self.regions.move(region, points)
+            else:
+                now = rated(quality(mesh, reference, self.metric))
+            self.reached = not (wanted & (now < limit)).any()
+            bad = region.cells[wanted & (now < (limit if stage + 1 < POOR else 0.0))]
+
+    def _rate(self, cells: IntArray, ratings: FloatArray) -> bool:
+        """Take new ratings (m,) of the cells (m,) of a region; return whether they are better."""
+        beyond = ~np.isin(self.cells, cells)
+        poor = ratings < self.below
+        every = np.concatenate([self.cells[beyond], cells[poor]])
+        now = np.concatenate([self.ratings[beyond], ratings[poor]])
+        more = len(every) > len(self.cells) and (now < 0.0).sum() == (self.ratings < 0.0).sum()
+        lowest, before = (some[some >= 0.0].min(initial=1.0) for some in (now, self.ratings))
+        if more and not lowest > WORTH * before:
+            return False
+        order = np.argsort(every)
+        self.cells, self.ratings = every[order], now[order]
+        return True
 
 
-def is_bad(found: Quality, below: float) -> NDArray[np.bool_]:
-    """Return a mask (m,) of the cells that are not proved valid, or below a limit."""
-    return (found.status != VALID) | (found.values < below)
+def rated(found: Quality) -> FloatArray:
+    """Return the quality (m,) of the cells, and -1 for those that are not proved valid."""
+    return np.where(found.status == VALID, found.values, -1.0)
 
 
 def _impossible(
@@ -229,12 +294,13 @@ def _impossible(
     signs: NDArray[np.int8],
     sums: FloatArray,
     metric: SkewMetric,
-) -> tuple[Impossible, ...]:
+) -> list[Impossible]:
     """Return the bad cells (mask (m,)) that no motion of free nodes mends.
 
     All their nodes are held, or those of a corner that folds, or of a side that folds on itself.
     """
-    out, points, held = [], region.mesh.points, region.freedom.place < 0
+    out = list[Impossible]()
+    points, held = region.mesh.points, region.freedom.place < 0
     for vtk, (ids, table) in region.mesh.cells.by_type.items():
         few = np.flatnonzero(bad[ids] & (held[table].sum(axis=1) >= points.shape[1]))
         cells, nodes = ids[few], table[few]
@@ -246,7 +312,7 @@ def _impossible(
             if wrong is not None:
                 wrong = sealed(np.sort(region.nodes[wrong]))
                 out.append(Impossible(int(region.cells[cell]), wrong))
-    return tuple(sorted(out, key=lambda one: one.cell))
+    return out
 
 
 def _fold(
@@ -293,23 +359,29 @@ class _Mending:
     ) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
         self.work, self.tell, self.round = work, tell, 0
-        self.nodes = work.mesh.cells.take(cells).nodes
+        shapes, nodes = work.reference, work.mesh.cells.take(cells).nodes
+        # In the order of coordinates sums have the same bits, however the mesh is numbered.
+        at = work.mesh.points[nodes] if shapes is None else shapes.points[nodes]
+        self.nodes = nodes[np.lexsort(at.T)]
         cells = cells[~work.hopeless[cells]]
-        part, shapes = work.mesh.cells.take(cells), work.reference
-        self.parts, order = [], []
-        length = _local_lengths(work.mesh.points, part, self.nodes)
-        for vtk, (some, nodes) in part.by_type.items():
-            local = np.searchsorted(self.nodes, nodes)
-            signs = work.signs[cells[some]].astype(float)
+        tables, order = dict[int, IntArray](), []
+        for vtk, (some, table) in work.mesh.cells.take(cells).by_type.items():
+            local = places(self.nodes, table)
+            rank = np.lexsort(np.sort(local, axis=1).T)
+            tables[vtk] = local[rank]
+            order.append(cells[some[rank]])
+        ids = np.concatenate(order)
+        self.signs, self.sums = work.signs[ids], work.sums[ids]
+        length = _local_lengths(work.mesh.points[self.nodes], tables)
+        self.parts = []
+        for (vtk, local), some in zip(tables.items(), order, strict=True):
+            signs = work.signs[some].astype(float)
             if shapes is not None:
-                at = shapes.points[nodes]
+                at = shapes.points[self.nodes[local]]
             else:
                 at = IDEAL[vtk] * length[local].mean(axis=1)[:, None, None]
                 at[..., 0] *= signs[:, None]
             self.parts.append(targets(vtk, local, at, signs))
-            order.append(cells[some])
-        ids = np.concatenate(order)
-        self.signs, self.sums = work.signs[ids], work.sums[ids]
         self.patch = self._patch(np.array(work.mesh.points[self.nodes]), free[self.nodes])
         # With sliding nodes held, to go on where projection folds a cell.
         moves = free[self.nodes]
@@ -474,16 +546,19 @@ class _Mending:
         self.tell(1 - 0.995**self.round)
 
 
-def _local_lengths(points: FloatArray, cells: Cells, nodes: IntArray) -> FloatArray:
-    """Return the mean length (k,) of the edges at each of the nodes (k,) of cells."""
-    total, count = np.zeros(len(nodes)), np.zeros(len(nodes))
-    for vtk, (_, table) in cells.by_type.items():
+def _local_lengths(points: FloatArray, tables: Mapping[int, IntArray]) -> FloatArray:
+    """Return the mean length (k,) of the edges at each of the points (k, d) of cells.
+
+    ``tables``: nodes (m, n) of the cells of each type, by VTK identifier.
+    """
+    total, count = np.zeros((2, len(points)))
+    for vtk, table in tables.items():
         for pair in ELEMENTS[vtk].edges:
             ends = table[:, pair]
             length = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
-            for end in np.searchsorted(nodes, ends).T:
-                total += np.bincount(end, length, len(nodes))
-                count += np.bincount(end, minlength=len(nodes))
+            for end in ends.T:
+                total += np.bincount(end, length, len(points))
+                count += np.bincount(end, minlength=len(points))
     return total / np.maximum(count, 1)
 
 
