@@ -28,7 +28,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.repair import Impossible, rated
+from slideviz.mesh.repair.repair import Impossible, quality_ratings
 from slideviz.mesh.repair.repair import repair as mend_cells
 from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.rbf.problem import PhaseTimer
@@ -212,7 +212,7 @@ def mend(
     limit = case.repair_below
     if shapes is not None:
         limit = min(limit, quality(shapes, metric=case.quality_metric).min)
-    if not (rated(found) < limit).any():
+    if not (quality_ratings(found) < limit).any():
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)

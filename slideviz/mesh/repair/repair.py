@@ -153,7 +153,7 @@ def repair(
     ``report``: called with the fraction that is done; may raise, to cancel.
     """
     shapes = None if reference is None else checked_reference(reference, mesh)
-    ratings = rated(quality(mesh, shapes, metric))
+    ratings = quality_ratings(quality(mesh, shapes, metric))
     before = np.flatnonzero(ratings < below)
     whole = _Whole(mesh, shapes, freedom)
     after, folded, impossible = mend_cells(whole, before, ratings[before], below, metric, report)
@@ -201,7 +201,7 @@ def mend_cells(
 
     Return those that are bad then, those that are not proved valid, and those that cannot be
     mended.
-    ``ratings`` (k,): of the bad cells, as of `rated`.
+    ``ratings`` (k,): of the bad cells, as of `quality_ratings`.
     The other arguments are as of `repair`.
     """
     report(0.0)
@@ -260,11 +260,11 @@ class _Rounds:
             wanted &= ~hopeless
             settings = region.freedom, sums, signs, self.metric, limit, tick, hopeless, self.pool
             _mend_patches(_Work(mesh, reference, *settings), wanted, RINGS[stage], points)
-            now = rated(quality(mesh.with_points(points), reference, self.metric))
+            now = quality_ratings(quality(mesh.with_points(points), reference, self.metric))
             if self._rate(region.cells, now):
                 self.regions.move(region, points)
             else:
-                now = rated(quality(mesh, reference, self.metric))
+                now = quality_ratings(quality(mesh, reference, self.metric))
             self.reached = not (wanted & (now < limit)).any()
             bad = region.cells[wanted & (now < (limit if stage + 1 < POOR else 0.0))]
 
@@ -283,7 +283,7 @@ class _Rounds:
         return True
 
 
-def rated(found: Quality) -> FloatArray:
+def quality_ratings(found: Quality) -> FloatArray:
     """Return the quality (m,) of the cells, and -1 for those that are not proved valid."""
     return np.where(found.status == VALID, found.values, -1.0)
 
