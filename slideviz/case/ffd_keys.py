@@ -15,6 +15,7 @@ from slideviz.errors import CaseError, shown
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
 NUMBERS = 24  # coordinates of the 8 corners of a box
+IN_2D = 12  # those of the 4 corners that 2D uses
 
 
 def _groups(text: str) -> list[list[Word]]:
@@ -31,12 +32,13 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
         extra = corners[NUMBERS:] if group is groups[-1] else []
         if all(word.is_number and not number(word.text) for word in extra):
             corners = corners[: len(corners) - len(extra)]  # SU2 passes over zeros at the end
-        if len(corners) != NUMBERS or name.is_number:
+        if len(corners) not in (IN_2D, NUMBERS) or name.is_number:
             raise CaseError(
                 f"box {shown(name.text)} has {len(corners)} numbers; expected its name and "
-                f"{NUMBERS}: 8 corners x, y, z (in 2D 4 with z = 0, and zeros)"
+                f"{NUMBERS}: 8 corners x, y, z (in 2D 4 with z = 0)"
             )
-        problems.append((name.text, tuple(number(word.text) for word in corners)))
+        values = [number(word.text) for word in corners] + [0.0] * (NUMBERS - len(corners))
+        problems.append((name.text, tuple(values)))
     names = [box for box, _ in problems]
     for box in names:
         if names.count(box) > 1:

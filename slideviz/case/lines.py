@@ -127,6 +127,12 @@ def listed(path: Path, problems: list[Problem]) -> str:
     """
     places = ((f"{path}:{line}" if line else f"{path}", said) for line, said in sorted(problems))
     lines = [f"{place}: {sentence}" for place, sentence in places]
-    if len(lines) > _LISTED:
-        lines[_LISTED:] = [f"{path}: and {len(lines) - _LISTED} more problems"]
-    return "\n".join(lines)
+    return first_lines(path, lines)
+
+
+def first_lines(path: Path, lines: list[str]) -> str:
+    """Return the first of very many lines as a text that ends with how many there are more."""
+    more = len(lines) - _LISTED
+    return "\n".join(
+        lines if more <= 0 else [*lines[:_LISTED], f"{path}: and {more} more problems"]
+    )

@@ -700,6 +700,17 @@ def test_zeros_after_the_last_box_are_passed_over_as_in_su2(here):
         config(BOXED.replace(")\nFFD_DEGREE", ", 3)\nFFD_DEGREE") + kind)
 
 
+def test_a_box_in_2d_has_the_numbers_of_its_four_corners_or_of_eight(here):
+    kind = "DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, 0, 0, 1)\nDV_VALUE= 0.1\n"
+    short = BOXED.replace(", 0" * 12, "")
+    assert config(short + kind).case.ffd_boxes == config(BOXED + kind).case.ffd_boxes
+    for count in (0, 11, 13, 23):
+        numbers = ", ".join(["1"] * count)
+        wrong = f"FFD_DEFINITION= (BOX, {numbers})\nFFD_DEGREE= (3, 1, 0)\n"
+        with pytest.raises(CaseError, match=f"box 'BOX' has {count} numbers; expected its name"):
+            config(wrong + kind)
+
+
 def test_without_dv_marker_some_of_the_deformed_boundaries_may_be_missing(here, capsys):
     rest = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= SCALE\nDV_VALUE= 1.1\n"
     Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (low, flap)\n")

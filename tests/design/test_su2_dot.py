@@ -190,6 +190,12 @@ def test_every_form_of_the_file_gives_the_same(case):
     back = np.arange(len(points))[::-1]
     write_csv("adj_cd.csv", points, weights, order=back, quoted=False, extra="AOA= 1.25\n")
     np.testing.assert_array_equal(found(), expected)
+    text = Path("adj_cd.csv").read_text()
+    for head in ("", ","):  # SU2 ends rows with a comma, and no heading
+        lines = text.splitlines()
+        rows = [f"{row}, " for row in lines[1 : len(points) + 1]]
+        Path("adj_cd.csv").write_text("\n".join([lines[0] + head, *rows, *lines[-1:]]) + "\n")
+        np.testing.assert_array_equal(found(), expected)
     Path("adj_cd.csv").rename("adj.csv")
     np.testing.assert_array_equal(found(), expected)
     Path("adj.csv").unlink()
@@ -205,6 +211,80 @@ def test_every_form_of_the_file_gives_the_same(case):
     more = "DV_SENSITIVITY_FORMAT= UNORDERED_ASCII\nDV_UNORDERED_SENS_FILENAME= sens.dat\n"
     Path("dot.cfg").write_text(simple() + more)
     np.testing.assert_array_equal(found(), expected)
+
+
+def outwards(mesh, points, name):
+    """Unit normals out of a 2D mesh at all points, zero but at a closed boundary: by its edges."""
+    normals = np.zeros(points.shape)
+    cells = np.concatenate([table for _, table in mesh.cells.by_type.values()])
+    for edge in mesh.marker(name).cells.by_type[3][1]:
+        cell = cells[np.isin(cells, edge).sum(axis=1) == 2][0]
+        along = points[edge[1]] - points[edge[0]]
+        normal = np.array([along[1], -along[0]])
+        inside = points[cell].mean(axis=0) - points[edge].mean(axis=0)
+        normals[edge] -= np.sign(normal @ inside) * normal
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(length > 0.0, length, 1.0)
+
+
+def write_surface_csv(path, points, along, rows, more=("x", "y")):
+    head = ", ".join(f'"{name}"' for name in ("PointID", *more, "Surface_Sensitivity"))
+    places = points[:, : len(more)]
+    lines = [", ".join(map(repr, [int(k), *places[k].tolist(), float(along[k])])) for k in rows]
+    Path(path).write_text("\n".join([head, *(f"{line}, " for line in lines)]) + "\n")
+
+
+@pytest.mark.parametrize("at", ["design", "mesh"])
+def test_surface_sensitivity_alone_is_along_the_normals_as_in_su2(case, at, capsys):
+    points, weights = case
+    mesh = square(8)
+    if at == "mesh":
+        Path("mesh.su2").write_bytes(Path("out.su2").read_bytes())
+    along = weights[:, 0]
+    nodes = mesh.marker("BLOCK").nodes
+    vectors = along[:, None] * outwards(mesh, points, "BLOCK")
+    write_csv("adj_cd.csv", points, vectors)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    expected = gradient()
+    everywhere, surface = range(len(points)), [*nodes, 0, 3]
+    for rows, more in ((everywhere, ("x", "y")), (surface, ("x", "y")), (everywhere, ())):
+        if not more and at == "mesh":
+            continue  # without coordinates they are those of the design
+        write_surface_csv("adj_cd.csv", points, along, rows, more)
+        assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
+        np.testing.assert_allclose(gradient(), expected, rtol=1e-12, atol=1e-15)
+        assert json.loads(Path("dot.json").read_text())["at"] == at
+    assert "are not in it" not in capsys.readouterr().err
+    write_surface_csv("adj_cd.csv", points, along, surface[2:])
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert f"2 of the {len(nodes)} moving nodes among them" in capsys.readouterr().err
+
+
+def test_surface_sensitivity_does_not_say_what_a_moved_grid_does(case, capsys):
+    points, weights = case
+    Path("dot.cfg").write_text(
+        HEAD + "DV_KIND= TRANSLATE_GRID\nDV_PARAM= (1, 0, 0)\nDV_VALUE= 0.1\n"
+    )
+    write_surface_csv("adj_cd.csv", points, weights[:, 0], range(len(points)))
+    assert run(["dot", "dot.cfg", "-q"]) == 1
+    assert "has Surface_Sensitivity only, which is of the surfaces in" in capsys.readouterr().err
+
+
+def test_surface_sensitivity_of_a_real_restart_is_its_sensitivity_along_the_normals(here):
+    from slideviz.case.motion import normals_at
+    from slideviz.design.su2.sensitivities import SURFACE, read_restart
+
+    unpacked("solution_adj_custom.csv")
+    unpacked("burner_hx.su2")
+    mesh = sv.read("burner_hx.su2")
+    names, table = read_restart(Path("solution_adj_custom.csv"))
+    column = [name.lower() for name in names].index
+    nodes = mesh.marker("wall_hx").nodes
+    normals = normals_at(mesh, ("wall_hx",), nodes)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    vectors = table[nodes][:, [column("sensitivity_x"), column("sensitivity_y")]]
+    along = table[nodes, column(SURFACE)]
+    np.testing.assert_allclose(-(normals * vectors).sum(axis=1), along, rtol=1e-9, atol=1e-15)
 
 
 def test_mesh_that_is_deformed_already_is_taken_as_it_is(case):

@@ -113,6 +113,47 @@ def test_a_zone_without_design_variables_stays_or_follows(tmp_path, monkeypatch)
     assert np.array_equal(sv.read("out.su2").points, mesh.points)
 
 
+def test_a_configuration_that_is_listed_twice_or_has_a_list_itself_is_told(here, capsys):
+    write(MAIN.replace("second", "first"))
+    assert run(["def", "main.cfg", "-q"]) == 0
+    said = "main.cfg: CONFIG_LIST has first.cfg 2 times, for the zones 1, 2; list a file for each"
+    assert capsys.readouterr().err.count(said) == 1
+    write(second=f"CONFIG_LIST= ( a.cfg )\n{OTHER}")
+    assert run(["def", "main.cfg", "-q", "--force"]) == 0
+    said = "second.cfg:1: CONFIG_LIST is ignored in a file that main.cfg lists; take it out"
+    assert said in capsys.readouterr().err
+
+
+def test_a_file_is_read_once_however_often_it_is_listed(here, monkeypatch):
+    from slideviz.design.su2 import config
+
+    read = []
+    monkeypatch.setattr(
+        config, "_rows", lambda path, rows=config._rows: read.append(path) or rows(path)
+    )
+    write(MAIN.replace("first.cfg, second.cfg", ", ".join(["first.cfg"] * 300)))
+    found = read_config(Path("main.cfg"))
+    assert read == [Path("main.cfg"), Path("first.cfg")]
+    assert [zone.zone for zone in found.zones] == [*range(1, 301)]
+    with pytest.raises(CaseError, match=r"CONFIG_LIST has 300 configurations, and stage\.su2 2 z"):
+        on_mesh(found, read_mesh(found))
+
+
+def test_of_very_many_missing_configurations_the_first_are_named(here):
+    write(MAIN.replace("first.cfg, second.cfg", ", ".join(f"{k}.cfg" for k in range(5000))))
+    with pytest.raises(CaseError, match=r"0\.cfg: there is no such") as problem:
+        read_config(Path("main.cfg"))
+    lines = str(problem.value).splitlines()
+    assert len(lines) < 50
+    assert lines[-1] == f"main.cfg: and {5000 - len(lines) + 1} more problems"
+
+
+def test_keys_of_su2_that_resemble_ours_are_no_mistakes(here, capsys):
+    write(MAIN + "NZONES= 2\n")
+    assert run(["def", "main.cfg", "-q"]) == 0
+    assert "NZONES" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("texts", "message"),
     [

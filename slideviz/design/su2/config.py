@@ -5,16 +5,25 @@ Such a file has hundreds of keys; the others are listed, and not read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cache
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
+from slideviz.case.lines import (
+    Entry,
+    Problem,
+    entries_of,
+    first_lines,
+    listed,
+    read_text,
+    require_no_mesh,
+)
 from slideviz.case.model import NEW, Case
 from slideviz.case.values import YES_NO, integer, real
 from slideviz.case.words import list_of, number
@@ -173,6 +182,8 @@ ALIKE, ALIKE_OWN = 0.9, 0.8
 """Similarity (``difflib``, 0 to 1) from which an unread key may be a mistyped one; the second for
 keys in `OWN`. SU2 has keys as similar as MARKER_INTERFACE (0.84 to MARKER_INTERNAL) and
 SOLUTION_FILENAME (0.895 to SOLUTION_ADJ_FILENAME)."""
+NOT_MISTYPED = {"NZONES"}
+"""Keys of SU2 that resemble one of slideviz and are not read."""
 ZONE_KEYS = {"CONFIG_LIST", "MULTIZONE", "SOLVER"}
 """Keys that are read where the first of them is there."""
 CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
@@ -251,19 +262,21 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     files = _listed_files(rows, problems)
     if problems:
         raise CaseError(listed(path, problems))
-    zones, faults = [], dict[str, None]()
+    each, faults = dict[Path, Su2Config](), dict[str, None]()
     # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
     inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
-    for zone, file in enumerate(files, 1):
+    for file, numbers in _numbers_of_zones(files).items():
         try:
             own, problems, said = _rows(file)
-            zones.append(_config(file, inherited | own | given, problems, said, path, zone))
+            said = (*said, *_list_warnings(path, file, own, numbers))
+            each[file] = _config(file, inherited | own | given, problems, said, path, numbers[0])
         except CaseError as problem:
             faults |= dict.fromkeys(str(problem).splitlines())
-    if not faults and not any("DV_KIND" in zone.present for zone in zones):
+    if not faults and not any("DV_KIND" in config.present for config in each.values()):
         faults[f"{path}: DV_KIND is missing, in the files of CONFIG_LIST, too"] = None
     if faults:
-        raise CaseError("\n".join(faults))
+        raise CaseError(first_lines(path, [*faults]))
+    zones = [replace(each[file], zone=zone) for zone, file in enumerate(files, 1)]
     first, reader = zones[0], _Reader(rows, problems)
     mesh, out = (reader.file(key, FILES[key]) for key in ("MESH_FILENAME", "MESH_OUT_FILENAME"))
     strange = [key for key in rows if key not in _read_keys(rows)]
@@ -273,8 +286,31 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         mesh_out=_with_ending(out, first.case),
         warnings=(*warnings, *_perhaps_ours(path, strange, rows), *first.case.warnings),
     )
-    ignored = dict.fromkeys(key for zone in zones for key in zone.ignored)
+    ignored = dict.fromkeys(key for config in each.values() for key in config.ignored)
     return replace(first, case=case, zone=None, zones=tuple(zones), ignored=tuple(ignored))
+
+
+def _numbers_of_zones(files: Iterable[Path]) -> dict[Path, list[int]]:
+    """Return the numbers of the zones, from 1, that each configuration is listed for."""
+    numbers: dict[Path, list[int]] = {}
+    for zone, file in enumerate(files, 1):
+        numbers.setdefault(file, []).append(zone)
+    return numbers
+
+
+def _list_warnings(
+    path: Path, file: Path, rows: Mapping[str, Entry], numbers: list[int]
+) -> Iterator[str]:
+    """Yield what is strange about a configuration in the CONFIG_LIST of ``path``."""
+    if len(numbers) > 1:
+        zones = ", ".join(map(str, numbers[:3])) + ", ..." * (len(numbers) > 3)
+        yield (
+            f"{path}: CONFIG_LIST has {file} {len(numbers)} times, for the zones {zones}; list a "
+            "file for each zone, unless they shall have the same keys"
+        )
+    if "CONFIG_LIST" in rows:
+        line = rows["CONFIG_LIST"].line
+        yield f"{file}:{line}: CONFIG_LIST is ignored in a file that {path} lists; take it out"
 
 
 def _rows(path: Path) -> tuple[dict[str, Entry], list[Problem], tuple[str, ...]]:
@@ -346,15 +382,23 @@ def _config(
 def _perhaps_ours(path: Path, ignored: Iterable[str], rows: dict[str, Entry]) -> list[str]:
     """Return a warning for each ignored key that resembles one that is read."""
     messages = []
-    for key in (key for key in ignored if rows[key].line >= 0):
-        close = (
-            get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN)
-            or get_close_matches(key, _read_keys() - set(rows), n=1, cutoff=ALIKE)
-            or sorted(other for other in _read_keys() if _one_letter_off(key, other))
-        )
+    for key in (key for key in ignored if rows[key].line >= 0 and key not in NOT_MISTYPED):
+        own, similar, one_letter_off = _resembled(key)
+        close = own or [other for other in similar if other not in rows] or one_letter_off
         if close:
             messages.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
     return messages
+
+
+@cache
+def _resembled(key: str) -> tuple[list[str], list[str], list[str]]:
+    """Return the keys that one may be mistyped for: of `OWN`, all similar, one letter apart."""
+    known = _read_keys()
+    return (
+        get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN),
+        get_close_matches(key, known, n=len(known), cutoff=ALIKE),
+        sorted(other for other in known if _one_letter_off(key, other)),
+    )
 
 
 def _one_letter_off(one: str, other: str) -> bool:

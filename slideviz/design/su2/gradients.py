@@ -84,11 +84,11 @@ def find_gradients(
     Raises SlidevizError if the sensitivities are missing or of another mesh, or the deformation is
     not possible. The warnings of the `Deformer` are among the warnings of the result.
     """
-    mesh = surface.mesh
+    mesh, markers = surface.mesh, surface.config.markers
     sensitivities = read_sensitivities(surface.config, mesh, surface.nodes)
     displacement = surface.displacement
     if surface.moves_whole_mesh:
-        matched = match(sensitivities, mesh, surface.nodes, lambda: surface.moved().points)
+        matched = match(sensitivities, mesh, surface.nodes, (), lambda: surface.moved().points)
         moved = displacement if matched.at_design else np.zeros_like(displacement)
         warnings = (*surface.case().warnings, *matched.warnings)
         return _gradients(surface, sensitivities, matched, matched.values, moved, warnings)
@@ -107,7 +107,7 @@ def find_gradients(
 
     messages: list[str] = []
     with _heard(messages):
-        matched = match(sensitivities, mesh, surface.nodes, design if moves else None)
+        matched = match(sensitivities, mesh, surface.nodes, markers, design if moves else None)
         if moves and not matched.at_design:
             displacement = np.zeros_like(displacement)
             prepared.clear()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import starmap
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.case.lines import read_text
+from slideviz.case.motion import normals_at
 from slideviz.design.su2.config import Su2Config
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.topology import unit
 from slideviz.system.file_checks import require_regular_file
 
 MAGIC = 535532  # the first number of SU2's binary restart files
@@ -52,8 +55,9 @@ def is_number(word: str) -> bool:
 def _csv(path: Path) -> tuple[list[str], FloatArray]:
     text, _ = read_text(path, "file of sensitivities")
     head, _, body = text.partition("\n")
-    names = [name.strip().strip('"').strip() for name in head.split(",")]
-    lines = body.splitlines()
+    # SU2 writes a comma behind the last number of a row, too.
+    names = [name.strip().strip('"').strip() for name in _without_last_comma(head).split(",")]
+    lines = [_without_last_comma(line) for line in body.splitlines()]
     while lines and not is_number(lines[-1].partition(",")[0].strip()):
         lines.pop()  # what SU2 notes at the end
     if not lines:
@@ -70,6 +74,10 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
             "commas; decimals are written with a point"
         )
     return names, table
+
+
+def _without_last_comma(line: str) -> str:
+    return line.rstrip().removesuffix(",")
 
 
 def _binary(path: Path) -> tuple[list[str], FloatArray]:
@@ -94,6 +102,8 @@ def _binary(path: Path) -> tuple[list[str], FloatArray]:
 _OBJECTIVES = Path(__file__).with_name("objectives.csv").read_text(encoding="utf-8")
 SUFFIXES = dict(line.split(",") for line in _OBJECTIVES.splitlines()[1:])
 """Suffixes that SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
+SURFACE = "surface_sensitivity"
+"""The column, in small letters, of derivatives along normals that SU2 writes for surfaces."""
 EXACT, CLOSE, SAME = 1e-13, 1e-8, 1e-6
 """Differences of positions in a file from points, as a part of the largest coordinate: up to
 ``EXACT`` the file is of these points, above ``CLOSE`` there is a warning, above ``SAME`` the file
@@ -106,7 +116,8 @@ class Sensitivities:
 
     path: Path
     values: FloatArray
-    """(n, d): in the order of the mesh's points; if not ``ordered``, of the rows of the file."""
+    """(n, d), or (n, 1) for Surface_Sensitivity, along the normal out of the mesh: in the order of
+    the mesh's points; if not ``ordered``, of the rows of the file."""
     points: FloatArray | None
     """(n, d): positions of the points, in the same order; None if the file has none."""
     ordered: bool = True
@@ -134,22 +145,58 @@ def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensi
     if not mesh.zone_parts:
         return _read(paths[0], mesh, moving)
     each = [_read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.zone_parts, strict=True)]
+    if len({one.values.shape[1] for one in each}) > 1:
+        files = " and ".join(map(str, paths))
+        raise CaseError(
+            f"{files}: some have Sensitivity_x, ..., others Surface_Sensitivity only; write all "
+            "with the same columns"
+        )
     points = [one.points for one in each if one.points is not None]
+    ordered = all(one.ordered for one in each) or len(points) < len(each)
     return Sensitivities(
         paths[0],
         np.concatenate([one.values for one in each]),
         np.concatenate(points) if len(points) == len(each) else None,
+        ordered,
     )
 
 
 def _read(path: Path, mesh: Mesh, moving: IntArray) -> Sensitivities:
     names, table = read_restart(path)
+    column = {name.lower(): place for place, name in enumerate(names)}
+    wanted = [f"sensitivity_{letter}" for letter in "xyz"[: mesh.dim]]
+    lacking = [f"Sensitivity_{name[-1]}" for name in wanted if name not in column]
+    if lacking and SURFACE in column:
+        wanted = [SURFACE]
+    elif lacking:
+        raise CaseError(
+            f"{path}: has no column {', '.join(lacking)}, but {', '.join(names[:8])} ...; write it "
+            "with SU2's discrete adjoint (OUTPUT_FILES= RESTART_ASCII)"
+        )
+    letters = [letter for letter in "xyz"[: mesh.dim] if letter in column]
+    points = table[:, [column[letter] for letter in letters]]
+    values = table[:, [column[name] for name in wanted]]
+    if wanted == [SURFACE] and len(table) < len(mesh.points) and len(letters) == mesh.dim:
+        _require_finite(path, values)
+        return Sensitivities(path, values, points, ordered=False)  # SU2's file of the surface
     if len(table) != len(mesh.points) and len(table) == len(moving):
         raise CaseError(
             f"{path}: has {len(table)} points, as many as move of {mesh.name}; sensitivities at "
             "moving nodes only are read with DV_SENSITIVITY_FORMAT= UNORDERED_ASCII"
         )
-    return _ordered(path, names, table, mesh)
+    if len(table) != len(mesh.points):
+        raise CaseError(
+            f"{path}: has {len(table)} points, and {mesh.name} {len(mesh.points)}; it is of "
+            "another mesh"
+        )
+    order = np.arange(len(table))
+    if "pointid" in column:
+        number = table[:, column["pointid"]]
+        order = np.argsort(number, kind="stable")
+        if not np.array_equal(number[order], np.arange(len(table))):
+            raise CaseError(f"{path}: its PointID are not 0 to {len(table) - 1}, each once")
+    _require_finite(path, values[order])
+    return Sensitivities(path, values[order], points[order] if len(letters) == mesh.dim else None)
 
 
 def _is_unordered(config: Su2Config) -> bool:
@@ -192,19 +239,31 @@ def _restart(config: Su2Config, zone: str = "") -> Path:
 
 
 def match(
-    found: Sensitivities, mesh: Mesh, moving: IntArray, design: Callable[[], FloatArray] | None
+    found: Sensitivities,
+    mesh: Mesh,
+    moving: IntArray,
+    markers: tuple[str, ...],
+    design: Callable[[], FloatArray] | None,
 ) -> Matched:
     """Return sensitivities in the order of the mesh's points, and whether they are at the design.
 
     An adjoint solution belongs to the mesh that it was computed on: that of this design, whose
     points (n, d) ``design`` returns (None: it moves nothing), or MESH_FILENAME itself where that
     is deformed already, as in SU2's own loop. The points in the file decide. ``moving`` (m,) are
-    the nodes of the boundaries that move; a file may have these only. Raises CaseError if the
-    points in the file are neither, or several rows are at one point.
+    the nodes of the boundaries that move, ``markers``; a file may have these only. Raises
+    CaseError if the points in the file are neither, or several rows are at one point.
     """
+    normal_only = found.values.shape[1] == 1
+    if normal_only and not markers:
+        raise CaseError(
+            f"{found.path}: has Surface_Sensitivity only, which is of the surfaces in DV_MARKER, "
+            "and the design variables move the whole mesh; give Sensitivity_x, Sensitivity_y, ..."
+        )
+    design = None if design is None else cache(design)
     if found.points is None:
         sentence = f"{found.path} has no coordinates: taken as those of this design"
-        return Matched(found.values, True, (sentence,))
+        at = mesh.points if design is None or not normal_only else design()
+        return Matched(_vectors(found.values, mesh, at, moving, markers), True, (sentence,))
     unit = largest_coordinate(mesh.points)
     gap, rows = _nearest(found, mesh.points)
     at_design = design is None
@@ -230,7 +289,7 @@ def match(
         notes.append(
             f"{found.path}: its points are off those of {where} by {gap:.2g}: is it older?"
         )
-    values = np.zeros(mesh.points.shape)
+    values = np.zeros((len(mesh.points), found.values.shape[1]))
     index, counts = np.unique(rows, return_counts=True)
     if (counts > 1).any():
         node = index[int(np.argmax(counts))]
@@ -241,8 +300,27 @@ def match(
         lost = len(np.setdiff1d(moving, index))
         of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
         sentence = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
-        notes.append(Note(sentence) if np.array_equal(index, moving) else sentence)
-    return Matched(values, at_design, tuple(notes))
+        alone = np.array_equal(index, moving) or (normal_only and not lost)
+        notes.append(Note(sentence) if alone else sentence)
+    at = design() if design is not None and at_design and normal_only else mesh.points
+    return Matched(_vectors(values, mesh, at, moving, markers), at_design, tuple(notes))
+
+
+def _vectors(
+    values: FloatArray, mesh: Mesh, points: FloatArray, moving: IntArray, markers: tuple[str, ...]
+) -> FloatArray:
+    """Return derivatives by position (n, d) of those along normals out of the mesh (n, 1).
+
+    As SU2_DOT takes Surface_Sensitivity (``SetProjection_FD``): at the moving nodes (m,), with the
+    normals of the median-dual mesh, when the points are at ``points`` (n, d). Others (n, d) are
+    returned as they are.
+    """
+    if values.shape[1] > 1:
+        return values
+    out = np.zeros(points.shape)
+    normals = unit(normals_at(mesh.with_points(points), markers, moving))
+    out[moving] = -values[moving] * normals
+    return out
 
 
 def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
@@ -260,34 +338,6 @@ def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarra
         near = gaps <= SAME * largest_coordinate(points)
         rows[again[near]], far[again[near]] = left[others[near]], gaps[near]
     return float(np.max(far, initial=0.0)), rows
-
-
-def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sensitivities:
-    letters = "xyz"[: mesh.dim]
-    column = {name.lower(): place for place, name in enumerate(names)}
-    wanted = [f"sensitivity_{letter}" for letter in letters]
-    lacking = [f"Sensitivity_{name[-1]}" for name in wanted if name not in column]
-    if lacking:
-        raise CaseError(
-            f"{path}: has no column {', '.join(lacking)}, but {', '.join(names[:8])} ...; write it "
-            "with SU2's discrete adjoint (OUTPUT_FILES= RESTART_ASCII)"
-        )
-    if len(table) != len(mesh.points):
-        raise CaseError(
-            f"{path}: has {len(table)} points, and {mesh.name} {len(mesh.points)}; it is of "
-            "another mesh"
-        )
-    order = np.arange(len(table))
-    if "pointid" in column:
-        number = table[:, column["pointid"]]
-        order = np.argsort(number, kind="stable")
-        if not np.array_equal(number[order], np.arange(len(table))):
-            raise CaseError(f"{path}: its PointID are not 0 to {len(table) - 1}, each once")
-    values = table[order][:, [column[name] for name in wanted]]
-    _require_finite(path, values)
-    there = all(letter in column for letter in letters)
-    points = table[order][:, [column[letter] for letter in letters]] if there else None
-    return Sensitivities(path, values, points)
 
 
 def _unordered(paths: Sequence[Path], mesh: Mesh) -> Sensitivities:
