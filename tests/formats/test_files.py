@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 import slideviz
 from slideviz.cli import run
 from slideviz.errors import MeshError
-from slideviz.formats.files import read, write
+from slideviz.formats.files import read, read_surface, write
+from slideviz.formats.meshio import bridge
 from slideviz.formats.meshio.bridge import read_with_meshio
+from slideviz.formats.table import FORMATS, MESHIO
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
@@ -113,7 +115,7 @@ def _in_this_process(monkeypatch):
     """Read in this process, where it is quick and can be patched."""
     monkeypatch.setattr(
         "slideviz.formats.files.read_in_subprocess",
-        lambda path, _: read_with_meshio(path),
+        lambda path, _, function="": (bridge.read_surface if function else read_with_meshio)(path),
     )
 
 
@@ -368,8 +370,54 @@ def test_node_that_does_not_exist(tmp_path):
 
 def test_point_that_is_not_finite(tmp_path):
     path = foreign(tmp_path / "a.vtu", [QUAD], [[0, 0, 0], [1, 0, 0], [1, np.nan, 0], [0, 1, 0]])
-    with pytest.raises(MeshError, match=r"a.vtu: point 2 is at \(1.0, nan\), which is not finite"):
+    said = r"a.vtu: cell 0: point 2 is at \(1.0, nan, 0.0\), which is not finite"
+    with pytest.raises(MeshError, match=said):
         read(path)
+
+
+REFUSED = r"not finite|stands where|nothing can be computed|cannot be read"
+MESHIO_READS = [row.ending for row in FORMATS.values() if row.reader == MESHIO.reader]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("ending", [*MESHIO_READS, ".stl", ".ply", ".su2", ".su2b"])
+def test_no_reader_takes_a_coordinate_that_cannot_be_computed_with(tmp_path, ending, value):
+    """Of a mesh, and of the surface that a boundary is laid onto; CGNS has its own test."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1.0]])
+    cells = [("tetra", np.array([[0, 1, 2, 3], [4, 3, 2, 1]]))]
+    if ending in (".stl", ".ply"):
+        cells = [("triangle", np.array([[0, 2, 1], [1, 2, 3]]))]
+    path, place = tmp_path / f"a{ending}", (3, 1)
+    if ending in (".su2", ".su2b"):
+        write(path, Mesh(points + 0.5625, Cells.from_types([10, 10], [0, 1, 2, 3, 4, 3, 2, 1])))
+        old, new = (np.float64(0.5625), np.float64(value))
+        data = path.read_bytes()
+        if ending == ".su2":
+            changed = data.replace(repr(float(old)).encode(), repr(float(new)).encode(), 1)
+        else:
+            changed = data.replace(old.tobytes(), new.tobytes(), 1)
+        assert changed != data
+        path.write_bytes(changed)
+    else:
+        points[place] = value
+        with np.errstate(all="ignore"):
+            foreign(path, cells, points)
+    for reader in (read, read_surface):
+        if ending in (".stl", ".ply") and reader is read:
+            continue  # they are surfaces
+        with pytest.raises(
+            MeshError, match=r"not finite|stands where|nothing can be computed|cannot be read"
+        ):
+            reader(path)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_surface_names_the_facet_of_a_coordinate_that_is_not_finite(tmp_path, value):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    points[3, 1] = value
+    path = foreign(tmp_path / "a.ply", [("triangle", np.array([[0, 2, 1], [1, 2, 3]]))], points)
+    with pytest.raises(MeshError, match=r"a.ply: facet 1: point 3 is at \(0.0, .*not finite; corr"):
+        read_surface(path)
 
 
 def test_side_with_a_node_twice(tmp_path):

@@ -300,8 +300,8 @@ def match(
         lost = len(np.setdiff1d(moving, index))
         of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
         sentence = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
-        alone = np.array_equal(index, moving) or (normal_only and not lost)
-        notes.append(Note(sentence) if alone else sentence)
+        expected = np.array_equal(index, moving) or (normal_only and not lost)
+        notes.append(Note(sentence) if expected else sentence)
     at = design() if design is not None and at_design and normal_only else mesh.points
     return Matched(_vectors(values, mesh, at, moving, markers), at_design, tuple(notes))
 

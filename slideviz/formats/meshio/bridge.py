@@ -23,7 +23,7 @@ import numpy as np
 from slideviz.errors import MeshError, path_error, printable
 from slideviz.formats.meshio.markers import MeshioBlock, find_markers
 from slideviz.formats.table import endings
-from slideviz.mesh.check import check_mesh, first_fault
+from slideviz.mesh.check import check_mesh, check_size, first_fault
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 
@@ -174,13 +174,18 @@ def _mesh(path: Path, data: meshio.Mesh, least: int = 2) -> Mesh:
         (block.vtk, block.nodes) for block in blocks if ELEMENTS[block.vtk].dim == dim
     )
     points = _points(path, data, cells)
-    if least == 1 and dim < points.shape[1]:
-        return Mesh(points=points, cells=cells, name=printable(path.name))
+    is_surface = least == 1 and dim < points.shape[1]
+    _require_finite(path, points, cells, "facet" if is_surface else "cell")
+    if is_surface:
+        surface = Mesh(points=points, cells=cells, name=printable(path.name))
+        check_size(surface, printable(path))
+        return surface
     if dim == 2 and points.shape[1] == 3:
         points = flattened(path, points, cells)
     mesh = Mesh(points=points, cells=cells, name=printable(path.name), source=path.resolve())
     # The outer surface can be looked for only in sound cells.
     check_mesh(mesh)
+    check_size(mesh, printable(path))
     sides = [block for block in blocks if ELEMENTS[block.vtk].dim == dim - 1]
     mesh = replace(mesh, markers=find_markers(mesh, data, sides))
     check_mesh(mesh)
@@ -216,6 +221,20 @@ def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
     if fault:
         raise path_error(path, f"cell {fault[0]}: {fault[1]}")
     return points
+
+
+def _require_finite(path: Path, points: FloatArray, cells: Cells, what: str) -> None:
+    """Raise MeshError if a corner of a cell, called ``what``, is NaN or infinite."""
+    wrong = ~np.isfinite(points).all(axis=1)
+    if wrong[cells.connectivity].any():
+        corner = int(np.argmax(wrong[cells.connectivity]))
+        cell = int(np.searchsorted(cells.offsets, corner, "right")) - 1
+        node = cells.connectivity[corner]
+        raise path_error(
+            path,
+            f"{what} {cell}: point {node} is at {tuple(points[node].tolist())}, which is not "
+            "finite; correct the file",
+        )
 
 
 def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
