@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from slideviz.case.limits import Limit, LimitResult, quality
     from slideviz.case.model import (
         Bump,
         Case,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.margin import SafeFraction
     from slideviz.mesh.metrics import MetricValues, metrics
     from slideviz.mesh.model import Cells, Marker, Mesh
-    from slideviz.mesh.quality import Quality, quality
+    from slideviz.mesh.quality import Quality
     from slideviz.mesh.quality_derivative import QualityDerivative
     from slideviz.mesh.walls import Walls, walls
     from slideviz.plots.section_picture import SectionStyle
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from slideviz.study.combinations import Combination, compare
 
 _NAMES = {
+    "case.limits": "Limit LimitResult quality",
     "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
     "Onto Prescribed Radial Rotate Scale SpanMotion Translate",
     "design.deformer": "Constraint Deformer",
@@ -69,7 +71,7 @@ _NAMES = {
     "mesh.margin": "SafeFraction",
     "mesh.metrics": "MetricValues metrics",
     "mesh.model": "Cells Marker Mesh",
-    "mesh.quality": "Quality quality",
+    "mesh.quality": "Quality",
     "mesh.quality_derivative": "QualityDerivative",
     "mesh.walls": "Walls walls",
     "plots.section_picture": "SectionStyle",
@@ -87,9 +89,9 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 __all__ = [
     "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "Gap", "HicksHenne",
-    "Marker", "Mesh", "MeshRepair", "MetricValues", "Onto", "Prescribed", "Quality",
-    "QualityDerivative", "Radial", "Reduction", "Rotate", "SafeFraction", "Scale", "Section",
-    "SectionStyle", "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning",
+    "Limit", "LimitResult", "Marker", "Mesh", "MeshRepair", "MetricValues", "Onto", "Prescribed",
+    "Quality", "QualityDerivative", "Radial", "Reduction", "Rotate", "SafeFraction", "Scale",
+    "Section", "SectionStyle", "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning",
     "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert", "deform", "film",
     "gaps", "metrics", "picture", "quality", "read", "repair", "safe_fraction", "section", "sweep",
     "walls", "wheel", "write",

@@ -199,6 +199,18 @@ def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):
     assert parse(words).zoom == Detail((-0.5, 0.25, -1e-3), 2.0)
 
 
+def test_designs_of_equal_times_are_refused(case, tmp_path, capsys):
+    for times, said in (
+        ("0.5 1 0.5", "designs 1 and 3 are at time 0.5 both; keep one"),
+        ("1 2", ""),
+    ):
+        rows = "".join(f"{time},{k}\n" for k, time in enumerate(times.split()))
+        (tmp_path / "t.csv").write_text(f"time,airfoil.rotate.angle_deg\n{rows}")
+        code = film(case, "-q", "-o", str(tmp_path / "a.gif"), "--designs", str(tmp_path / "t.csv"))
+        assert code == (1 if said else 0)
+        assert said in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_interrupted_it_leaves_nothing_and_says_so(case, tmp_path):
     """Ctrl+C while images are drawn, told by the progress on a terminal."""

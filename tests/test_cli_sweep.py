@@ -100,11 +100,22 @@ def test_designs_that_fail(folder, in_threads, capsys):
     code, _, err = said(capsys, "sweep", "passage.cfg", "designs.csv", "-o", "out", "-q")
     assert code == 0
     assert "slideviz: warning: design 1: PERIODIC_MODE= moving needs a sliding method" in err
-    (folder / "designs.csv").write_text("SLIDING_MODE\nnone\n")
     words = ("sweep", "passage.cfg", "designs.csv", "-o", "out", "-q", "--force")
+    (folder / "designs.csv").write_text("SLIDING_MODE,PERIODIC_TYPE\nnone,auto\nps,rotational\n")
     code, _, err = said(capsys, *words)
     assert code == 1
     assert "no design could be computed; out/results.csv says why for each" in err
+    for count in (1, 2):  # one reason is one line
+        (folder / "designs.csv").write_text("SLIDING_MODE\n" + count * "none\n")
+        code, _, err = said(capsys, *words)
+        assert code == 1
+        assert err.startswith("slideviz: no design could be computed: PERIODIC_MODE= moving needs")
+        assert err.count("\n") == 1
+    (folder / "designs.csv").write_text("airfoil.translate.y\n0.1\n0.2\n")
+    code, _, err = said(capsys, *words, "--meshes", "--stream", "--zone", "9")
+    assert code == 1
+    assert "there is no zone 9" in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,6 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     if mesh.zone_parts:
         return tuple(_problems_of_zones(case, mesh))
     return (
-        *key_problems(case),
         *_radius_problems(case, mesh),
         *(sentence for _, sentence in contradictions(case, exact=True)),
         *marker_problems(case, mesh),
@@ -61,7 +60,6 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
-    yield from key_problems(case)
     if len(case.interfaces) % 2:
         yield f"MARKER_ZONE_INTERFACE: {', '.join(case.interfaces)} are no pairs of boundaries"
         return
@@ -260,7 +258,7 @@ def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator
 
 
 def key_problems(case: Case) -> Iterator[str]:
-    """Yield a sentence for each value out of range: a case made by a program may have such."""
+    """Yield a sentence for each value out of range, when a program makes a case."""
     for key in KEYS.values():
         value = key.get(case)
         if key.group in (FILES, BOUNDARIES, MOTION) or value is None:

@@ -15,16 +15,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from slideviz.argument_types import CheckedFields
+from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.values import Kind
 from slideviz.case.words import name_text, number
 from slideviz.errors import CaseError, nearest, not_one_of, shown
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
+from slideviz.mesh.quality import quality as quality_of
 from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.walls import CHANGES, LAYERS, walls
-from slideviz.terms import METRICS, SIZE_SKEW, Metric, field_of
+from slideviz.terms import METRICS, SIZE_SKEW, Metric, SkewMetric, field_of
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -183,7 +184,11 @@ boundary after @ or at all with layers, and all metrics."""
 
 @dataclass(frozen=True)
 class Limit(CheckedFields):
-    """A limit on a number of `NUMBERS`, everywhere or at the boundary ``marker``."""
+    """A limit on a number of a deformed mesh, such as ``Limit("min", ">", 0.3)``.
+
+    ``slideviz keys`` lists the names at LIMITS. ``sign`` is ``>``, ``>=``, ``<``, ``<=`` or ``=``.
+    A number of walls can be limited at the boundary ``marker`` alone.
+    """
 
     name: str
     sign: str
@@ -267,6 +272,79 @@ def names_text(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + ", ..." * (len(names) > 3)
 
 
+@check_types
+def quality(
+    mesh: Mesh,
+    reference: Mesh | None = None,
+    metric: SkewMetric = "knupp",
+    going_on: Callable[[], object] = lambda: None,
+    *,
+    derivative: bool = False,
+    p: float = 50.0,
+    limits: Sequence[Limit] | str = (),
+) -> Quality:
+    """Return the quality of each cell, compared with the undeformed mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The deformed mesh.
+    reference : Mesh, optional
+        The undeformed mesh, with the same cells; without it ``size`` is 1 for all cells that are
+        not inverted. The signs of the cells are found from it, too.
+    metric : {"knupp", "rbf-slide"}
+        See `Quality`.
+    going_on : callable
+        Called every few thousand cells; what it raises ends the work.
+    derivative : bool
+        Find the derivatives of minimum and mean by the points too (`QualityDerivative`), for an
+        optimiser. Give the undeformed mesh then: without it a mesh that is wholly inverted is taken
+        for one numbered the other way round.
+    p : float
+        The exponent of the smooth minimum that is differentiated, at least 1: higher is closer to
+        the minimum, and less smooth.
+    limits : sequence of Limit, or str
+        Limits on numbers of the mesh, or a text as ``min > 0.3, inverted = 0``; whether it meets
+        each of them is in `Quality.limits`.
+
+    Raises
+    ------
+    MeshError
+        The mesh has no cells or unusable ones, coordinates too large, or the reference is another
+        mesh. With ``derivative`` also: a point is no number, or the reference has cells without a
+        positive volume.
+    CaseError
+        The metric is unknown, the exponent below 1, or a limit is wrong, or compares with the
+        undeformed mesh and there is no reference.
+
+    Examples
+    --------
+    A square, and the same with a corner drawn in to its centre and beyond:
+
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.quality(square).min
+    1.0
+    >>> folded = square.with_points([[0, 0], [1, 0], [0.4, 0.4], [0, 1]])
+    >>> found = sv.quality(folded, reference=square, limits="inverted = 0, skewness < 4")
+    >>> found.inverted
+    1
+    >>> [(str(one.limit), one.passed) for one in found.limits]
+    [('inverted = 0', False), ('skewness < 4', True)]
+
+    The way that the drawn corner must go for the minimum to rise:
+
+    >>> slope = sv.quality(folded, reference=square, derivative=True).derivative
+    >>> slope.of_minimum[2] > 0
+    array([ True,  True])
+    """
+    wanted = read_limits(limits) if isinstance(limits, str) else limits
+    rated = quality_of(mesh, reference, metric, going_on, derivative=derivative, p=p)
+    if not wanted:
+        return rated
+    return replace(rated, limits=check_limits(wanted, MeasuredMesh(rated, mesh, reference)))
+
+
 def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
     """Return for each limit whether a mesh meets it.
 
@@ -302,6 +380,12 @@ def check_case_limits(
     """Return for each limit of a case whether its deformed mesh meets it."""
     names = case.walls(mesh.marker_names)
     return check_limits(case.limits, MeasuredMesh(quality, mesh, reference, names))
+
+
+def rated_limits(case: Case, reference: Mesh, mesh: Mesh) -> tuple[LimitResult, ...]:
+    """Return `check_case_limits` of a mesh whose quality is not known."""
+    rated = quality_of(mesh, reference, case.quality_metric)
+    return check_case_limits(case, rated, mesh, reference)
 
 
 MET = "met"  # what `outcome` returns where all limits are met

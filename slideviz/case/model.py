@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -95,6 +96,13 @@ class Onto(FromFile):
     """
 
     limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.limit < inf:
+            raise CaseError(
+                f"the limit {self.limit:g} is not above 0; leave it out for 1 % of the size"
+            )
 
 
 @dataclass(frozen=True)
@@ -267,6 +275,12 @@ class Prescribed(CheckedFields):
         object.__setattr__(self, "vectors", vectors)
 
 
+_NUMBERS = (
+    "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
+    "support_radius", "reduction", "layer_thickness", "repair_below", "idw_power",
+    "idw_fixed_weight",
+)  # fmt: skip
+"""The fields of a case whose numbers must be in a range, which the table of keys has."""
 _ROLES = 'a role for each marker, as {"blade": "moving"}'
 OnAirfoil = HicksHenne | Cst | Bump
 BoxMotion = Ffd | FfdCamber | FfdThickness | FfdTwist
@@ -409,6 +423,11 @@ class Case(CheckedFields):
         for name in ("mesh_file", "mesh_out", "source"):
             if (path := getattr(self, name)) is not None:
                 object.__setattr__(self, name, Path(path))
+        usual = self.__dataclass_fields__
+        if any(getattr(self, name) is not usual[name].default for name in _NUMBERS):
+            from slideviz.case.check import key_problems, raise_all
+
+            raise_all(tuple(key_problems(self)))
 
     def change(self, **values: Any) -> Case:
         """Return the case with other values of some fields.

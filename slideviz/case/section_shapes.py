@@ -226,7 +226,7 @@ SECTION_SHAPES = {
                 "Span",
                 "span",
                 unit="parts of the way from hub to shroud",
-                remedy="give a number between 0, the hub, and 1, the shroud",
+                remedy="give a number between 0, the hub, and 1, the shroud: 0.5 for 50 %",
                 example="a span, as in 0.5 or s=0.5",
                 high=1.0,
                 usual=0.5,

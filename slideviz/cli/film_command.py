@@ -167,21 +167,22 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks
     from slideviz.design.sweeps.columns import TIME, number_of
-    from slideviz.design.sweeps.table import read_designs
+    from slideviz.design.sweeps.table import read_designs, require_distinct_times
     from slideviz.session.state import StepFrame
 
     frames, warnings = [], list[str]()
     cases = [("", case)]
     if arguments.designs is not None:
-        designs = read_designs(case, arguments.designs).rows
+        table = read_designs(case, arguments.designs)
+        require_distinct_times(table)
         cases = [
             (
-                f"design {design.number} of {len(designs)}"
+                f"design {design.number} of {len(table.rows)}"
                 if design.values.get(TIME, "") == ""
                 else f"time {number_of(design.values[TIME]):g}",
                 design.case,
             )
-            for design in designs
+            for design in table.rows
         ]
     with Bar(not arguments.quiet) as bar:
         for label, one in cases:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from slideviz.cli.options import integer
+from slideviz.cli.options import add_shared, integer
 from slideviz.formats.table import FILE_FORMATS
 
 
@@ -26,6 +26,7 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
     )
     call.add_argument("--variant", metavar="NAME", help="other motions; listed without NAME")
     call.add_argument("--force", action="store_true", help="replace files that exist")
+    add_shared(call, "quiet")
     call.set_defaults(command=sample)
 
 
@@ -45,6 +46,8 @@ def sample(arguments: argparse.Namespace) -> int:
     paths = write_sample(
         arguments.name, folder, arguments.size, arguments.variant, arguments.force, arguments.format
     )
+    if arguments.quiet:
+        return DONE
     for path in paths:
         print(path)
     case = next(path for path in paths if path.suffix == ".cfg")

@@ -119,6 +119,9 @@ def sweep(arguments: argparse.Namespace) -> int:
     report["results"] = str(folder / RESULTS)
     if not save_json(arguments.json, report) and not arguments.quiet:
         _print_sweep(report)
+    problems = {row.problem for row in results}
+    if len(problems) == 1 and report["failed"] == len(results):
+        raise CaseError(f"no design could be computed: {problems.pop()}")
     _warn(case.warnings, results, arguments.quiet)
     if report["failed"] == len(results):
         raise CaseError(f"no design could be computed; {folder / RESULTS} says why for each")

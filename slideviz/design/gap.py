@@ -119,8 +119,8 @@ def gaps(
     Raises
     ------
     CaseError, MeshError
-        No boundary moves besides hub and shroud, or a boundary is unknown, or is of another zone
-        than the one it is measured from.
+        No boundary moves besides hub and shroud, or a boundary is unknown, is of another zone than
+        the one it is measured from, or is to be measured from itself.
 
     Examples
     --------
@@ -132,6 +132,10 @@ def gaps(
     >>> round(throat.distance, 3)
     0.008
     """
+    written = spellings(mesh)
+    for first, second in between:
+        if written.get(first, first) == written.get(second, second):
+            raise CaseError(f"between: {first!r} is given twice; name two boundaries")
     at, base = np.asarray(places, float), reference or mesh
     zones = zip(zone_cases(case, mesh, False), zones_of(mesh), zones_of(base), strict=True)
     names = [names_from(mesh, part) for part in mesh.zone_parts] or [{}]

@@ -73,12 +73,7 @@ class SpanVariables:
     @check_types
     def case_of(self, values: FloatArray) -> Case:
         """Return the case with other values (k,) of the variables."""
-        given = np.asarray(values, np.float64)
-        if given.shape != self.values.shape or not np.isfinite(given).all():
-            raise CaseError(
-                f"values have the shape {given.shape}; expected {len(self.values)} finite numbers, "
-                f"of {', '.join(self.names)}"
-            )
+        given = self._checked("values", values)
         motions = list(self.case.motions)
         for at, value in zip(self._at.values(), given.tolist(), strict=True):
             at.put(motions, value)
@@ -93,7 +88,7 @@ class SpanVariables:
     def jvp(self, values: FloatArray, direction: FloatArray) -> FloatArray:
         """Return the derivative (m, d) of the displacement at ``values`` in a direction (k,)."""
         out = np.zeros((len(self.nodes), self.mesh.dim))
-        change = np.asarray(direction, np.float64)
+        change = self._checked("direction", direction)
         for rows, columns, by_total, slope in self._slopes(values):
             out[rows] += by_total * (slope @ change[columns])[:, None]
         return out
@@ -102,10 +97,30 @@ class SpanVariables:
     def vjp(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the gradient (k,) of ``(weights * displacement).sum()``; weights (m, d)."""
         out = np.zeros(len(self.values))
+        shape = len(self.nodes), self.mesh.dim
         adjoint = np.asarray(weights, np.float64)
+        if adjoint.shape != shape:
+            raise CaseError(
+                f"weights has the shape {adjoint.shape}; expected {shape}, a row for each node of "
+                "`nodes`"
+            )
         for rows, columns, by_total, slope in self._slopes(values):
             out[columns] += np.sum(adjoint[rows] * by_total, axis=1) @ slope
         return out
+
+    def _checked(self, name: str, values: FloatArray) -> FloatArray:
+        """Return numbers (k,) for the variables, or raise CaseError."""
+        given = np.asarray(values, np.float64)
+        if given.shape != self.values.shape:
+            raise CaseError(
+                f"{name} has the shape {given.shape}; expected {self.values.shape}: a number each "
+                f"for {', '.join(self.names)}"
+            )
+        finite = np.isfinite(given)
+        if not finite.all():
+            at = int(np.argmin(finite))
+            raise CaseError(f"{name}: {self.names[at]} is {given[at]:g}; expected a finite number")
+        return given
 
     def _slopes(
         self, values: FloatArray

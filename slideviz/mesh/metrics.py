@@ -109,16 +109,16 @@ class MetricValues:
 
 @check_types
 def metrics(
-    mesh: Mesh, names: Iterable[str] | None = None, reference: Mesh | None = None
+    mesh: Mesh, names: Iterable[str] | str | None = None, reference: Mesh | None = None
 ) -> dict[str, MetricValues]:
     """Return the values of some metrics of a mesh, or of all, by name.
 
     Parameters
     ----------
     mesh : Mesh
-    names : iterable of str, optional
-        Names of `slideviz.terms.METRICS`, with ``-`` or ``_``, in any case; None: all, without a
-        reference those that need none.
+    names : str, or iterable of str, optional
+        A name, or names, of `slideviz.terms.METRICS`, with ``-`` or ``_``, in any case; None: all,
+        without a reference those that need none.
     reference : Mesh, optional
         The undeformed mesh, as of `slideviz.quality`. Only size-skew and its factors depend on its
         shape. Of the others, cells that are numbered the other way round there have the same
@@ -143,7 +143,7 @@ def metrics(
     """
     if names is None:
         names = [name for name, term in METRICS.items() if reference or not term.compares]
-    wanted = {name: metric_name(name) for name in names}
+    wanted = {name: metric_name(name) for name in ([names] if isinstance(names, str) else names)}
     rated = quality(mesh, reference) if set(wanted.values()) & set(SIZE_SKEW) else None
     return {key: rated_metric(mesh, name, reference, rated) for key, name in wanted.items()}
 

@@ -36,6 +36,8 @@ from slideviz.terms import SkewMetric
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from slideviz.case.limits import LimitResult
+
 __all__ = [
     "INVERTED",
     "UNPROVEN",
@@ -171,6 +173,8 @@ class Quality:
     """By the points, if it was asked for."""
     of_mesh: QualityTotals | None = None
     """Those of all cells of the mesh, where the arrays are of a part of them or in a file."""
+    limits: tuple[LimitResult, ...] = ()
+    """Whether the mesh meets each limit that `slideviz.quality` was asked for."""
 
     def __len__(self) -> int:
         return len(self.values)
@@ -281,51 +285,7 @@ def quality(
 ) -> Quality:
     """Return the quality of each cell, compared with the undeformed mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The deformed mesh.
-    reference : Mesh, optional
-        The undeformed mesh, with the same cells; without it ``size`` is 1 for all cells that are
-        not inverted. The signs of the cells are found from it, too.
-    metric : {"knupp", "rbf-slide"}
-        See `Quality`.
-    going_on : callable
-        Called every few thousand cells; what it raises ends the work.
-    derivative : bool
-        Find the derivatives of minimum and mean by the points too (`QualityDerivative`), for an
-        optimiser. Give the undeformed mesh then: without it a mesh that is wholly inverted is taken
-        for one numbered the other way round.
-    p : float
-        The exponent of the smooth minimum that is differentiated, at least 1: higher is closer to
-        the minimum, and less smooth.
-
-    Raises
-    ------
-    MeshError
-        The mesh has no cells or unusable ones, coordinates too large, or the reference is another
-        mesh. With ``derivative`` also: a point is no number, or the reference has cells without a
-        positive volume.
-    CaseError
-        The metric is unknown, or the exponent below 1.
-
-    Examples
-    --------
-    A square, and the same with a corner drawn in to its centre and beyond:
-
-    >>> import slideviz as sv
-    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
-    >>> sv.quality(square).min
-    1.0
-    >>> folded = square.with_points([[0, 0], [1, 0], [0.4, 0.4], [0, 1]])
-    >>> sv.quality(folded, reference=square).summary()["inverted"]
-    1
-
-    The way that the drawn corner must go for the minimum to rise:
-
-    >>> slope = sv.quality(folded, reference=square, derivative=True).derivative
-    >>> slope.of_minimum[2] > 0
-    array([ True,  True])
+    Parameters and errors as of `slideviz.quality`, which also checks limits.
     """
     if metric not in SKEW_METRICS:
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(SKEW_METRICS)}")

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from slideviz.argument_types import check_types
+from slideviz.case.limits import rated_limits
 from slideviz.case.model import Case
 from slideviz.case.zones import with_marker_names
 from slideviz.errors import DeformError, UnsoundError
@@ -96,10 +97,12 @@ def deform(
     """
     report = progress or (lambda _: None)
     case = with_marker_names(case, mesh)
+    check_limits = partial(rated_limits, case, mesh)
     if mesh.zone_parts:
         from slideviz.solver.zones import deform_zones
 
-        yield from deform_zones(case, mesh, partial(deform, certify=certify), report)
+        for step in deform_zones(case, mesh, partial(deform, certify=certify), report):
+            yield replace(step, check_limits=check_limits)
         return
     timer = PhaseTimer(
         lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction))
@@ -117,7 +120,8 @@ def deform(
     before, done = mesh, 0.0
     for step in all_steps(stepping):
         ends = mend is not None and step.index == step.total and step.repaired is None
-        yield _mended(stepping, step, before, done) if ends else step
+        last = _mended(stepping, step, before, done) if ends else step
+        yield replace(last, check_limits=check_limits)
         before, done = step.mesh, step.part
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
-from slideviz.case.check import key_problems, raise_all, unknown_markers
+from slideviz.case.check import raise_all, unknown_markers
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.case.zones import zone_cases
 from slideviz.elastic.conditions import conditions
-from slideviz.errors import MeshError, not_one_of
+from slideviz.errors import CaseError, MeshError, not_one_of
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
@@ -137,8 +137,12 @@ def _case_alone(
         for name in names
         if roles[name] != role
     )
-    case = Case(roles=roles, repair="yes", repair_below=below)
-    wrong = (text.replace("REPAIR_BELOW", "below") for text in key_problems(case))
+    case = Case(roles=roles, repair="yes")
+    wrong = []
+    try:
+        case = case.change(repair_below=below)
+    except CaseError as problem:
+        wrong.append(str(problem).replace("REPAIR_BELOW", "below"))
     periodic = case.markers_with("periodic")
     odd = f"periodic: {', '.join(periodic)}; boundaries repeat in pairs, so name both of each"
     raise_all(

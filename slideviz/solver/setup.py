@@ -13,7 +13,7 @@ from slideviz.case.check import file_before_motions, idle_settings, require_vali
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.spans import moves_over_span, span_field
-from slideviz.errors import CaseError, Note
+from slideviz.errors import Note
 from slideviz.machine.span import SpanField
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -304,15 +304,10 @@ def _method(
 
 
 def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return the note that RELAX= AUTO relaxes no such mesh; CaseError if RELAX= YES cannot."""
+    """Return the note that RELAX= AUTO relaxes no such mesh."""
     if case.relax == "no" or case.method != "rbf":
         return ()
     if mesh.part is not None:
-        if case.relax == "yes":
-            raise CaseError(
-                "RELAX= YES needs the whole mesh in memory, but this run goes from file to file; "
-                "use RELAX= NO or AUTO, or run it in memory"
-            )
         return (Note("RELAX= AUTO relaxes no mesh that goes from file to file"),)
     if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:
         return (

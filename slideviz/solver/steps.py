@@ -5,9 +5,10 @@ Steps are made in `slideviz.solver.stepping`, their number is chosen in `slidevi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as made_by
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Cycle, Relaxed
 
 if TYPE_CHECKING:
+    from slideviz.case.limits import LimitResult
     from slideviz.mesh.quality import Quality
     from slideviz.mesh.walls import Walls
 
@@ -164,6 +166,13 @@ class Step:
     safe: SafeFraction | None = None
     """How far this step, straight on, may go until the first cell folds; None where it was not
     asked for."""
+    check_limits: Callable[[Mesh], tuple[LimitResult, ...]] = lambda _: ()
+    """Returns whether a mesh meets each limit of the case."""
+
+    @cached_property
+    def limits(self) -> tuple[LimitResult, ...]:
+        """Return whether the mesh meets each limit of the case; measured when first asked for."""
+        return self.check_limits(self.mesh)
 
 
 @dataclass(frozen=True, eq=False)

@@ -360,8 +360,9 @@ def _naming_file_nodes(numbers: IntArray) -> Iterator[None]:
 def require_stream(case: Case) -> None:
     """Raise where a case cannot be streamed.
 
-    Raises CaseError if its method, linear elasticity, repair of each step, or one of its limits
-    needs the whole mesh at once, and MeshError if its mesh is of no format that can be streamed.
+    Raises CaseError if its method, linear elasticity, relaxation, repair of each step, or one of
+    its limits needs the whole mesh at once, and MeshError if its mesh is of no format that can be
+    streamed.
     """
     path = case.mesh_file
     assert path is not None
@@ -369,6 +370,11 @@ def require_stream(case: Case) -> None:
         raise CaseError(
             "REPAIR_STEPS= YES needs the whole mesh after each step and cannot be streamed; use "
             "REPAIR_STEPS= NO, or run it without --stream"
+        )
+    if case.relax == "yes" and case.method == "rbf":
+        raise CaseError(
+            "RELAX= YES needs the whole mesh at once and cannot be streamed; use RELAX= NO or "
+            "AUTO, or run it without --stream"
         )
     if case.method == "elastic":
         raise CaseError(

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import slideviz as sv
 from slideviz.case.check import check_case
 from slideviz.case.limits import (
     NUMBERS,
@@ -26,7 +27,8 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.walls import CHANGES, VALUES, walls
 from slideviz.terms import METRICS, field_of
-from tests.builders import grid
+from tests.builders import grid, square
+from tests.mesh.test_interfaces import zones as square_and_core
 
 
 @st.composite
@@ -144,6 +146,44 @@ def test_the_cells_that_fail_are_the_worst_first(measured):
     assert not len(at.cells)
     (above,) = check_limits([Limit("size", ">", float(measured.quality.size.min()))], measured)
     assert not above.passed
+
+
+def test_the_quality_of_a_mesh_says_whether_it_meets_limits(measured):
+    text = "min > 0.9, inverted = 0, skewness < 4, margin > 0"
+    found = sv.quality(measured.mesh, measured.reference, limits=text)
+    for limits in (read_limits(text), [*read_limits(text)]):
+        again = sv.quality(measured.mesh, measured.reference, limits=limits).limits
+        assert [str(one.limit) for one in again] == text.split(", ")
+    expected = check_limits(read_limits(text), measured)
+    assert [one.passed for one in found.limits] == [one.passed for one in expected]
+    for one, other in zip(found.limits, expected, strict=True):
+        np.testing.assert_array_equal(one.cells, other.cells)
+    assert sv.quality(measured.mesh, measured.reference).limits == ()
+    np.testing.assert_array_equal(found.values, measured.quality.values)
+    with pytest.raises(CaseError, match="'min' is no limit; expected NAME > NUMBER"):
+        sv.quality(measured.mesh, limits="min")
+    with pytest.raises(CaseError, match="compares with the undeformed mesh; give it"):
+        sv.quality(measured.mesh, limits=[sv.Limit("margin", ">", 0.0)])
+
+
+@pytest.mark.parametrize("zones", [False, True])
+def test_each_step_of_a_run_says_whether_it_meets_the_limits_of_the_case(zones, tmp_path):
+    text = "min > 0.97, inverted = 0"
+    mesh = sv.read(square_and_core(tmp_path)) if zones else square(6)
+    case = sv.Case(
+        roles={"BLOCK": "moving"},
+        motions=(sv.Translate("BLOCK", (0.03, 0.0)),),
+        steps=3,
+        limits=text,
+    )
+    steps = [*sv.deform(case, mesh)]
+    for step in steps:
+        expected = sv.quality(step.mesh, mesh, limits=text).limits
+        assert [(str(one.limit), one.passed) for one in step.limits] == [
+            (str(one.limit), one.passed) for one in expected
+        ]
+    assert steps[0].limits[0].actual > steps[-1].limits[0].actual
+    assert [*sv.deform(case.change(limits=()), mesh)][-1].limits == ()
 
 
 def test_counts_and_the_mean(measured):

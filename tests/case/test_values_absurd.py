@@ -93,14 +93,31 @@ def test_the_ends_of_what_is_allowed_work(end, sliding):
 
 @pytest.mark.parametrize("value", [1e-300, 1e300])
 def test_a_program_is_told_of_an_absurd_radius(value):
-    mesh = builders.square(6)
-    case = Case(
-        roles={"BLOCK": "moving"},
-        motions=(Translate("BLOCK", (0.02, 0.01)),),
-        influence_factor=value,
-    )
     with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; expected"):
-        next(sv.deform(case, mesh))
+        Case(influence_factor=value)
+
+
+NUMBERS = [key for key in FIELDS if key.kind.entry in ("real", "whole")]
+WRONG = {"axis": (0.0, 0.0, 0.0), "origin": (np.inf, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize("key", NUMBERS, ids=lambda key: key.name)
+@pytest.mark.parametrize("value", [-1, float("nan")])
+def test_a_program_is_told_at_once_of_a_number_that_a_file_cannot_have(key, value):
+    """With the sentence of a file: when the case is made, and when it is changed."""
+    if key.kind.entry == "whole" and value != -1:
+        return
+    in_reduction = key.group == REDUCTION and not hasattr(Case(), key.field)
+    wrong = {"reduction": Reduction(**{key.field: value})} if in_reduction else {key.field: value}
+    for made in (lambda: Case(**wrong), lambda: Case().change(**wrong)):
+        with pytest.raises(CaseError, match=f"^{key.name}: .*"):
+            made()
+
+
+@pytest.mark.parametrize("field", WRONG)
+def test_a_program_is_told_at_once_of_an_axis_or_point(field):
+    with pytest.raises(CaseError, match=r"^PERIODIC_(AXIS|ORIGIN): .*"):
+        Case(**{field: WRONG[field]})
 
 
 @pytest.mark.filterwarnings("error")

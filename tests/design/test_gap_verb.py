@@ -137,6 +137,8 @@ def test_in_2d_there_are_no_tip_gaps_by_span(files, capsys):
     assert "--between SHROUD,BLADE" in said
     assert run(["gap", "plane.cfg", "--between", f"{mesh.marker_names[0]},BLOCK"]) == 0
     assert f"{mesh.marker_names[0]} to BLOCK\n" in capsys.readouterr().out
+    assert run(["gap", "plane.cfg", "--between", "BLOCK,BLOCK"]) == 1
+    assert "between: 'BLOCK' is given twice; name two boundaries" in capsys.readouterr().err
 
 
 def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):

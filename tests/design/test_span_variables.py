@@ -79,8 +79,21 @@ def test_what_has_no_such_derivatives_is_refused(impeller):
     with pytest.raises(CaseError, match="motion 3 turns or scales what motion 1 has moved"):
         sv.SpanVariables(mesh, case.change(motions=(*case.motions, sv.Rotate("BLADE", 1.0))))
     design = sv.SpanVariables(mesh, case)
-    with pytest.raises(CaseError, match=r"shape \(2,\); expected 5 finite numbers, of BLADE.twist"):
-        design.displacement(np.zeros(2))
+    weights = np.ones((len(design.nodes), 3))
+    for call in (
+        lambda values: design.displacement(values),
+        lambda values: design.jvp(values, design.values),
+        lambda values: design.vjp(values, weights),
+    ):
+        with pytest.raises(CaseError, match=r"values has the shape \(2,\); expected \(5,\): a nu"):
+            call(np.zeros(2))
+        with pytest.raises(CaseError, match=r"values: BLADE.twist.0.5 is nan; expected a finite n"):
+            call(np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
+    with pytest.raises(CaseError, match=r"direction has the shape \(3,\); expected \(5,\)"):
+        design.jvp(design.values, np.zeros(3))
+    for shape in ((5,), weights.shape[::-1], (2, *weights.shape), weights[:-1].shape):
+        with pytest.raises(CaseError, match=r"weights has the shape .*; expected \(\d+, 3\), a r"):
+            design.vjp(design.values, np.ones(shape))
 
 
 def test_columns_of_a_sweep_are_points_of_curves(impeller):

@@ -520,6 +520,8 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     out = tmp_path / "out.su2b"
+    with pytest.raises(CaseError, match="RELAX= YES needs the whole mesh at once"):
+        stream(case.change(relax="yes", mesh_file=out.with_name("missing.su2")), out)
     with pytest.raises(CaseError, match="METHOD= elastic needs the whole mesh at once"):
         stream(case.change(method="elastic"), out)
     sv.convert("mesh.su2b", "mesh.vtu")

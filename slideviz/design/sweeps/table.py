@@ -154,6 +154,19 @@ def iterations(designs: Designs, time_step: float | None = None) -> dict[int, in
     return numbers
 
 
+def require_distinct_times(designs: Designs) -> None:
+    """Raise CaseError where two designs have the same time."""
+    designs_at: dict[float, int] = {}
+    for design in designs.rows if TIME in designs.columns else ():
+        time = float(design.values[TIME])
+        if time in designs_at:
+            raise CaseError(
+                f"designs {designs_at[time]} and {design.number} are at time {time:g} both; keep "
+                "one of them"
+            )
+        designs_at[time] = design.number
+
+
 def _files_in_time(pattern: Path) -> list[dict[str, Any]]:
     """Return a design for each displacement file that matches, its time the number in its name."""
     rows = []

@@ -225,9 +225,9 @@ def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
 
 def _require_finite(path: Path, points: FloatArray, cells: Cells, what: str) -> None:
     """Raise MeshError if a corner of a cell, called ``what``, is NaN or infinite."""
-    wrong = ~np.isfinite(points).all(axis=1)
-    if wrong[cells.connectivity].any():
-        corner = int(np.argmax(wrong[cells.connectivity]))
+    wrong = ~np.isfinite(points[cells.connectivity]).all(axis=1)
+    if wrong.any():
+        corner = int(np.argmax(wrong))
         cell = int(np.searchsorted(cells.offsets, corner, "right")) - 1
         node = cells.connectivity[corner]
         raise path_error(
