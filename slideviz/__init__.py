@@ -91,8 +91,9 @@ __all__ = [
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "Gap", "HicksHenne",
     "Limit", "LimitResult", "Marker", "Mesh", "MeshRepair", "MetricValues", "Onto", "Prescribed",
     "Quality", "QualityDerivative", "Radial", "Reduction", "Rotate", "SafeFraction", "Scale",
-    "Section", "SectionStyle", "SlidevizError", "SpanMotion", "SpanVariables", "Step", "ToleranceWarning",
-    "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert", "deform", "film",
+    "Section", "SectionStyle", "SlidevizError", "SpanMotion", "SpanVariables", "Step",
+    "ToleranceWarning", "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert",
+    "deform", "film",
     "gaps", "metrics", "picture", "quality", "read", "repair", "safe_fraction", "section", "sweep",
     "walls", "wheel", "write",
 ]  # fmt: skip
