@@ -288,6 +288,13 @@ RELAXES: dict[Relax, Term] = {
 }
 """Whether the mesh is relaxed after the last step."""
 
+Rims = Literal["free", "slide"]
+RIMS: dict[Rims, Term] = {
+    "free": Term("go with the motion", "They may leave the wall, which a run then warns of."),
+    "slide": Term("stay on walls", "They are put back on the wall, and what is beside follows."),
+}
+"""What nodes of moving boundaries do that are also on walls."""
+
 Repair = Literal["auto", "no", "yes"]
 REPAIRS: dict[Repair, Term] = {
     "auto": Term("automatic", "Mended where cells are bad."),

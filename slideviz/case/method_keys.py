@@ -207,6 +207,11 @@ def nothing_slides(case: Case) -> str:
     return "" if slides else "no boundary has the role “sliding” or “periodic”"
 
 
+def _no_walls(case: Case) -> str:
+    walls = {"sliding", "internal"}.intersection(case.roles.values())
+    return "" if walls else "no boundary has the role “sliding” or “internal”"
+
+
 def or_auto(kind: Kind, word: str) -> Kind:
     """Return the kind of the values of ``kind``, which are numbers, or ``word``: 0 in the case."""
     nothing = 0 if kind.entry == "whole" else 0.0
@@ -257,6 +262,19 @@ METHOD_ROWS = (
         "boundary in stages (pseudo), or slide as part of the system itself (direct).",
         run_label="",
         idle_reason=nothing_slides,
+    ),
+    _setting(
+        "RIMS",
+        "What a motion does with nodes of moving boundaries that are also on sliding or internal "
+        "ones: FREE takes them off these walls, with a warning; SLIDE keeps them there, at the "
+        "closest point, and the nodes beside them follow smoothly.",
+        label="Nodes on walls",
+        form="main",
+        tip="Whether nodes that what moves shares with a sliding or internal boundary, such as "
+        "those of a blade on its hub, stay on that wall whatever the motion is; the nodes beside "
+        "them follow smoothly.",
+        run_label="rims {}",
+        idle_reason=_no_walls,
     ),
     _setting(
         "RELAX",

@@ -312,7 +312,7 @@ def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
     )
 
 
-NEW: dict[str, Any] = {"relax": "auto", "layers": "auto", "repair": "auto"}
+NEW: dict[str, Any] = {"rims": "slide", "relax": "auto", "layers": "auto", "repair": "auto"}
 """Settings of new cases where those of a file without their keys are others, for its results."""
 
 
@@ -380,6 +380,7 @@ class Case(CheckedFields):
     ffd_axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
     method: terms.Method = field(default="rbf", metadata=terms.METHODS)
     sliding: terms.Sliding = field(default="none", metadata=terms.SLIDING)
+    rims: terms.Rims = field(default="free", metadata=terms.RIMS)
     periodic: terms.PeriodicMode = field(default="none", metadata=terms.PERIODIC_MODES)
     periodic_type: terms.PeriodicType = field(default="auto", metadata=terms.PERIODIC_TYPES)
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)

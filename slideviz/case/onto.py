@@ -21,10 +21,10 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
-from slideviz.mesh.topology import corner_vectors, unit
+from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
-from slideviz.rbf.projection import as_simplices, surface_rim
+from slideviz.rbf.projection import as_simplices, simplex_vectors, surface_rim
 
 FARTHEST = 0.01
 """Largest distance from the target that may remain, over the boundary's size, by default."""
@@ -225,8 +225,7 @@ def _nearest(simplices: FloatArray) -> Nearest:
 
 def _normals(simplices: FloatArray) -> FloatArray:
     """Return the unit normals (m, d) of triangles (m, 3, 3) or segments (m, 2, 2)."""
-    flat = simplices.shape[1] == 2
-    return unit(corner_vectors(simplices if flat else simplices[:, [0, 1, 2, 2]]))
+    return unit(simplex_vectors(simplices))
 
 
 def _along(edges: FloatArray) -> Nearest | None:

@@ -123,7 +123,7 @@ def _further(
             more = made[-1].control
             control = np.concatenate([control, more[~np.isin(more, control)]])
         timer = PhaseTimer(partial(_report, report, k + 1, total))
-        goal = setup.coords[setup.known] + setup.target * part
+        goal = value(setup.goal(setup.target, part))
         # Relaxation, after the last step, chooses no control nodes.
         begun = replace(setup.at_step(False), solve=partial(_continued, setup, solution.stages))
         made.append(

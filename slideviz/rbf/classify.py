@@ -205,7 +205,7 @@ MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface
 for a node between them (a circular far field in two markers); the full feature angle would
 round off true corners of the domain. Which boundaries are one surface is also decided in
-`slideviz.mesh.fans.smooth_joints`, `slide_rows` and ``projection._surface_labels``:
+`slideviz.mesh.fans.smooth_joints`, `slide_rows` and ``projection.surface_labels``:
 change them together."""
 
 

@@ -10,7 +10,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick, reached
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
-from slideviz.rbf.loops import place
+from slideviz.rbf.loops import place, shift
 from slideviz.rbf.slopes import pull_positions, push_positions
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import Array, Linear, Link, Variable, recorded, value
@@ -78,6 +78,13 @@ def _converted(
         return x
     rows = value(x)
     return _turned(x, convert(flat(rows)).reshape(rows.shape), lambda: slopes_of(frame, rows))
+
+
+def moved_by(start: Array, by: Array, *, overwrite: bool = False) -> Array:
+    """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
+    x, u = value(start), value(by)
+    out = shift(x, u if overwrite else u.copy())
+    return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
 def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:

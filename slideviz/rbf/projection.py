@@ -158,9 +158,9 @@ def find_tracks(
     curved = False
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = True
-    across = _across_period(boundary, classes.representative, roles) if shift is not None else None
+    across = across_period(boundary, classes.representative, roles) if shift is not None else None
     vectors = corner_vectors(place(boundary.facets))
-    labels = _surface_labels(boundary, vectors, roles, feature_angle_deg, across)
+    labels = surface_labels(boundary, vectors, roles, feature_angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
     fan_facet[fans.fan] = fans.facet
@@ -187,7 +187,7 @@ def find_tracks(
     return Tracks(tracks, of_node, bool(curved))
 
 
-def _across_period(
+def across_period(
     boundary: Boundary, representative: IntArray, roles: Mapping[str, str]
 ) -> IntArray:
     """Return pairs (j, 2) of facets, not of periodic markers, that meet only by images."""
@@ -208,7 +208,7 @@ def _role_numbers(boundary: Boundary, roles: Mapping[str, str]) -> IntArray:
     return np.array(given, np.int64)[boundary.marker]
 
 
-def _surface_labels(
+def surface_labels(
     boundary: Boundary,
     vectors: FloatArray,
     roles: Mapping[str, str],
@@ -272,6 +272,12 @@ def as_simplices(sides: FloatArray) -> FloatArray:
         return sides
     quad = sides[np.any(sides[:, 2] != sides[:, 3], axis=1)]
     return np.concatenate([sides[:, :3], quad[:, [0, 2, 3]]])
+
+
+def simplex_vectors(simplices: FloatArray) -> FloatArray:
+    """Return normals (m, d), of any length, of triangles (m, 3, 3) or segments (m, 2, 2)."""
+    flat = simplices.shape[1] == 2
+    return corner_vectors(simplices if flat else simplices[:, [0, 1, 2, 2]])
 
 
 def _bends(vectors: FloatArray, either_way: bool = False) -> bool:

@@ -40,6 +40,7 @@ from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
 from slideviz.session.state import Session, StepFrame
+from slideviz.solver.rims import rims_key
 from slideviz.solver.zones import check_motions
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
@@ -127,7 +128,8 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     case = session.case
     roles = tuple(sorted(case.roles.items()))
     around = case.span, case.periodic_type, case.axis, case.origin, case.interfaces
-    return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around)
+    rims = case.rims, case.feature_angle_deg
+    return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around, *rims)
 
 
 def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
@@ -165,7 +167,10 @@ def prepare_spans(case: Case, mesh: Mesh) -> None:
 
 def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
-    laid = tuple(motion for motion in session.case.motions if isinstance(motion, Onto))
+    case = session.case
+    laid: tuple[object, ...] = tuple(one for one in case.motions if isinstance(one, Onto))
+    if case.rims == "slide":
+        laid = *laid, rims_key(case)
     same = (session.intersection, session.folding, session.laid) == (*found, laid)
     if same or intersection_key(session) != key:
         return session

@@ -25,6 +25,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import marker_zones
 from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
+from slideviz.solver.rims import are_ready, on_walls
 from slideviz.system.atomic import atomic_write
 
 PLACEHOLDER = Path("table")
@@ -338,7 +339,8 @@ class Ghosts:
 
         A displacement file that cannot be read, or a missing box, moves nothing here; the checks
         before a run report it. Motions onto surfaces take seconds: without ``wait`` they move
-        nothing until their displacement is known (`slideviz.session.jobs.find_intersection`).
+        nothing until their displacement is known (`slideviz.session.jobs.find_intersection`), and
+        rims stay on their walls (RIMS= SLIDE) from when these are.
         """
         on = {
             name: self._nodes[name]
@@ -359,7 +361,19 @@ class Ghosts:
             files |= placed_displacements(case, self.mesh, on)
         points = self.mesh.points
         moved = moved_together(case.motions, points, on, files)
+        with suppress(SlidevizError):
+            if on and (wait or are_ready(case, self.mesh)):
+                moved = self._on_walls(case, on, moved)
         return {name: points[nodes] + moved[name] for name, nodes in on.items()}
+
+    def _on_walls(
+        self, case: Case, on: Mapping[str, IntArray], moved: Mapping[str, FloatArray]
+    ) -> dict[str, FloatArray]:
+        """Return displacements (k, d) of the nodes of each boundary with rims on their walls."""
+        nodes, first = np.unique(np.concatenate(list(on.values())), return_index=True)
+        together = Displacements(nodes, np.concatenate(list(moved.values()))[first])
+        kept = on_walls(case, self.mesh, together)
+        return {name: kept.at(nodes) for name, nodes in on.items()}
 
     def _read(self, motion: model.FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
         # A file for several boundaries may list the nodes of each of them.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.case.check import effective
-from slideviz.case.model import Case, Motion
+from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
@@ -140,8 +140,9 @@ class Session:
     folding: str = ""
     """A sentence on moving boundaries that cross themselves, with which a run can start; or
     empty."""
-    laid: tuple[Motion, ...] = ()
-    """The motions onto surfaces whose displacement is computed: until then they have no ghost."""
+    laid: tuple[object, ...] = ()
+    """What ghosts wait for and is computed: the motions onto surfaces, and for which roles rims
+    stay on their walls."""
     invalid: tuple[tuple[PanelPlace, str], ...] = ()
     """tuple of (PanelPlace, str): fields whose text is not valid, so that the case still has the
     value before: the panel, and a sentence. No run starts meanwhile."""

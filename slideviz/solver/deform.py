@@ -255,7 +255,7 @@ def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
     Direct sliding has one system for each axis if normals are along axes. Where boundaries are
     curved, it solves a further one, for all boundary nodes.
     """
-    goal = setup.coords[setup.known] + setup.target
+    goal = setup.goal(setup.target, 1.0)
     problem = problem_at(setup, setup.coords, goal)
     label, moves = problem.reach
     moves = moves | lasting

@@ -7,6 +7,7 @@ with cells of a height of 1e-6 between the two.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
 
@@ -36,6 +37,7 @@ STRAY = 10.0
 """A node strays where it goes more than this times as far as the farthest boundary node."""
 
 OFF_WALL = 1e-3  # part of the span by which sliding nodes may leave hub or shroud
+NOISE = 1e-6  # part of the size of what moves by which its nodes may leave a wall: digits of a file
 
 HOPELESS = 0.1
 """A system was not solved where its solution misses the displacement of a control node by more than
@@ -168,14 +170,59 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
 
 
 def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> list[str]:
-    """Return warnings that nodes left a sliding hub or shroud, where blades move over the span.
+    """Return warnings that nodes left a wall that they should be on.
 
-    They may be off it as its undeformed facets are, and `OFF_WALL`. ``points`` (n, d): deformed.
+    These are nodes of moving boundaries that they share with sliding or internal ones; and, where
+    blades move over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
     """
-    warnings = list[str]()
+    off_span, off_walls = _off_span(setup, case, mesh, points), _off_walls(setup, mesh, points)
+    return [
+        f"node {mesh.number(off.node)} of {off.boundary} at "
+        f"({', '.join(f'{value:.6g}' for value in points[off.node])}) has left {off.wall} by "
+        f"{off.distance:.3g}{off.why}"
+        for off in (*off_span, *off_walls)
+    ]
+
+
+@dataclass(frozen=True)
+class _OffWall:
+    """The node that is farthest from a wall."""
+
+    node: int
+    boundary: str  # that has it
+    wall: str
+    distance: float  # in the mesh's length unit
+    why: str  # the rest of the sentence, with the remedy
+
+
+def _off_walls(setup: Setup, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
+    """Yield for each wall with a rim the node of that which is farthest off."""
+    rims = setup.rims
+    if rims is None:
+        return
+    least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
+    for wall in rims.walls:
+        nodes = rims.nodes[rims.rim[wall.rows]]
+        off = rims.off(wall, points[nodes])
+        k = int(np.argmax(off))
+        if off[k] > wall.bulge + least:
+            names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
+            remedy = "; RIMS= SLIDE keeps such nodes on it"
+            if rims.hold:
+                remedy = ", to which it cannot be brought back; move it less"
+            yield _OffWall(
+                int(nodes[k]), " and ".join(names), " and ".join(wall.names), float(off[k]), remedy
+            )
+
+
+def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
+    """Yield for hub and shroud of a span the node that is farthest off, if they slide.
+
+    Nodes may be off as the undeformed facets are, and `OFF_WALL`.
+    """
     field, boundary = setup.span, setup.boundary
     if field is None:
-        return warnings
+        return
     for end, name in enumerate(span_ends(case, mesh)):
         if setup.roles.get(name) != "sliding":
             continue
@@ -188,19 +235,15 @@ def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> l
             for x in (coords, field.meridional(middles.reshape(-1, 3)))
         )
         allowed = float(of_facets.max()) + OFF_WALL
-        if off.max(initial=0.0) > allowed:
-            k = int(np.argmax(off))
+        k = int(np.argmax(off))
+        if off[k] > allowed:
             far = abs(float(field.distances(coords[[k]])[end][0][0]))
-            where = ", ".join(f"{value:.6g}" for value in points[nodes[k]])
             remedy = f"refine {name}" if field.revolved else "let no periodic side cut the blade"
             why = f"where the blade stood, its shape is not known; move the blade less, or {remedy}"
             if nodes[k] in setup.classes.moving:
                 why = "the blade's motions do not add up to one along it; use those over the span"
-            warnings.append(
-                f"node {mesh.number(int(nodes[k]))} of {name} at ({where}) has left this boundary "
-                f"by {far:.3g}, {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
-            )
-    return warnings
+            why = f", {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
+            yield _OffWall(int(nodes[k]), name, "this boundary", far, why)
 
 
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
@@ -246,7 +289,8 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
             "DATA_REDUCTION= YES"
         )
     pair = sorted((int(nodes[k]), int(nodes[others[k]])))
-    named = " and ".join(f"{mesh.number(node)} ({_boundaries(setup, node)})" for node in pair)
+    at = [f"{mesh.number(node)} ({', '.join(_names_at(setup, node))})" for node in pair]
+    named = " and ".join(at)
     return (
         f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
         "smooth function cannot follow; let the boundary that stays go along (role moving, "
@@ -255,6 +299,6 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     )
 
 
-def _boundaries(setup: Setup, node: int) -> str:
+def _names_at(setup: Setup, node: int) -> list[str]:
     mine = (setup.boundary.facets == node).any(axis=1)
-    return ", ".join(setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine]))
+    return [setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine])]

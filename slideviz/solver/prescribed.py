@@ -16,8 +16,10 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.rbf.images import ImageDisplacements, require_free
+from slideviz.rbf.rims import Rims
 from slideviz.solver.domain import Domain, find_classes, roles_of_copies
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
+from slideviz.solver.rims import displaced_on, on_walls
 
 APART = 100.0
 """Allowed difference of the displacements of images over the largest displacement, divided by their
@@ -113,12 +115,16 @@ def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str |
 
 def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     """Return the `motion_messages` of a case of one zone before it runs."""
-    moved = displaced(displacements(case, mesh), mesh)
+    moved = on_walls(case, mesh, displaced(displacements(case, mesh), mesh))
     return motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
 
 
 def prescribe(
-    case: Case, mesh: Mesh, domain: Domain, moved: Displacements | None = None
+    case: Case,
+    mesh: Mesh,
+    domain: Domain,
+    moved: Displacements | None = None,
+    rims: Rims | None = None,
 ) -> BoundaryConditions:
     """Return what a case prescribes at the moving and fixed nodes of a domain.
 
@@ -126,12 +132,13 @@ def prescribe(
     DeformError if no node is moving or fixed, or images are asked to move differently.
     ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
     motions.
+    ``rims``: those that are kept on their walls after each step; checks are made with them there.
     """
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
     moved = moved or displaced(displacements(case, mesh), mesh)
     classes, frame = domain.classes, domain.frame
     case = case.change(roles=domain.roles)
-    problem, folded = motion_messages(case, mesh, moved)
+    problem, folded = motion_messages(case, mesh, displaced_on(rims, mesh, moved))
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
     known = np.concatenate([classes.moving, classes.fixed])

@@ -25,9 +25,12 @@ from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
+from slideviz.rbf.operations import moved_by
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
+from slideviz.rbf.rims import Keep, Rims
+from slideviz.rbf.tape import Array, multiply, put, take
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.layers import layer_zone
 from slideviz.solver.prescribed import (
@@ -37,6 +40,7 @@ from slideviz.solver.prescribed import (
     prescribe,
     support_radius,
 )
+from slideviz.solver.rims import find_rims
 
 if TYPE_CHECKING:
     from slideviz.elastic.conditions import Body
@@ -152,6 +156,7 @@ class Setup(Domain):
     span: SpanField | None  # along which blades move; None: they do not
     solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
     zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
+    rims: Rims | None  # nodes that moving boundaries share with walls; None: there are none
     fitted_radius: float  # the support radius that fits the motion, whatever the case says
     relaxation: Relaxation | None = None
     """What relaxes the last step; None where RELAX has no effect."""
@@ -179,6 +184,21 @@ class Setup(Domain):
         halo = self.halo
         outside = halo is not None and ~np.isin(halo.receivers, self.images)
         return np.flatnonzero(outside)
+
+    def goal(self, target: Array, part: float, keep: Keep | None = None) -> Array:
+        """Return the coordinates (..., a, d) of known nodes after a part of their displacement.
+
+        With the rims on their walls (RIMS= SLIDE) after each part, where walls are curved, too.
+        ``target`` (..., a, d): the whole displacement, in the frame.
+        ``keep``: of derivatives, as of `Rims.kept`.
+        """
+        goal = moved_by(self.coords[self.known], multiply(target, np.array([[part]])))
+        if self.rims is None:
+            return goal
+        rows = np.arange(len(self.rims.nodes))  # known nodes begin with those that move
+        moving = take(goal, rows)
+        kept = self.rims.kept(moving, keep)
+        return goal if kept is moving else put(goal, rows, kept)
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return nodes (q,) and unit normals (q, d) along which sliding nodes may not move.
@@ -234,10 +254,17 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     require_one_zone(mesh, "a setup")
     require_valid(case, mesh)
     domain = find_domain(case, mesh)
-    return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved))
+    rims = find_rims(case, mesh, domain)
+    return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved, rims), rims)
 
 
-def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditions) -> Setup:
+def setup_of(
+    case: Case,
+    mesh: Mesh,
+    domain: Domain,
+    conditions: BoundaryConditions,
+    rims: Rims | None = None,
+) -> Setup:
     """Return the setup of a deformation of a domain for what is prescribed on it."""
     case = case.change(roles=domain.roles)
     candidates = _candidates(domain.classes, conditions.known)
@@ -283,6 +310,7 @@ def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditi
         span=span,
         solve=_method(case, mesh, frame, axis),
         zone=layer_zone(case, mesh, domain, conditions.known),
+        rims=rims,
         fitted_radius=fitted_radius(case, mesh, conditions.moved),
         relaxation=relaxation_of(case, mesh, frame, axis),
     )

@@ -82,7 +82,7 @@ class Stepping:
             total = index + len(ahead)
             at = index + 1, total
             timer = PhaseTimer(lambda *now, at=at: self.report(Progress(*at, *now)), seconds)
-            goal = setup.coords[setup.known] + setup.target * part
+            goal = value(setup.goal(setup.target, part))
             solution = one_step(setup.at_step(len(ahead) == 1), coords, goal, timer, before)
             moved = displaced_coords(setup, coords, value(solution.displacement), goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)

@@ -25,6 +25,7 @@ from slideviz.mesh.zones import join_zones, names_from, names_in, with_zones
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.prescribed import check_motion
+from slideviz.solver.rims import on_walls
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.terms import Role
 
@@ -60,7 +61,8 @@ class InterfaceMotion:
         self._zone = {n: k for k, part in enumerate(mesh.zone_parts) for n in names_in(mesh, part)}
         asked = [each for each in self.interfaces if self.roles.get(each.marker) == "moving"]
         for index in self.moving(range(len(self.cases))):
-            moved = displacements(self._alone[index], mesh.zone_parts[index].mesh)
+            alone, zone = self._alone[index], mesh.zone_parts[index].mesh
+            moved = on_walls(alone, zone, displacements(alone, zone))
             shift = np.zeros_like(mesh.points)
             shift[mesh.zone_parts[index].points][moved.nodes] = moved.vectors
             self._lead(index, shift, asked, range(len(self.cases)))

@@ -269,7 +269,8 @@ class _ZoneRuns:
             pairs = np.empty((0, 2), np.int64)
             boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
             setup = replace(setup, boundary=boundary)
-            lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+            no_tracks = Tracks((), setup.tracks.of_node[:0], setup.tracks.curved)
+            lean = replace(setup, tracks=no_tracks, rims=None)
             give_back()
 
             def rate(steps: Sequence[Step]) -> Quality:

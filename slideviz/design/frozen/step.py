@@ -23,10 +23,10 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf import tape
 from slideviz.rbf.field import share
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.loops import add_correction, keep_undeformed, shift
+from slideviz.rbf.loops import add_correction, keep_undeformed
 from slideviz.rbf.methods import IMAGES, ROUNDING, correction_of
 from slideviz.rbf.operations import coords as coords_of
-from slideviz.rbf.operations import points
+from slideviz.rbf.operations import moved_by, points
 from slideviz.rbf.problem import Levels, PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import projection_matrices
 from slideviz.rbf.tape import Array, Variable, value
@@ -188,7 +188,7 @@ class FrozenStep:
         ``out`` (..., n, d): where the coordinates are written, if nothing is a variable.
         """
         setup = self.setup
-        goal = _shifted(setup.coords[setup.known], tape.multiply(target, np.array([[self.part]])))
+        goal = setup.goal(target, self.part, partial(self.choices, "rims"))
         run = _Run(self, before.coords, out)
         solution = one_step(setup, before.coords, goal, _SILENT, before.solution, run)
         displacement = solution.displacement
@@ -201,7 +201,7 @@ class FrozenStep:
             held[:2] = 0.0
             still = tape.multiply(tape.take(displacement, on), held[None])
             displacement = tape.put(displacement, on, still, overwrite=True)
-        moved = _shifted(before.coords, displacement, overwrite=True)
+        moved = moved_by(before.coords, displacement, overwrite=True)
         moved = tape.put(moved, setup.known, goal, overwrite=True)
         return StepState(moved, replace(solution, displacement=np.empty((0, 0))))
 
@@ -217,7 +217,7 @@ class FrozenStep:
         donor, start = self.mesh.points[donors], self.mesh.points[copies]
         follow = tape.transform(halo.rotations[rows], tape.take(at, donors) - donor)
         overwrite = at is not moved
-        at = tape.put(at, copies, _shifted(start, follow), overwrite=overwrite)
+        at = tape.put(at, copies, moved_by(start, follow), overwrite=overwrite)
         return tape.put(
             moved, copies, coords_of(frame, tape.take(at, copies)), overwrite=overwrite
         ), at
@@ -345,13 +345,6 @@ def _plus_unless_rounding(slid: Array, away: Array, least: float) -> Array:
     off = value(away)
     off = np.where(np.abs(off).max(axis=-1, keepdims=True) <= least, 0.0, off)
     return slid + (replace(away, value=off) if isinstance(away, Variable) else off)
-
-
-def _shifted(start: Array, by: Array, *, overwrite: bool = False) -> Array:
-    """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
-    x, u = value(start), value(by)
-    out = shift(x, u if overwrite else u.copy())
-    return tape.recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
 def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> Array:

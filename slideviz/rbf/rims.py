@@ -1,0 +1,310 @@
+"""Rims: nodes that moving boundaries share with walls, put back on these, with the rows beside.
+
+A rim goes to the closest point of its wall, or of all its walls at once where several meet. The
+other nodes of its body, a connected part of the moving boundaries, follow smoothly: they take the
+correction of the rim, continued harmonically over the body, times a share. The share falls from 1
+at the rim to 0 at the nodes farthest from it, with a slope of 0 at both: so the rows beside the rim
+go with it nearly as they are, and what is far from all walls has the motion that is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
+from slideviz.mesh.topology import TINY, unit, vertex_normals
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.projection import projection_matrices, simplex_vectors
+from slideviz.rbf.tape import Array, Variable, recorded, take, transform, value
+
+ROUNDING = 1e-13
+"""Part of the largest coordinate by which a rim may be off its wall and stays where it is: so a
+motion along the wall changes no bit."""
+ROUNDS = 30  # most steps to where several walls meet; on flat ones the first gets there
+ENOUGH = 1e-15  # part of the largest coordinate: a shorter step is the last one
+PARALLEL = 1e-6  # walls count as one where the sine of the angle between them is below this
+STEEPEST = 1e6  # largest weight of the side of a triangle, where its opposite angle is very thin
+BULGE = 0.25
+"""Distance of a smooth wall from an edge of its facets, over the edge times the difference of the
+normals at its ends: twice the 1/8 of an arc, since normals at nodes are estimates."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A smooth surface, in 2D a curve, that nodes of a rim are on."""
+
+    names: tuple[str, ...]  # its boundaries that have the nodes
+    rows: IntArray  # (k,): these nodes, as places in the rim
+    surface: ClosestPoints
+    bulge: float  # how far nodes on it may be off its facets
+
+    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
+        closest, which = self.surface.nearest(at)
+        return closest, projection_matrices(self.surface.simplices(which), at, closest)
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenRim:
+    """Where a rim is at a reference, and its closest points on the walls, linear around it."""
+
+    at: FloatArray
+    closest: FloatArray
+    """`at`, `closest` (r, d)."""
+    slopes: FloatArray  # (r, d, d): of the closest points by ``at``
+
+
+Keep = Callable[[Callable[[], FrozenRim]], FrozenRim]
+"""Returns what its argument returned when it was called first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The connected moving boundaries that have rims, as a graph; periodic images are one place."""
+
+    edges: IntArray  # (e, 2): places
+    weights: FloatArray  # (e,): of the edges in the Laplacian
+    rim: IntArray  # (r,): the places of the rim
+    share: FloatArray  # (b,): of the correction that each place takes
+
+    @cached_property
+    def inner(self) -> IntArray:
+        """Return the places (i,) that are not in the rim."""
+        return np.setdiff1d(np.arange(len(self.share)), self.rim)
+
+    @cached_property
+    def harmonic(self) -> tuple[Callable[[FloatArray], FloatArray], Any]:
+        """Return the inverse of the Laplacian at the inner places, and its columns of the rim."""
+        from scipy.sparse import coo_array, diags_array
+        from scipy.sparse.linalg import splu
+
+        count, (one, two) = len(self.share), self.edges.T
+        links = coo_array((self.weights, (one, two)), (count, count)).tocsr()
+        links = links + links.T
+        rows = (diags_array(links.sum(axis=1)) - links).tocsr()[self.inner]
+        # Symmetric, positive definite: no pivots, and the order of least degree.
+        factor = splu(
+            rows[:, self.inner].tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return factor.solve, rows[:, self.rim]
+
+    def spread(self, of_rim: FloatArray) -> FloatArray:
+        """Return the correction (..., b, d) of all places, of that of the rim (..., r, d)."""
+        ahead, dim = of_rim.shape[:-2], of_rim.shape[-1]
+        out = np.zeros((*ahead, len(self.share), dim))
+        out[..., self.rim, :] = of_rim
+        if len(self.inner) and of_rim.any():
+            solve, columns = self.harmonic
+            inner = solve(-(columns @ _wide(of_rim)))
+            out[..., self.inner, :] = _narrow(self.share[self.inner, None] * inner, ahead, dim)
+        return out
+
+    def gathered(self, adjoint: FloatArray) -> FloatArray:
+        """Return the transpose of `spread`, (..., r, d), of an adjoint (..., b, d)."""
+        ahead, dim = adjoint.shape[:-2], adjoint.shape[-1]
+        out = adjoint[..., self.rim, :]
+        if len(self.inner):
+            solve, columns = self.harmonic
+            inner = solve(self.share[self.inner, None] * _wide(adjoint[..., self.inner, :]))
+            out = out - _narrow(columns.T @ inner, ahead, dim)
+        return out
+
+
+def _wide(x: FloatArray) -> FloatArray:
+    """Return x (..., n, d) with the columns of all arrays side by side, (n, k)."""
+    return np.ascontiguousarray(np.moveaxis(x, -2, 0).reshape(x.shape[-2], -1))
+
+
+def _narrow(wide: FloatArray, ahead: tuple[int, ...], dim: int) -> FloatArray:
+    """Return the arrays (..., n, d) of what `_wide` returns."""
+    return np.moveaxis(wide.reshape(len(wide), *ahead, dim), 0, -2)
+
+
+@dataclass(frozen=True, eq=False)
+class Rims:
+    """The rims of all moving nodes, in a frame.
+
+    Of periodic images only the one that represents them is in a rim; all have its correction.
+    """
+
+    frame: Frame
+    nodes: IntArray  # (m,): the moving nodes, ascending
+    start: FloatArray  # (m, d): their undeformed coordinates
+    stands: IntArray  # (m,): for each the place of the one that represents its images
+    rim: IntArray  # (r,): those of the rim, as places among them
+    walls: tuple[Wall, ...]
+    bodies: Bodies
+    place: IntArray  # (m,): the place of each in the bodies; -1: its body has no rim
+    hold: bool  # whether rims are put back on their walls (RIMS= SLIDE)
+
+    @cached_property
+    def walls_of(self) -> IntArray:
+        """Return the number of walls of each node of the rim, (r,)."""
+        rows = np.concatenate([wall.rows for wall in self.walls])
+        return np.bincount(rows, minlength=len(self.rim))
+
+    def off(self, wall: Wall, points: FloatArray) -> FloatArray:
+        """Return the distances (k,) of the nodes of a wall from it, now at Cartesian points (k, d).
+
+        Of those that are on other walls, too, from the plane of the wall: where they leave
+        another, this one ends.
+        """
+        at = self.frame.coords(points)
+        closest, which = wall.surface.nearest(at)
+        normals = unit(simplex_vectors(wall.surface.simplices(which)))
+        across = np.abs(np.einsum("kd,kd->k", at - closest, normals))
+        gaps = np.linalg.norm(self.frame.points(closest) - points, axis=1)
+        return np.where(self.walls_of[wall.rows] > 1, across, gaps)
+
+    @property
+    def least(self) -> float:
+        """Return the length up to which a correction is rounding."""
+        return ROUNDING * largest_coordinate(self.start)
+
+    def kept(self, at: Array, keep: Keep | None = None) -> Array:
+        """Return the coordinates (..., m, d) of the moving nodes with their rims on the walls.
+
+        ``at`` (..., m, d): where they would be without. ``keep``: of derivatives.
+        """
+        if not self.hold:
+            return at
+        here = take(at, self.rim)
+        if keep is None:
+            off: Array = self.closest(value(here))[0] - value(here)
+        else:
+            frozen = keep(lambda: FrozenRim(value(here), *self.closest(value(here))))
+            moved = here - frozen.at
+            off = transform(frozen.slopes, moved) - moved + (frozen.closest - frozen.at)
+        exact = value(off)
+        exact = np.where(np.abs(exact).max(axis=-1, keepdims=True) <= self.least, 0.0, exact)
+        if isinstance(off, Variable):
+            off = Variable(exact, off.tape, off.place)
+        elif not exact.any():
+            return at
+        else:
+            off = exact
+        more = self._spread(off)
+        x, by = value(at), value(more)
+        # Adding zero would turn -0.0 into 0.0.
+        return recorded(np.where(by == 0.0, x, x + by), (at, _same, _same), (more, _same, _same))
+
+    def _spread(self, of_rim: Array) -> Array:
+        there = np.flatnonzero(self.place >= 0)
+        place, count, size = self.place[there], len(self.place), len(self.bodies.share)
+
+        def spread(x: FloatArray) -> FloatArray:
+            out = np.zeros((*x.shape[:-2], count, x.shape[-1]))
+            out[..., there, :] = self.bodies.spread(x)[..., place, :]
+            return out
+
+        def gathered(g: FloatArray) -> FloatArray:
+            out = np.zeros((*g.shape[:-2], size, g.shape[-1]))
+            np.add.at(out, (..., place, slice(None)), g[..., there, :])  # type: ignore[arg-type]
+            return self.bodies.gathered(out)
+
+        return recorded(spread(value(of_rim)), (of_rim, spread, gathered))
+
+    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the closest points (r, d) on the walls, and their derivatives (r, d, d).
+
+        ``at`` (r, d): the coordinates of the rim. Where several walls meet, Newton's method goes to
+        a point that is on all of them: each time to the closest one of their tangent planes.
+        """
+        count, dim = at.shape
+        closest, slopes = at.copy(), np.zeros((count, dim, dim))
+        for wall in self.walls:
+            rows = wall.rows[self.walls_of[wall.rows] == 1]
+            closest[rows], slopes[rows] = wall.closest(at[rows])
+        corners, enough = np.flatnonzero(self.walls_of > 1), ENOUGH * largest_coordinate(self.start)
+        for _ in range(ROUNDS if len(corners) else 0):
+            across, ways = self._across(closest)
+            across, ways = across[corners], ways[corners]
+            inverse = np.linalg.pinv(across, rcond=PARALLEL)
+            step = np.einsum("cdq,cq->cd", inverse, ways)
+            closest[corners] += step
+            slopes[corners] = np.eye(dim) - inverse @ across
+            if np.abs(step).max() <= enough:
+                break
+        return closest, slopes
+
+    def _across(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return for nodes of several walls the parts of a step across them, and those needed.
+
+        They are (r, q, d) and (r, q), zero where a node has fewer walls than others, or one.
+        """
+        count, dim = at.shape
+        across = np.zeros((count, int(self.walls_of.max()), dim, dim))
+        ways, filled = np.zeros(across.shape[:3]), np.zeros(count, np.int64)
+        for wall in self.walls:
+            rows = wall.rows[self.walls_of[wall.rows] > 1]
+            closest, slopes = wall.closest(at[rows])
+            across[rows, filled[rows]] = np.eye(dim) - slopes
+            ways[rows, filled[rows]] = closest - at[rows]
+            filled[rows] += 1
+        return across.reshape(count, -1, dim), ways.reshape(count, -1)
+
+    def displaced(self, nodes: IntArray, points: FloatArray, vectors: FloatArray) -> FloatArray:
+        """Return Cartesian displacements (k, d) after which rims are on their walls.
+
+        ``nodes`` (k,): of those that move, ``points`` (k, d) undeformed and Cartesian.
+        ``vectors`` (k, d): their displacements; images that are not among them move alike.
+        """
+        place = np.searchsorted(self.nodes, nodes).clip(max=len(self.nodes) - 1)
+        rows = np.flatnonzero(self.nodes[place] == nodes)[::-1]  # of images the first one counts
+        shift = np.zeros_like(self.start)
+        shift[self.stands[place[rows]]] = self.frame.difference(points[rows], vectors[rows])
+        at = self.start + shift[self.stands]
+        now = value(self.kept(at))
+        rows = rows[(now != at)[place[rows]].any(axis=1)]
+        out, change = vectors.copy(), place[rows]
+        out[rows] += self.frame.points(now[change]) - self.frame.points(at[change])
+        return out
+
+
+def _same(x: FloatArray) -> FloatArray:
+    return x
+
+
+def bulge_of(coords: FloatArray, facets: IntArray) -> float:
+    """Return how far a smooth surface through nodes (n, d) may be off its facets (f, k)."""
+    nodes, normals = vertex_normals(coords, facets)
+    one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    ends = (unit(normals)[np.searchsorted(nodes, end)] for end in (one, two))
+    first, second = ends
+    off = np.einsum("ed,ed->e", coords[two] - coords[one], second - first)
+    return BULGE * float(np.abs(off).max(initial=0.0))
+
+
+def side_weights(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the edges (e, 2) of facets (f, k), and their weights (e,) in a Laplacian.
+
+    ``points`` (n, d), Cartesian. In 2D an edge weighs as the inverse of its length, in 3D as half
+    the cotangent of the angle opposite to it in a triangle, if that is positive (U. Pinkall and
+    K. Polthier, Computing discrete minimal surfaces and their conjugates, 1993). A quadrilateral is
+    the mean of both its divisions into triangles. Edges occur once for each triangle.
+    """
+    if facets.shape[1] == 2:
+        length = np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1)
+        return facets, 1.0 / np.maximum(length, TINY)
+    quads = facets[:, 2] != facets[:, 3]
+    halves = [np.roll(facets[quads], -k, axis=1)[:, :3] for k in range(4)]
+    triangles = np.concatenate([facets[~quads, :3], *halves])
+    parts = np.where(np.arange(len(triangles)) < np.count_nonzero(~quads), 0.5, 0.25)
+    edges, weights = [], []
+    for k in range(3):
+        tip, one, two = np.roll(triangles, -k, axis=1).T
+        a, b = points[one] - points[tip], points[two] - points[tip]
+        sine = np.maximum(np.linalg.norm(np.cross(a, b), axis=1), TINY)
+        cotangent = np.einsum("td,td->t", a, b) / sine
+        edges.append(np.stack([one, two], axis=1))
+        weights.append(parts * np.clip(cotangent, 0.0, STEEPEST))
+    return np.concatenate(edges), np.concatenate(weights)

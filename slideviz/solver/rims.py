@@ -1,0 +1,221 @@
+"""The rims of a case: nodes that moving boundaries share with walls, which they leave or stay on.
+
+Walls are boundaries that slide, or are internal. A wall is as smooth surfaces continue, over
+boundaries of any role but moving and periodic ones: what is on it may go from one to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, SpanMotion, applies_to
+from slideviz.case.spans import moves_over_span, span_ends
+from slideviz.case.zones import each_zone
+from slideviz.mesh.fans import components
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.topology import corner_vectors, unit
+from slideviz.rbf.classify import MERGE_FRACTION
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.frames import corners
+from slideviz.rbf.projection import across_period, as_simplices, surface_labels, surface_rim
+from slideviz.rbf.rims import Bodies, Rims, Wall, bulge_of, side_weights
+from slideviz.solver.domain import Domain, find_domain
+from slideviz.terms import Role
+
+WALLS: tuple[Role, ...] = ("sliding", "internal")  # roles of boundaries that rims are on
+
+_RIMS: WeakKeyDictionary[Mesh, dict[object, Rims | None]] = WeakKeyDictionary()
+
+
+def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
+    """Return the rims of a case; None where no moving boundary shares nodes with a wall.
+
+    Those that move over the span alone are not among them on hub and shroud: they stay on these by
+    their motion.
+    """
+    boundary, moving = domain.boundary, domain.classes.moving
+    roles = np.array([domain.roles.get(name, "fixed") for name in boundary.names], object)
+    is_moving = np.zeros(len(mesh.points), bool)
+    is_moving[moving] = True
+    facets = np.isin(roles[boundary.marker].astype(str), WALLS)
+    facets &= is_moving[boundary.facets].any(axis=1)
+    facet, column = np.nonzero(facets[:, None] & is_moving[boundary.facets])
+    node = boundary.facets[facet, column]
+    keep = domain.once(node) & ~domain.axis[node] & ~_over_span(case, mesh, domain, node, facet)
+    facet, node = facet[keep], node[keep]
+    if not len(node):
+        return None
+    rim, walls = _walls(case, domain, is_moving, node, facet)
+    stands = np.searchsorted(moving, domain.classes.representative[moving])
+    of_moving = boundary.facets[roles[boundary.marker] == "moving"]
+    place, bodies = _bodies(mesh, of_moving, moving, stands, rim)
+    return Rims(
+        frame=domain.frame,
+        nodes=moving,
+        start=domain.coords[moving],
+        stands=stands,
+        rim=rim,
+        walls=walls,
+        bodies=bodies,
+        place=place,
+        hold=case.rims == "slide",
+    )
+
+
+def _over_span(
+    case: Case, mesh: Mesh, domain: Domain, node: IntArray, facet: IntArray
+) -> np.ndarray:
+    """Return which pairs (p,) of a node and a facet of a wall need no check: blades along a hub."""
+    out = np.zeros(len(node), bool)
+    if not moves_over_span(case):
+        return out
+    boundary, other = domain.boundary, np.zeros(len(mesh.points), bool)
+    for name in case.markers_with("moving"):
+        motions = [motion for motion in case.motions if applies_to(motion, name)]
+        if not all(isinstance(motion, SpanMotion) for motion in motions):
+            other[mesh.marker(name).nodes] = True
+    ends = [boundary.names.index(name) for name in span_ends(case, mesh)]
+    return np.isin(boundary.marker[facet], ends) & ~other[node]
+
+
+def _walls(
+    case: Case, domain: Domain, is_moving: np.ndarray, node: IntArray, facet: IntArray
+) -> tuple[IntArray, tuple[Wall, ...]]:
+    """Return the rim (r,), as places among the moving nodes, and the walls that its nodes are on.
+
+    ``node`` and ``facet`` (p,): pairs of a node of the rim and a facet of a wall there.
+    """
+    boundary, frame, axis = domain.boundary, domain.frame, domain.axis
+    place = partial(corners, domain.coords, axis=axis)
+    apart = ("moving", "periodic")
+    roles = {n: r if r in apart else "sliding" for n, r in domain.roles.items()}
+    roles = {name: roles.get(name, "sliding") for name in boundary.names}
+    shift = frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None
+    across = None
+    if shift is not None:
+        across = across_period(boundary, domain.classes.representative, roles)
+    vectors = corner_vectors(place(boundary.facets))
+    labels = surface_labels(boundary, vectors, roles, case.feature_angle_deg, across)
+    rim = np.unique(node)
+    groups: dict[tuple[int, ...], list[int]] = {}
+    merge = np.cos(np.radians(case.feature_angle_deg * MERGE_FRACTION))
+    for one, chosen in _surfaces(node, labels[facet], unit(vectors)[facet], float(merge)):
+        groups.setdefault(chosen, []).append(one)
+    walls = []
+    for chosen, nodes in groups.items():
+        member = np.isin(labels, chosen)
+        some = boundary.facets[member]
+        of_rim = np.isin(node, nodes) & member[facet]
+        names = [boundary.names[k] for k in np.unique(boundary.marker[facet[of_rim]])]
+        tree = ClosestPoints(
+            as_simplices(place(some)), shift, surface_rim(boundary, member, is_moving, place)
+        )
+        rows = np.searchsorted(rim, sorted(nodes))
+        walls.append(Wall(tuple(names), rows, tree, bulge_of(domain.coords, some)))
+    return np.searchsorted(domain.classes.moving, rim), tuple(walls)
+
+
+def _surfaces(
+    node: IntArray, label: IntArray, normal: FloatArray, merge: float
+) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Yield each node with the labels of a wall that it is on, once for each wall.
+
+    Surfaces whose normals at the node have a cosine above ``merge`` are one wall: a blade that
+    divides a hub has it on both sides. ``node``, ``label`` (p,), ``normal`` (p, d): of each pair of
+    a node and a facet.
+    """
+    pairs, group = np.unique(np.stack([node, label], axis=1), axis=0, return_inverse=True)
+    normals = np.zeros((len(pairs), normal.shape[1]))
+    np.add.at(normals, group.reshape(-1), normal)
+    normals = unit(normals)
+    starts = np.flatnonzero(np.r_[True, pairs[1:, 0] != pairs[:-1, 0]])
+    for first, last in zip(starts, np.r_[starts[1:], len(pairs)], strict=True):
+        if last == first + 1:
+            yield int(pairs[first, 0]), (int(pairs[first, 1]),)
+            continue
+        alike = normals[first:last] @ normals[first:last].T > merge
+        wall = components(last - first, *np.nonzero(alike))
+        for k in range(wall.max() + 1):
+            yield int(pairs[first, 0]), tuple(pairs[first:last, 1][wall == k].tolist())
+
+
+def _bodies(
+    mesh: Mesh, facets: IntArray, moving: IntArray, stands: IntArray, rim: IntArray
+) -> tuple[IntArray, Bodies]:
+    """Return the place in a body of each moving node, (m,), -1 for none, and the bodies with rims.
+
+    ``facets`` (f, k): of the moving boundaries. ``moving``, ``stands`` (m,), ``rim`` (r,): as of
+    `Rims`.
+    """
+    from scipy.spatial import cKDTree  # takes long to load
+
+    edges, weights = side_weights(mesh.points, facets)
+    edges = stands[np.searchsorted(moving, edges)]
+    body = components(len(moving), *edges.T)[stands]
+    with_rim = np.isin(body, body[rim])
+    kept = with_rim[edges[:, 0]]
+    places, place = np.unique(np.where(with_rim, stands, -1), return_inverse=True)
+    place = place.reshape(-1) - int(places[0] < 0)
+    at = mesh.points[moving[with_rim]]
+    of_rim = np.isin(stands[with_rim], rim)
+    distance = np.full(int(place.max()) + 1, np.inf)
+    np.minimum.at(distance, place[with_rim], cKDTree(at[of_rim]).query(at)[0])
+    reach = np.zeros(len(moving))
+    np.maximum.at(reach, body[with_rim], distance[place[with_rim]])
+    near = np.zeros_like(distance)
+    near[place[with_rim]] = reach[body[with_rim]]
+    near = 1.0 - distance / np.where(near > 0.0, near, 1.0)
+    share = near**2 * (3.0 - 2.0 * near)
+    return place, Bodies(place[edges[kept]], weights[kept], place[rim], share)
+
+
+def rims_key(case: Case) -> object:
+    """Return what the rims of a mesh depend on."""
+    period = case.periodic, case.periodic_type, case.axis, case.origin
+    motions = case.motions if moves_over_span(case) else ()
+    return tuple(case.roles.items()), *period, case.sliding, case.feature_angle_deg, motions
+
+
+def are_ready(case: Case, mesh: Mesh) -> bool:
+    """Return whether `on_walls` needs no time: rims are free, or were found for this mesh."""
+    if case.rims == "free" or not mesh.zone_parts:
+        return case.rims == "free" or rims_key(case) in _RIMS.get(mesh, {})
+    return all(are_ready(one, zone) for one, zone in each_zone(case, mesh))
+
+
+def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
+    """Return the displacements with the rims that a case keeps on their walls (RIMS= SLIDE).
+
+    They are found once for the roles of a mesh. Raises MeshError as `find_domain`.
+    """
+    if mesh.zone_parts:
+        vectors = moved.vectors.copy()
+        for part, (one, zone) in zip(mesh.zone_parts, each_zone(case, mesh), strict=True):
+            first = part.points.start
+            here = slice(*np.searchsorted(moved.nodes, [first, part.points.stop]))
+            mine = Displacements(moved.nodes[here] - first, moved.vectors[here])
+            vectors[here] = on_walls(one, zone, mine).vectors
+        return replace(moved, vectors=vectors)
+    if case.rims == "free":
+        return moved
+    known, key = _RIMS.setdefault(mesh, {}), rims_key(case)
+    if key not in known:
+        rims = find_rims(case, mesh, find_domain(case, mesh))
+        if rims is not None:
+            _ = rims.bodies.harmonic  # takes time: not in the thread that draws ghosts
+        known[key] = rims
+    return displaced_on(known[key], mesh, moved)
+
+
+def displaced_on(rims: Rims | None, mesh: Mesh, moved: Displacements) -> Displacements:
+    """Return the displacements with rims on their walls, if there are any that are kept there."""
+    if rims is None or not rims.hold:
+        return moved
+    vectors = rims.displaced(moved.nodes, mesh.points[moved.nodes], moved.vectors)
+    return replace(moved, vectors=vectors)
