@@ -79,7 +79,7 @@ class Bodies:
         return np.setdiff1d(np.arange(len(self.share)), self.rim)
 
     @cached_property
-    def harmonic(self) -> tuple[Callable[[FloatArray], FloatArray], Any]:
+    def _harmonic(self) -> tuple[Callable[[FloatArray], FloatArray], Any]:
         """Return the inverse of the Laplacian at the inner places, and its columns of the rim."""
         from scipy.sparse import coo_array, diags_array
         from scipy.sparse.linalg import splu
@@ -97,13 +97,17 @@ class Bodies:
         )
         return factor.solve, rows[:, self.rim]
 
+    def prepare(self) -> None:
+        """Compute what `spread` keeps."""
+        self.spread(np.ones((len(self.rim), 1)))
+
     def spread(self, of_rim: FloatArray) -> FloatArray:
         """Return the correction (..., b, d) of all places, of that of the rim (..., r, d)."""
         ahead, dim = of_rim.shape[:-2], of_rim.shape[-1]
         out = np.zeros((*ahead, len(self.share), dim))
         out[..., self.rim, :] = of_rim
         if len(self.inner) and of_rim.any():
-            solve, columns = self.harmonic
+            solve, columns = self._harmonic
             inner = solve(-(columns @ _wide(of_rim)))
             out[..., self.inner, :] = _narrow(self.share[self.inner, None] * inner, ahead, dim)
         return out
@@ -113,7 +117,7 @@ class Bodies:
         ahead, dim = adjoint.shape[:-2], adjoint.shape[-1]
         out = adjoint[..., self.rim, :]
         if len(self.inner):
-            solve, columns = self.harmonic
+            solve, columns = self._harmonic
             inner = solve(self.share[self.inner, None] * _wide(adjoint[..., self.inner, :]))
             out = out - _narrow(columns.T @ inner, ahead, dim)
         return out

@@ -208,7 +208,7 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
     if key not in known:
         rims = find_rims(case, mesh, find_domain(case, mesh))
         if rims is not None:
-            _ = rims.bodies.harmonic  # takes time: not in the thread that draws ghosts
+            rims.bodies.prepare()  # takes time: not in the thread that draws ghosts
         known[key] = rims
     return displaced_on(known[key], mesh, moved)
 
