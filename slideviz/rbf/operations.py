@@ -80,7 +80,7 @@ def _converted(
     return _turned(x, convert(flat(rows)).reshape(rows.shape), lambda: slopes_of(frame, rows))
 
 
-def moved_by(start: Array, by: Array, *, overwrite: bool = False) -> Array:
+def add_displacement(start: Array, by: Array, *, overwrite: bool = False) -> Array:
     """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
     x, u = value(start), value(by)
     out = shift(x, u if overwrite else u.copy())

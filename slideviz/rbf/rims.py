@@ -36,7 +36,7 @@ normals at its ends: twice the 1/8 of an arc, since normals at nodes are estimat
 
 
 @dataclass(frozen=True, eq=False)
-class Wall:
+class RimWall:
     """A smooth surface, in 2D a curve, that nodes of a rim are on."""
 
     names: tuple[str, ...]  # its boundaries that have the nodes
@@ -143,9 +143,9 @@ class Rims:
     frame: Frame
     nodes: IntArray  # (m,): the moving nodes, ascending
     start: FloatArray  # (m, d): their undeformed coordinates
-    stands: IntArray  # (m,): for each the place of the one that represents its images
+    representative: IntArray  # (m,): for each the place of the one that represents its images
     rim: IntArray  # (r,): those of the rim, as places among them
-    walls: tuple[Wall, ...]
+    walls: tuple[RimWall, ...]
     bodies: Bodies
     place: IntArray  # (m,): the place of each in the bodies; -1: its body has no rim
     hold: bool  # whether rims are put back on their walls (RIMS= SLIDE)
@@ -156,7 +156,7 @@ class Rims:
         rows = np.concatenate([wall.rows for wall in self.walls])
         return np.bincount(rows, minlength=len(self.rim))
 
-    def off(self, wall: Wall, points: FloatArray) -> FloatArray:
+    def off(self, wall: RimWall, points: FloatArray) -> FloatArray:
         """Return the distances (k,) of the nodes of a wall from it, now at Cartesian points (k, d).
 
         Of those that are on other walls, too, from the plane of the wall: where they leave
@@ -174,7 +174,7 @@ class Rims:
         """Return the length up to which a correction is rounding."""
         return ROUNDING * largest_coordinate(self.start)
 
-    def kept(self, at: Array, keep: Keep | None = None) -> Array:
+    def projected(self, at: Array, keep: Keep | None = None) -> Array:
         """Return the coordinates (..., m, d) of the moving nodes with their rims on the walls.
 
         ``at`` (..., m, d): where they would be without. ``keep``: of derivatives.
@@ -265,9 +265,9 @@ class Rims:
         place = np.searchsorted(self.nodes, nodes).clip(max=len(self.nodes) - 1)
         rows = np.flatnonzero(self.nodes[place] == nodes)[::-1]  # of images the first one counts
         shift = np.zeros_like(self.start)
-        shift[self.stands[place[rows]]] = self.frame.difference(points[rows], vectors[rows])
-        at = self.start + shift[self.stands]
-        now = value(self.kept(at))
+        shift[self.representative[place[rows]]] = self.frame.difference(points[rows], vectors[rows])
+        at = self.start + shift[self.representative]
+        now = value(self.projected(at))
         rows = rows[(now != at)[place[rows]].any(axis=1)]
         out, change = vectors.copy(), place[rows]
         out[rows] += self.frame.points(now[change]) - self.frame.points(at[change])

@@ -218,16 +218,19 @@ def _off_walls(setup: Setup, mesh: Mesh, points: FloatArray) -> Iterator[_OffWal
 def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
     """Yield for hub and shroud of a span the node that is farthest off, if they slide.
 
-    Nodes may be off as the undeformed facets are, and `OFF_WALL`.
+    Nodes may be off as the undeformed facets are, and `OFF_WALL`. Those of `_off_walls` are not
+    among them.
     """
-    field, boundary = setup.span, setup.boundary
+    field, boundary, rims = setup.span, setup.boundary, setup.known[:0]
     if field is None:
         return
+    if setup.rims is not None:
+        rims = setup.rims.nodes[setup.rims.rim]
     for end, name in enumerate(span_ends(case, mesh)):
         if setup.roles.get(name) != "sliding":
             continue
         facets = boundary.facets[boundary.marker == boundary.names.index(name)]
-        nodes = np.unique(facets)
+        nodes = np.setdiff1d(facets, rims)
         middles = 0.5 * (mesh.points[facets[:, :3]] + mesh.points[facets[:, [1, 2, 0]]])
         coords = field.meridional(points[nodes])
         off, of_facets = (
@@ -240,8 +243,6 @@ def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Itera
             far = abs(float(field.distances(coords[[k]])[end][0][0]))
             remedy = f"refine {name}" if field.revolved else "let no periodic side cut the blade"
             why = f"where the blade stood, its shape is not known; move the blade less, or {remedy}"
-            if nodes[k] in setup.classes.moving:
-                why = "the blade's motions do not add up to one along it; use those over the span"
             why = f", {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
             yield _OffWall(int(nodes[k]), name, "this boundary", far, why)
 

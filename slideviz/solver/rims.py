@@ -24,7 +24,7 @@ from slideviz.rbf.classify import MERGE_FRACTION
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import corners
 from slideviz.rbf.projection import across_period, as_simplices, surface_labels, surface_rim
-from slideviz.rbf.rims import Bodies, Rims, Wall, bulge_of, side_weights
+from slideviz.rbf.rims import Bodies, Rims, RimWall, bulge_of, side_weights
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.terms import Role
 
@@ -52,14 +52,14 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
     if not len(node):
         return None
     rim, walls = _walls(case, domain, is_moving, node, facet)
-    stands = np.searchsorted(moving, domain.classes.representative[moving])
+    representative = np.searchsorted(moving, domain.classes.representative[moving])
     of_moving = boundary.facets[roles[boundary.marker] == "moving"]
-    place, bodies = _bodies(mesh, of_moving, moving, stands, rim)
+    place, bodies = _bodies(mesh, of_moving, moving, representative, rim)
     return Rims(
         frame=domain.frame,
         nodes=moving,
         start=domain.coords[moving],
-        stands=stands,
+        representative=representative,
         rim=rim,
         walls=walls,
         bodies=bodies,
@@ -86,7 +86,7 @@ def _over_span(
 
 def _walls(
     case: Case, domain: Domain, is_moving: np.ndarray, node: IntArray, facet: IntArray
-) -> tuple[IntArray, tuple[Wall, ...]]:
+) -> tuple[IntArray, tuple[RimWall, ...]]:
     """Return the rim (r,), as places among the moving nodes, and the walls that its nodes are on.
 
     ``node`` and ``facet`` (p,): pairs of a node of the rim and a facet of a wall there.
@@ -117,7 +117,7 @@ def _walls(
             as_simplices(place(some)), shift, surface_rim(boundary, member, is_moving, place)
         )
         rows = np.searchsorted(rim, sorted(nodes))
-        walls.append(Wall(tuple(names), rows, tree, bulge_of(domain.coords, some)))
+        walls.append(RimWall(tuple(names), rows, tree, bulge_of(domain.coords, some)))
     return np.searchsorted(domain.classes.moving, rim), tuple(walls)
 
 
@@ -146,24 +146,24 @@ def _surfaces(
 
 
 def _bodies(
-    mesh: Mesh, facets: IntArray, moving: IntArray, stands: IntArray, rim: IntArray
+    mesh: Mesh, facets: IntArray, moving: IntArray, representative: IntArray, rim: IntArray
 ) -> tuple[IntArray, Bodies]:
     """Return the place in a body of each moving node, (m,), -1 for none, and the bodies with rims.
 
-    ``facets`` (f, k): of the moving boundaries. ``moving``, ``stands`` (m,), ``rim`` (r,): as of
-    `Rims`.
+    ``facets`` (f, k): of the moving boundaries.
+    ``moving``: the nodes of `Rims`, which has ``representative`` and ``rim``, too.
     """
     from scipy.spatial import cKDTree  # takes long to load
 
     edges, weights = side_weights(mesh.points, facets)
-    edges = stands[np.searchsorted(moving, edges)]
-    body = components(len(moving), *edges.T)[stands]
+    edges = representative[np.searchsorted(moving, edges)]
+    body = components(len(moving), *edges.T)[representative]
     with_rim = np.isin(body, body[rim])
     kept = with_rim[edges[:, 0]]
-    places, place = np.unique(np.where(with_rim, stands, -1), return_inverse=True)
+    places, place = np.unique(np.where(with_rim, representative, -1), return_inverse=True)
     place = place.reshape(-1) - int(places[0] < 0)
     at = mesh.points[moving[with_rim]]
-    of_rim = np.isin(stands[with_rim], rim)
+    of_rim = np.isin(representative[with_rim], rim)
     distance = np.full(int(place.max()) + 1, np.inf)
     np.minimum.at(distance, place[with_rim], cKDTree(at[of_rim]).query(at)[0])
     reach = np.zeros(len(moving))

@@ -25,7 +25,7 @@ from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
-from slideviz.rbf.operations import moved_by
+from slideviz.rbf.operations import add_displacement
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
@@ -190,14 +190,14 @@ class Setup(Domain):
 
         With the rims on their walls (RIMS= SLIDE) after each part, where walls are curved, too.
         ``target`` (..., a, d): the whole displacement, in the frame.
-        ``keep``: of derivatives, as of `Rims.kept`.
+        ``keep``: of derivatives, as of `Rims.projected`.
         """
-        goal = moved_by(self.coords[self.known], multiply(target, np.array([[part]])))
+        goal = add_displacement(self.coords[self.known], multiply(target, np.array([[part]])))
         if self.rims is None:
             return goal
         rows = np.arange(len(self.rims.nodes))  # known nodes begin with those that move
         moving = take(goal, rows)
-        kept = self.rims.kept(moving, keep)
+        kept = self.rims.projected(moving, keep)
         return goal if kept is moving else put(goal, rows, kept)
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -77,7 +77,7 @@ def test_a_new_case_has_other_values_than_a_file_without_keys_and_saves_them(pas
     pairs = find_pairs(mesh)
     case = guess_case(mesh, guess_roles(mesh, pairs), pairs)
     differ = {f.name for f in fields(Case) if getattr(case, f.name) != getattr(usual, f.name)}
-    new = {"relax", "layers", "repair", "sliding", "steps", "periodic", "roles"}
+    new = {"rims", "relax", "layers", "repair", "sliding", "steps", "periodic", "roles"}
     assert new <= differ <= new | {"axis", "origin"}
     assert (case.relax, case.layers, case.repair, case.sliding) == ("auto", "auto", "auto", "ps")
     assert (case.steps, case.periodic) == (5, "moving")

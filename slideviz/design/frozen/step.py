@@ -25,8 +25,8 @@ from slideviz.rbf.field import share
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.loops import add_correction, keep_undeformed
 from slideviz.rbf.methods import IMAGES, ROUNDING, correction_of
+from slideviz.rbf.operations import add_displacement, points
 from slideviz.rbf.operations import coords as coords_of
-from slideviz.rbf.operations import moved_by, points
 from slideviz.rbf.problem import Levels, PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import projection_matrices
 from slideviz.rbf.tape import Array, Variable, value
@@ -201,7 +201,7 @@ class FrozenStep:
             held[:2] = 0.0
             still = tape.multiply(tape.take(displacement, on), held[None])
             displacement = tape.put(displacement, on, still, overwrite=True)
-        moved = moved_by(before.coords, displacement, overwrite=True)
+        moved = add_displacement(before.coords, displacement, overwrite=True)
         moved = tape.put(moved, setup.known, goal, overwrite=True)
         return StepState(moved, replace(solution, displacement=np.empty((0, 0))))
 
@@ -217,7 +217,7 @@ class FrozenStep:
         donor, start = self.mesh.points[donors], self.mesh.points[copies]
         follow = tape.transform(halo.rotations[rows], tape.take(at, donors) - donor)
         overwrite = at is not moved
-        at = tape.put(at, copies, moved_by(start, follow), overwrite=overwrite)
+        at = tape.put(at, copies, add_displacement(start, follow), overwrite=overwrite)
         return tape.put(
             moved, copies, coords_of(frame, tape.take(at, copies)), overwrite=overwrite
         ), at
