@@ -9,8 +9,9 @@ the wall nodes i near it (at X_i, displaced by d_i, turned by M_i) would carry i
 
 where h is the height of the first layer at the nearest wall node,
 smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the `NEAREST` nodes of the wall that see the node:
-s_i rises from 0 to 1 with the cosine of the angle between the wall's normal and X - X_i, so that
-the two sides of a thin body do not mix. Of several walls k, j whose zones overlap each has the
+s_i rises from 0 to 1 with the cosine of the angle between X - X_i and the normal of a facet at X_i,
+of its facets the one nearest to X - X_i, so that the two sides of a thin body do not mix, and both
+see their common sharp edge. Of several walls k, j whose zones overlap each has the
 weight b / distance^6, 1 - b is the product of theirs, and b_k is
 (1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap thinner than the zones the
 nodes between are left to the radial functions.
@@ -28,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.mesh.axis_frame import axis_basis
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, offsets_of
 from slideviz.mesh.topology import TINY, corner_vectors
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
@@ -50,6 +51,7 @@ from slideviz.rbf.tape import (
     unit,
     value,
 )
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
@@ -111,9 +113,10 @@ class WallNodes:
     origin: IntArray  # (s,): the place here of the node that each source is, or is an image of
     turn: FloatArray | None
     """(s, d, d): rotations from it to the source; None: images are only shifted."""
-    places: FloatArray
+    places: FloatArray  # (s, d): the undeformed Cartesian points of the sources
     normals: FloatArray
-    """`places`, `normals` (s, d): of the sources, undeformed, Cartesian; normals into the mesh."""
+    """(k, d): the undeformed Cartesian unit normals of the facets at the sources, into the mesh."""
+    offsets: IntArray  # (s + 1,): the normals at source i are offsets[i] to offsets[i + 1]
 
     @cached_property
     def _trees(self) -> list[tuple[cKDTree, ClosestPoints]]:
@@ -238,16 +241,16 @@ class WallNodes:
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
         tree, (_, at, _) = self._trees[k][0], self.walls[k]
-        count = min(CANDIDATES, tree.n)
+        count, facing = min(CANDIDATES, tree.n), (self.places, self.normals, self.offsets)
         nearest = np.empty((len(targets), count), np.int64)
         weight = np.empty((len(targets), count))
 
         def find(part: slice) -> None:
             found = tree.query(targets[part], k=count)
             gap, index = (np.reshape(x, (-1, count)) for x in found)
-            gap = np.maximum(gap, TINY)
-            away = targets[part][:, None] - self.places[at][index]
-            cosine = np.einsum("mcd,mcd->mc", away, self.normals[at][index]) / gap
+            gap, cosine = np.maximum(gap, TINY), np.empty(gap.shape)
+            source = at.start + index
+            _largest_cosines(targets[part], source, gap, *facing, cosine)
             seen = smooth((cosine + GRAZING) / (2.0 * GRAZING))
             seen[~(seen > 0.0).any(axis=1)] = 1.0
             w = seen * (gap[:, :1] / gap) ** POWER * _faded(gap, seen > 0.0, count < tree.n)
@@ -255,6 +258,23 @@ class WallNodes:
 
         in_parts(find, len(targets))
         return nearest, weight
+
+
+@njit(**OPTIONS)
+def _largest_cosines(targets, source, gap, places, normals, offsets, out):  # type: ignore[no-untyped-def]
+    """Write the cosines (m, c) between the ways to points (m, d) and the nearest normals.
+
+    ``source`` and ``gap`` (m, c): of each point some sources, and its distances from them.
+    """
+    for m in range(len(source)):
+        for c in range(source.shape[1]):
+            s, largest = source[m, c], -np.inf
+            for k in range(offsets[s], offsets[s + 1]):
+                along = 0.0
+                for d in range(targets.shape[1]):
+                    along += (targets[m, d] - places[s, d]) * normals[k, d]
+                largest = max(largest, along)
+            out[m, c] = largest / gap[m, c]
 
 
 def _shared(parts: list[Reached]) -> list[Reached]:
@@ -338,10 +358,9 @@ def wall_nodes(
     origin = np.concatenate(rows)
     at = coords[which[origin]] + by[:, None] * frame.shift()
     sources = frame.points(at)
-    normals = np.zeros_like(sources)
-    for _, _, images in parts:
-        for corner in images.T:
-            np.add.at(normals, corner, -corner_vectors(sources[images]))
+    images = np.concatenate([images for _, _, images in parts])
+    at_corners = np.repeat(-corner_vectors(sources[images]), images.shape[1], axis=0)
+    order = np.argsort(images, axis=None, kind="stable")
     none = np.empty((0, 2 if frame.dim == 2 else 4), np.int64)
     return WallNodes(
         frame=frame,
@@ -352,7 +371,8 @@ def wall_nodes(
         origin=origin,
         turn=_turns(frame, by) if frame.cylindrical and len(shifts) > 1 else None,
         places=sources,
-        normals=unit_rows(normals),
+        normals=unit_rows(at_corners[order]),
+        offsets=offsets_of(np.bincount(images.reshape(-1), minlength=len(sources))),
     )
 
 
