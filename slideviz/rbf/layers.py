@@ -11,10 +11,10 @@ where h is the height of the first layer at the nearest wall node,
 smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the `NEAREST` nodes of the wall that see the node:
 s_i rises from 0 to 1 with the cosine of the angle between X - X_i and the normal of a facet at X_i,
 of its facets the one nearest to X - X_i, so that the two sides of a thin body do not mix, and both
-see their common sharp edge. Of several walls k, j whose zones overlap each has the
-weight b / distance^6, 1 - b is the product of theirs, and b_k is
-(1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap thinner than the zones the
-nodes between are left to the radial functions.
+see their common sharp edge. There each side has its own M_i; those that see X share the weight.
+Of several walls k, j whose zones overlap each has the weight b / distance^6, 1 - b is the product
+of theirs, and b_k is (1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap
+thinner than the zones the nodes between are left to the radial functions.
 All of this is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
 the map of the directions of the facets at the wall node (lines in 2D, normals and edges in 3D).
 """
@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.mesh.axis_frame import axis_basis
-from slideviz.mesh.model import FloatArray, IntArray, offsets_of
+from slideviz.mesh.model import FloatArray, IntArray, offsets_of, ranges
 from slideviz.mesh.topology import TINY, corner_vectors
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
@@ -89,6 +89,9 @@ class Wall:
 
     names: tuple[str, ...]  # the boundaries that it consists of
     facets: IntArray  # (f, 2 or 4): its facets, nodes ordered so that normals point out of the mesh
+    sides: IntArray
+    """(f, 2 or 4): numbers of the smooth sides of the wall at its nodes: at a sharp edge a node has
+    several, each of which turns by itself."""
     thickness: float  # of its zone, in the mesh's length unit
     first: FloatArray
     """(w,): at its nodes, ascending, the height of the first layer, which is wholly in the zone."""
@@ -101,15 +104,17 @@ Reached = tuple[IntArray, FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class WallNodes:
-    """The nodes of all walls, and the sources: these and their periodic images."""
+    """The nodes of all walls, once for each side, and the sources: these and their images."""
 
     frame: Frame
     known: IntArray
-    """(w,): the nodes, by their places among the known nodes; nodes of two walls are here twice."""
+    """(w,): the nodes, by their places among the known nodes; those of two walls, or on a sharp
+    edge, are here twice."""
     start: FloatArray  # (w, d): undeformed Cartesian points
     facets: IntArray  # (f, 2 or 4): of moving walls, by places of nodes here
-    walls: tuple[tuple[Wall, slice, IntArray], ...]
-    """Each wall, with its sources, and its facets and their images by places of sources."""
+    walls: tuple[tuple[Wall, IntArray, IntArray], ...]
+    """Each wall, with the places (u + 1,) where the sources of each of its u nodes and images
+    begin, and its facets and their images by places of sources."""
     origin: IntArray  # (s,): the place here of the node that each source is, or is an image of
     turn: FloatArray | None
     """(s, d, d): rotations from it to the source; None: images are only shifted."""
@@ -123,8 +128,8 @@ class WallNodes:
         from scipy.spatial import cKDTree  # takes long to load
 
         return [
-            (cKDTree(self.places[at]), ClosestPoints(as_simplices(self.places[facets])))
-            for _, at, facets in self.walls
+            (cKDTree(self.places[begins[:-1]]), ClosestPoints(as_simplices(self.places[facets])))
+            for _, begins, facets in self.walls
         ]
 
     @cached_property
@@ -196,11 +201,9 @@ class WallNodes:
         for k, part in enumerate(parts):
             left = outside[part[0]] < 1.0  # where two walls are as near, none may have a share
             some, each = part[0][left], part[3][left]
-            nearest, carrier = self._carriers(k, targets[some])
-            carrier *= (each * (1.0 - outside[some]) / weight[some])[:, None]
-            row, column = np.nonzero(carrier)
-            source = self.walls[k][1].start + nearest[row, column]
-            found.append((place[some[row]], source, carrier[row, column]))
+            row, source, carrier = self._carriers(k, targets[some])
+            carrier *= (each * (1.0 - outside[some]) / weight[some])[row]
+            found.append((place[some[row]], source, carrier))
         rows, columns, values = (np.concatenate(each) for each in zip(*found, strict=True))
         arm = values[:, None] * (targets[hit[rows]] - self.places[columns])
         (total, dim), count = self.places.shape, len(hit)
@@ -238,43 +241,68 @@ class WallNodes:
         gap = np.maximum(gap, np.maximum(1e-9 * limit, TINY))
         return some, gap, share, (limit / gap) ** POWER
 
-    def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
-        tree, (_, at, _) = self._trees[k][0], self.walls[k]
-        count, facing = min(CANDIDATES, tree.n), (self.places, self.normals, self.offsets)
+    def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return which points (m, d) which sources of wall k carry, and their weights, all (c,)."""
+        tree, begins = self._trees[k][0], self.walls[k][1]
+        count, facets = min(CANDIDATES, tree.n), self.offsets[begins]
         nearest = np.empty((len(targets), count), np.int64)
         weight = np.empty((len(targets), count))
 
         def find(part: slice) -> None:
             found = tree.query(targets[part], k=count)
             gap, index = (np.reshape(x, (-1, count)) for x in found)
-            gap, cosine = np.maximum(gap, TINY), np.empty(gap.shape)
-            source = at.start + index
-            _largest_cosines(targets[part], source, gap, *facing, cosine)
-            seen = smooth((cosine + GRAZING) / (2.0 * GRAZING))
+            seen = self._seen(targets[part], begins[index], (facets[index], facets[index + 1]))
             seen[~(seen > 0.0).any(axis=1)] = 1.0
+            gap = np.maximum(gap, TINY)
             w = seen * (gap[:, :1] / gap) ** POWER * _faded(gap, seen > 0.0, count < tree.n)
             nearest[part], weight[part] = index, w / w.sum(axis=1, keepdims=True)
 
         in_parts(find, len(targets))
-        return nearest, weight
+        point, column = np.nonzero(weight)
+        node = nearest[point, column]
+        sides = begins[node + 1] - begins[node]
+        source, carrier = ranges(begins[node], sides), np.repeat(weight[point, column], sides)
+        point, edge = np.repeat(point, sides), np.flatnonzero(np.repeat(sides > 1, sides))
+        # Of the sides of an edge, those that see the point carry it.
+        own = source[edge, None]
+        seen = self._seen(targets[point[edge]], own, (self.offsets[own], self.offsets[own + 1]))
+        group = np.repeat(np.arange(len(node)), sides)[edge]
+        total = np.bincount(group, seen[:, 0], len(node))[group]
+        alike = 1.0 / sides[group]
+        carrier[edge] *= np.where(
+            total > 0.0, seen[:, 0] / np.where(total > 0.0, total, 1.0), alike
+        )
+        return point, source, carrier
+
+    def _seen(
+        self, targets: FloatArray, source: IntArray, facets: tuple[IntArray, IntArray]
+    ) -> FloatArray:
+        """Return how well sources (m, c) see points (m, d): from 0, not at all, to 1.
+
+        ``facets``: begins and ends (m, c) of the normals of each among ``normals``.
+        """
+        cosine = np.empty(source.shape)
+        _largest_cosines(targets, self.places, source, *facets, self.normals, cosine)
+        return smooth((cosine + GRAZING) / (2.0 * GRAZING))
 
 
 @njit(**OPTIONS)
-def _largest_cosines(targets, source, gap, places, normals, offsets, out):  # type: ignore[no-untyped-def]
-    """Write the cosines (m, c) between the ways to points (m, d) and the nearest normals.
+def _largest_cosines(targets, places, source, begin, end, normals, out):  # type: ignore[no-untyped-def]
+    """Write the cosines (m, c) of the angle from sources (m, c) to points (m, d), and a normal.
 
-    ``source`` and ``gap`` (m, c): of each point some sources, and its distances from them.
+    Of the normals ``begin`` to ``end`` (m, c) of each source, the nearest one.
     """
     for m in range(len(source)):
         for c in range(source.shape[1]):
-            s, largest = source[m, c], -np.inf
-            for k in range(offsets[s], offsets[s + 1]):
+            s, largest, squared = source[m, c], -np.inf, 0.0
+            for d in range(targets.shape[1]):
+                squared += (targets[m, d] - places[s, d]) ** 2
+            for k in range(begin[m, c], end[m, c]):
                 along = 0.0
                 for d in range(targets.shape[1]):
                     along += (targets[m, d] - places[s, d]) * normals[k, d]
                 largest = max(largest, along)
-            out[m, c] = largest / gap[m, c]
+            out[m, c] = largest / max(np.sqrt(squared), TINY)
 
 
 def _shared(parts: list[Reached]) -> list[Reached]:
@@ -343,13 +371,16 @@ def wall_nodes(
     nodes, facets, rows, parts, corners = [], [], [], [], []
     first = begin = 0
     for wall in walls:
-        some, local = np.unique(wall.facets, return_inverse=True)
-        local = local.reshape(wall.facets.shape)
+        most = int(wall.sides.max()) + 1
+        keys, local = np.unique(wall.facets * most + wall.sides, return_inverse=True)
+        some, local = keys // most, local.reshape(wall.facets.shape)
+        heads = np.flatnonzero(np.r_[True, some[1:] != some[:-1]])
         if wall.moves:
             facets.append(first + local)
         images = np.concatenate([begin + k * len(some) + local for k in range(len(shifts))])
         size = len(shifts) * len(some)
-        parts.append((wall, slice(begin, begin + size), images))
+        begins = [begin + k * len(some) + heads for k in range(len(shifts))]
+        parts.append((wall, np.r_[(*begins, begin + size)], images))
         rows.append(np.tile(first + np.arange(len(some)), len(shifts)))
         corners.append(np.repeat(shifts, len(some)))
         nodes.append(some)

@@ -45,6 +45,10 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
     rise = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
     length = size if mesh.dim == 2 else np.sqrt(size / 2)
+    sides, fans = np.zeros(boundary.facets.shape, np.int64), domain.fans
+    for k, corner in enumerate(boundary.facets.T):
+        at = np.flatnonzero(fans.node == corner[fans.facet])
+        sides[fans.facet[at], k] = fans.fan[at]
     walls = []
     for role in ("moving", "fixed"):
         chosen = np.zeros(len(height), bool)
@@ -66,6 +70,7 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
                 Wall(
                     tuple(boundary.names[m] for m in np.unique(boundary.marker[some])),
                     boundary.facets[some],
+                    sides[some],
                     min(case.layer_thickness, mesh.extent)
                     or min(SIZE * float(extent), float(thickness)),
                     _first_heights(columns, rise, some, height[flat]),
