@@ -29,7 +29,15 @@ from slideviz.mesh.model import FloatArray
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS
-from tools.study.flows import SHAPES, c_mesh, o_mesh, triangle_mesh
+from tools.study.flows import (
+    SHAPES,
+    c_mesh,
+    cusped,
+    joukowski,
+    layered_o_mesh,
+    o_mesh,
+    triangle_mesh,
+)
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
     "rbf": {"relax": "no", "layers": "no"},
@@ -143,6 +151,8 @@ def _outer(mesh: sv.Mesh, body: str, motion: str) -> sv.Case:
 def _motion(mesh: sv.Mesh, body: str, name: str) -> Motion:
     if name.startswith("turned by"):
         return sv.Rotate(body, float(name.split()[2]))
+    if name == "bump at 0.9":
+        return sv.HicksHenne(body, 0.01, 0.9)
     if name in ("turned", "moved", "stretched"):
         points = mesh.points[np.unique(mesh.marker(body).nodes)]
         return _part_motions(float(np.ptp(points, axis=0).max()))[name]
@@ -209,6 +219,11 @@ def contests(folder: Path | None) -> Iterator[Contest]:
     o_layers = lambda: _sample("airfoil", 96, "layers").mesh  # noqa: E731
     yield from _layered_rows("O-mesh", o_layers, "airfoil", ("turned by 30", *shapes), _outer)
     yield from _layered_rows("C-mesh", cache(c_mesh), "airfoil", ("turned by 30", *shapes), _outer)
+    sharp = ("turned by 30", "bump at 0.9", "bent", "thicker 60")
+    for name, outline in (("Joukowski", joukowski), ("cusp", cusped)):
+        o_shape, c_shape = partial(layered_o_mesh, outline), partial(c_mesh, outline, first=2e-6)
+        yield from _layered_rows(f"{name}, O-mesh", cache(o_shape), "airfoil", sharp, _outer)
+        yield from _layered_rows(f"{name}, C-mesh", cache(c_shape), "airfoil", sharp, _outer)
     yield Contest("turbine-row-3d twisted by 10", partial(_own, "turbine-row-3d", None, "motion"))
     yield Contest(
         "turbine-row-3d twisted linearly",

@@ -1,4 +1,4 @@
-"""Meshes of the contest that the samples do not have: a C-mesh, and bodies in outer flows."""
+"""Meshes of the contest that are no samples: airfoils by formula, and bodies in outer flows."""
 
 from __future__ import annotations
 
@@ -16,36 +16,89 @@ FAR = 15.0
 FINE, COARSEN = 0.04, 0.15
 """Length of triangles' edges at the body, in its sizes, and its growth with the distance."""
 FIRST, GROWTH = 2e-4, 1.25
-"""Height of the C-mesh's first cells, as a part of the whole height, and ratio of neighbours."""
+"""Height of a C-mesh's first cells, as a part of the whole height, and ratio of neighbours."""
 LINE, TRIANGLE, QUADRILATERAL = 3, 5, 9
 
 
-def c_mesh(around: int = 120, wake: int = 24) -> sv.Mesh:
-    """Return a C-mesh with layers around a NACA 0012 with a closed trailing edge; its chord is 1.
+Outline = Callable[[FloatArray], FloatArray]
+"""An airfoil of chord 1 as complex points at t (m,) from -1 to 1: from its trailing edge, 1, along
+the lower side to the leading edge, 0, and back along the upper one; about x = t^2."""
+
+
+def naca_0012(t: FloatArray) -> FloatArray:
+    """Return a NACA 0012 with a closed trailing edge, an `Outline`."""
+    x = t**2
+    half = 0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4
+    return x + 0.6j * np.sign(t) * half
+
+
+def joukowski(t: FloatArray) -> FloatArray:
+    """Return a cambered airfoil of Joukowski's, whose trailing edge is a cusp, an `Outline`."""
+    centre = -0.08 + 0.08j
+    zeta = centre + (1.0 - centre) * (2.0 * t**2 - 1.0 + 2.0j * t * np.sqrt(1.0 - t**2))
+    front = 2.0 * centre - 1.0 + 1.0 / (2.0 * centre - 1.0)
+    return (zeta + 1.0 / zeta - front) / (2.0 - front)
+
+
+def cusped(t: FloatArray) -> FloatArray:
+    """Return an airfoil with 4 % of camber, 12 % thick, that ends in a cusp, an `Outline`."""
+    x = t**2
+    return x + 0.16j * x * (1.0 - x) + 0.185j * t * (1.0 - x) ** 1.5
+
+
+FOCUS = 0.5 * 1.1019 * 0.12**2
+"""Half the nose radius of a NACA 0012: the origin of the square roots of a C-mesh."""
+
+
+def c_mesh(
+    outline: Outline = naca_0012, around: int = 120, wake: int = 24, first: float = FIRST
+) -> sv.Mesh:
+    """Return a C-mesh with layers around an airfoil.
 
     It is a sheared grid in the plane of w = sqrt(z - z0), where the airfoil and its wake are nearly
     a straight line. ``around`` and ``wake`` are the numbers of cells around the airfoil and along
-    the wake.
+    the wake; ``first`` is the height of the first cells, as a part of the whole height.
     """
-    t = np.linspace(-1.0, 1.0, around + 1)
-    x = t**2
-    half = 0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4
-    z = x + 0.6j * np.sign(t) * half - 0.5 * 1.1019 * 0.12**2
-    w = np.sqrt(np.abs(z)) * np.exp(0.5j * np.mod(np.angle(z), 2 * np.pi))
-    w[0], w[-1] = -np.abs(w[0]), np.abs(w[-1])
+    z = outline(np.linspace(-1.0, 1.0, around + 1)) - FOCUS
+    z[0] = z[-1]
+    w = np.sqrt(np.abs(z)) * np.exp(0.5j * (np.unwrap(np.angle(z))))
+    w *= np.sign(w[-1].real)
     ratio = _ratio((np.sqrt(FAR) - w[-1].real) / (w[-1] - w[-2]).real, wake)
     behind = w[-1].real + (w[-1] - w[-2]).real * np.cumsum(ratio ** np.arange(1, wake + 1))
     base = np.r_[-behind[::-1], w, behind]
-    steps = FIRST * GROWTH ** np.arange(60)
+    steps = first * GROWTH ** np.arange(80)
     steps = steps[np.cumsum(steps) < 1.0]
     way = np.r_[0.0, np.cumsum(steps)] / steps.sum()
     height = (np.sqrt(FAR) - base.imag)[:, None] * way
-    z = (base[:, None] + 1j * height) ** 2 + 0.5 * 1.1019 * 0.12**2
+    z = (base[:, None] + 1j * height) ** 2 + FOCUS
     number = np.arange(z.size).reshape(z.shape)
     number[-wake - 1 :, 0] = number[wake::-1, 0]  # both sides of the wake are one
     quads = _quads(number)
     body, far = number[wake:-wake, 0], np.r_[number[0], number[1:-1, -1], number[-1, ::-1]]
     return _mesh(z, [(QUADRILATERAL, quads)], {"airfoil": body[::-1], "farfield": far[::-1]})
+
+
+def layered_o_mesh(outline: Outline, around: int = 120, first: float = 1e-5) -> sv.Mesh:
+    """Return an O-mesh with layers around an airfoil: lines along its normals, bent to a circle.
+
+    At a sharp trailing edge one line continues the airfoil. ``first``: height of the first cells.
+    """
+    wall = outline(np.linspace(-1.0, 1.0, around + 1))[:-1]
+    along = np.roll(wall, -1) - wall
+    before = np.roll(along, 1)
+    normal = 1j * before / np.abs(before) * np.exp(0.5j * np.angle(along / before))
+    behind = wall[0] - 0.5 * (wall[1] + wall[-1])
+    normal[0] = behind / np.abs(behind)  # of a cusp, whose two facets fold back on each other
+    height = first * (1.2 ** np.arange(200) - 1.0) / 0.2
+    height = height[height < FAR]
+    part = (height / height[-1]) ** 1.2
+    far = 1.0 + FAR * normal[0] * np.exp(-2j * np.pi * np.arange(around) / around)
+    z = (1.0 - part)[:, None] * (wall + height[:, None] * normal) + part[:, None] * far
+    z = np.c_[z, z[:, :1]].T
+    number = np.arange(z.size).reshape(z.shape)
+    number[-1] = number[0]
+    sides = {"airfoil": number[::-1, 0], "farfield": number[:, -1]}
+    return _mesh(z, [(QUADRILATERAL, _quads(number))], sides)
 
 
 def o_mesh(around: int = 60) -> sv.Mesh:
