@@ -233,6 +233,18 @@ def test_contest_keeps_layers_where_elasticity_stretches_them(tmp_path, capsys):
     assert table[0] == "| mesh and motion | rbf | auto | elastic |"
 
 
+SHARP = [row for row in contest.contests(None) if re.match("Joukowski|cusp", row.name)]
+
+
+def test_layers_at_cusps_are_kept_in_all_motions():
+    assert len(SHARP) == 16
+    for row in SHARP:
+        (found,) = contest.run_row(row, ["auto"])
+        assert 0.99 < found.height_min <= found.height_max < 1.01
+        assert found.angle_deg < 1.0
+        assert found.inverted == 0
+
+
 @pytest.mark.parametrize("shape", ["block", "cross"])
 def test_relaxation_is_better_without_layers(shape):
     rows = [row for row in contest.contests(None) if row.name.startswith(f"{shape} in triangles")]

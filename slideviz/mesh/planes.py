@@ -317,9 +317,9 @@ def line_normals(ways: FloatArray) -> FloatArray:
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    """Return vectors (..., d) at length 1; NaN for those of length 0."""
-    with np.errstate(invalid="ignore"):
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    """Return vectors (..., d) at length 1; NaN for those whose squared length is 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, np.nan)
 
 
 # Random directions (8, d), with no relation to any mesh, that paths in `Planes.separates` go by.

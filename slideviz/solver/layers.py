@@ -18,6 +18,9 @@ from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
 from slideviz.solver.domain import Domain
 
 STEEP = 3.0  # largest first height that is kept, over the median of the wall
+SHARP = -0.25
+"""Cosine between the normals of the sides of a sharp edge, at most: it has an angle below 75°. The
+sides of blunter edges turn as one: nodes that see both would come nearer to the edge else."""
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
@@ -45,10 +48,6 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
     rise = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
     length = size if mesh.dim == 2 else np.sqrt(size / 2)
-    sides, fans = np.zeros(boundary.facets.shape, np.int64), domain.fans
-    for k, corner in enumerate(boundary.facets.T):
-        at = np.flatnonzero(fans.node == corner[fans.facet])
-        sides[fans.facet[at], k] = fans.fan[at]
     walls = []
     for role in ("moving", "fixed"):
         chosen = np.zeros(len(height), bool)
@@ -57,7 +56,7 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
             layered = case.layers == "keep" or 2 * np.count_nonzero(height[mine]) > mine.sum()
             if layered and domain.roles.get(name, "fixed") == role:
                 chosen |= mine
-        facets = boundary.facets[chosen]
+        facets, sides = boundary.facets[chosen], _sides(domain, chosen)
         links = np.concatenate([facets[:, [0, k]] for k in range(1, facets.shape[1])])
         part = components(len(points), *links.T)[facets[:, 0]]
         for label in np.unique(part):
@@ -78,6 +77,29 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
                 )
             )
     return walls
+
+
+def _sides(domain: Domain, chosen: np.ndarray) -> IntArray:
+    """Return the number (f, 2 or 4) of the side of the wall that each corner of a facet belongs to.
+
+    Fans of a node are sides of a sharp edge where their normals differ by more than `SHARP`.
+    ``chosen`` (f,) bool: the facets of walls.
+    """
+    fans, normals = domain.fans, domain.normals
+    order, links, apart = np.unique(fans.fan[chosen[fans.facet]]), [np.empty((2, 0), int)], 1
+    order = order[np.argsort(fans.fan_node[order], kind="stable")]
+    node = fans.fan_node[order]
+    while len(at := np.flatnonzero(node[apart:] == node[: len(node) - apart])):
+        one, two = order[at], order[at + apart]
+        alike = np.einsum("jd,jd->j", normals[one], normals[two]) > SHARP
+        links.append(np.stack([one[alike], two[alike]]))
+        apart += 1
+    side = components(len(fans.fan_node), *np.concatenate(links, axis=1))
+    sides = np.zeros(domain.boundary.facets.shape, np.int64)
+    for k, corner in enumerate(domain.boundary.facets.T):
+        at = np.flatnonzero(fans.node == corner[fans.facet])
+        sides[fans.facet[at], k] = side[fans.fan[at]]
+    return sides
 
 
 def _first_heights(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Prescribed, Rotate, Translate
@@ -13,6 +15,7 @@ from slideviz.solver.setup import make_setup
 from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
 from tests.test_laws import box, box_case, sector, sector_case
+from tools.study.flows import c_mesh, joukowski, layered_o_mesh
 
 pytestmark = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
 
@@ -234,3 +237,98 @@ def test_in_3d_with_nodes_that_slide_on_hub_and_shroud(motion):
     for name in ("hub", "shroud"):
         on = mesh.marker(name).nodes
         assert np.array_equal(last.mesh.points[on, 2], mesh.points[on, 2])
+
+
+def carried(mesh, moved, **changes):
+    """The walls' summary and the number of inverted cells, with layers kept and without."""
+    nodes = np.unique(mesh.marker("airfoil").nodes)
+    motion = Prescribed(nodes, moved(mesh.points[nodes]), "airfoil")
+    case = Case(roles={"airfoil": "moving"}, motions=(motion,), layers="auto", **changes)
+    (*_, last), (*_, plain) = (sv.deform(one, mesh) for one in (case, case.change(layers="no")))
+    inverted = [sv.quality(one.mesh, mesh).inverted for one in (last, plain)]
+    return sv.walls(last.mesh, mesh).summary()["airfoil"], *inverted
+
+
+def lifted(x):
+    return np.stack([0 * x[:, 0], 0.08 * x[:, 0] ** 2], axis=1)
+
+
+def sharp(edge_deg, camber):
+    """A cambered airfoil whose trailing edge has an angle; on one side its facets are shorter."""
+
+    def outline(t):
+        x = np.abs(t) ** np.where(t < 0.0, 1.6, 2.0)
+        wedge = np.tan(np.radians(edge_deg / 2.0)) * x**3 * (1.0 - x)
+        half = 0.185 * np.sqrt(x) * (1.0 - x) ** 1.5 + wedge
+        return x + 1j * (4.0 * camber * x * (1.0 - x) + np.sign(t) * half)
+
+    return outline
+
+
+@pytest.mark.parametrize("outline", [joukowski, sharp(0.0, 0.04)])
+def test_nodes_beside_a_cusp_see_it_from_both_sides(outline):
+    """Though, without sides of its own, the edge has the normal of one side only."""
+    mesh = c_mesh(outline, 80, 16, first=2e-6)
+    wall, inverted, _ = carried(mesh, lifted, feature_angle_deg=180.0)
+    assert inverted == 0
+    assert (
+        0.99 < wall["first_height"]["ratio"]["min"] <= wall["first_height"]["ratio"]["max"] < 1.01
+    )
+    assert wall["angle"]["change"]["max"] < 1.0
+
+
+@given(
+    edge_deg=st.floats(0.0, 20.0),
+    camber=st.floats(-0.05, 0.05),
+    kind=st.sampled_from([c_mesh, layered_o_mesh]),
+    waves=st.lists(st.floats(-0.01, 0.01), min_size=3, max_size=3),
+    thicker=st.floats(-0.3, 0.3),
+)
+@settings(max_examples=20, deadline=None)
+def test_layers_of_cambered_airfoils_are_kept_at_any_trailing_edge(
+    edge_deg, camber, kind, waves, thicker
+):
+    def moved(points):
+        x, y = points.T
+        waved = sum(size * np.cos(k * np.pi * x) for k, size in enumerate(waves, 1))
+        return np.stack([waves[0] * x, waved + thicker * y], axis=1)
+
+    wall, inverted, plain = carried(kind(sharp(edge_deg, camber), 60, first=2e-6), moved)
+    assert inverted <= plain
+    assert (
+        0.99 < wall["first_height"]["ratio"]["min"] <= wall["first_height"]["ratio"]["max"] < 1.01
+    )
+    assert wall["angle"]["change"]["max"] < 1.0
+
+
+def test_the_sides_of_a_sharp_edge_in_3d_turn_by_themselves():
+    """A wing of constant section, thickened and turned between two sliding planes."""
+    flat = c_mesh(sharp(16.0, 0.04), 60, 12, first=2e-6)
+    count, planes = len(flat.points), np.linspace(0.0, 0.4, 5)
+    points = np.concatenate([np.c_[flat.points, np.full(count, z)] for z in planes])
+    quads = flat.cells.connectivity.reshape(-1, 4)
+    hexahedra = [np.c_[quads, quads + count] + k * count for k in range(len(planes) - 1)]
+    sides = {"low": quads[:, ::-1], "high": quads + (len(planes) - 1) * count}
+    for marker in flat.markers:
+        line = marker.cells.connectivity.reshape(-1, 2)
+        strip = np.c_[line, line[:, ::-1] + count]
+        sides[marker.name] = np.concatenate([strip + k * count for k in range(len(planes) - 1)])
+    markers = [Marker(name, Cells.from_blocks([(9, rows)])) for name, rows in sides.items()]
+    mesh = Mesh(points, Cells.from_blocks([(12, np.concatenate(hexahedra))]), tuple(markers))
+
+    def moved(x):
+        return np.stack([-0.2 * x[:, 1], 0.2 * x[:, 0] + 0.5 * x[:, 1], 0.0 * x[:, 2]], axis=1)
+
+    nodes = np.unique(mesh.marker("airfoil").nodes)
+    case = Case(
+        roles={"airfoil": "moving", "low": "sliding", "high": "sliding"},
+        motions=(Prescribed(nodes, moved(mesh.points[nodes]), "airfoil"),),
+        sliding="ps",
+        layers="auto",
+    )
+    *_, last = sv.deform(case, mesh)
+    wall = sv.walls(last.mesh, mesh).summary()["airfoil"]
+    assert (
+        0.99 < wall["first_height"]["ratio"]["min"] <= wall["first_height"]["ratio"]["max"] < 1.01
+    )
+    assert sv.quality(last.mesh, mesh).inverted == 0
