@@ -14,7 +14,7 @@ from slideviz.case.model import Case, SpanMotion, applies_to
 from slideviz.errors import CaseError, MeshError, SlidevizError, nearest
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.gap import bodies
-from slideviz.machine.span import SpanField, find_span
+from slideviz.machine.span import WHOLE, SpanField, find_span
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -62,7 +62,7 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
     Raises CaseError or MeshError where there is none.
     """
     sides, (hub, shroud) = case.markers_with("periodic"), span_ends(case, mesh)
-    axis, origin, period = case.axis, case.origin, 2.0 * np.pi
+    axis, origin, period = case.axis, case.origin, WHOLE
     if sides and mesh.dim == 3:
         inside = without_halo(mesh)[0]
         pair = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)[0]

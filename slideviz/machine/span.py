@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import MeshError
-from slideviz.machine.wall import closed_wall, wall_profile
+from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -43,6 +43,7 @@ from slideviz.system.weak_cache import weak_cache
 NEAR = 1e-7  # part of the distance between the walls, within which a wall's own normal counts
 FACING = 0.3  # least cosine between the directions from hub to shroud at both walls
 AMID = 0.25  # curves begin at a node whose span is so near to the middle
+CUBIC = 3  # the degree of the splines between traced curves, which need one place more
 SPANS = 33  # curves that `SpanCurves` traces
 STEPS, MOST_STEPS = 64, 512
 """Steps of a curve along the extent of the walls, and most steps in each direction."""
@@ -50,6 +51,8 @@ BEND = 0.5  # largest sine of the angle between a wall's normal and the way to i
 NEWTON, EXACT, OFF = 12, 1e-15, 1e-9
 """Most Newton steps to a span, its error that needs no further one, and its largest error."""
 ON_AXIS = 1e-9  # a point nearer to the axis, as a part of the largest radius, has no theta
+
+WHOLE = 2.0 * np.pi  # the period of a mesh that repeats by no rotation
 
 Distances = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -174,7 +177,7 @@ def find_span(
     shroud: str,
     axis: tuple[float, float, float],
     origin: tuple[float, float, float],
-    period: float = 2.0 * np.pi,
+    period: float = WHOLE,
 ) -> SpanField:
     """Return the span between two boundaries of a 3D mesh, whose passages repeat by ``period``.
 
@@ -207,7 +210,16 @@ def _span_between(
         if not len(facets[-1]):
             raise MeshError(f"{mesh.name}: boundary {name!r} has no facets, so there is no span")
     nodes = np.unique(np.concatenate([table.ravel() for table in facets]))
-    x, y, _ = in_axis_frame(mesh.points[nodes], axis, origin).T
+    local = in_axis_frame(mesh.points[nodes], axis, origin)
+    tables = [np.searchsorted(nodes, table) for table in facets]
+    if not period < WHOLE and not turn_about_axis(local, tables):
+        raise MeshError(
+            f"{mesh.name}: hub {hub!r} and shroud {shroud!r} do not turn about the axis "
+            f"{tuple(axis)} through {tuple(origin)}, and a span needs an axis; correct "
+            "PERIODIC_AXIS and PERIODIC_ORIGIN, name the periodic sides of a passage, or move the "
+            "boundaries of a wing otherwise, as with rotate or ffd-twist"
+        )
+    x, y, _ = local.T
     middle = float(np.arctan2(y.sum(), x.sum()))
     radius = float(np.hypot(x, y).max())
     coords = _meridional(mesh.points, axis, origin, middle) * (1.0, 1.0, radius)
@@ -260,6 +272,13 @@ class SpanCurves:
         step = self._size / (STEPS * float(seeds[:, 1].mean()))
         before, after = (self._trace(seeds, spans, sign * step) for sign in (-1.0, 1.0))
         table = np.concatenate([before[:0:-1], after])  # (steps, spans, 3): z, r and m
+        if len(table) <= CUBIC:
+            z, r = np.asarray(start, float)
+            raise MeshError(
+                f"curves of constant span cannot be traced from z = {z:.6g}, r = {r:.6g}: the axis "
+                f"is too near for walls of an extent of {self._size:.6g}; correct PERIODIC_AXIS "
+                "and PERIODIC_ORIGIN"
+            )
         self.m_prime = step * np.arange(1 - len(before), len(after))
         """(k,): where the curves were traced; they go on straight beyond."""
         self._splines = [

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import unit, vertex_normals
+from slideviz.mesh.topology import facet_vectors, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
 
@@ -18,6 +18,43 @@ as a root of the mean square: facets of a curved profile have some, too."""
 APART = 1e-3  # least distance of points of a profile, as a part of its extent
 STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
 FLAT = 1e-7  # a rim that is so narrow, as a part of its length, is of a blade without thickness
+
+TURNED = 0.5
+"""Largest component along theta of the normals of a wall about an axis, contoured ones too, as a
+root of the mean square."""
+PLANE = 1e-6  # part by which the sum of the facets' vectors of a flat wall may be shorter
+RING, OCTANTS = 0.1, 8
+"""A ring around the axis is in all octants, and its least radii there differ by no more than this
+part of the largest of them."""
+
+
+def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
+    """Return whether walls have the z axis: they turn about it, and if all are flat, as rings.
+
+    Flat walls alone, as those beside a wing, have no axis. ``local`` (n, 3): Cartesian, in the
+    frame of the axis. ``walls``: facets (f, 4) of each.
+    """
+    flat = []
+    for facets in walls:
+        vectors, middles = facet_vectors(local, facets), local[facets].mean(axis=1)
+        size = np.linalg.norm(vectors, axis=1)
+        flat.append(np.linalg.norm(vectors.sum(axis=0)) >= (1.0 - PLANE) * size.sum())
+        across = vectors[:, 1] * middles[:, 0] - vectors[:, 0] * middles[:, 1]
+        normal = size * np.hypot(middles[:, 0], middles[:, 1])
+        along_theta = across / np.where(normal > 0.0, normal, 1.0)
+        if np.sqrt(np.average(along_theta**2, weights=size)) > TURNED:
+            return False
+    return not all(flat) or all(_is_ring(local[np.unique(facets)]) for facets in walls)
+
+
+def _is_ring(local: FloatArray) -> bool:
+    """Return whether nodes (n, 3) go around the z axis, with a rim inside that is a circle."""
+    radius = np.hypot(local[:, 0], local[:, 1])
+    theta = np.arctan2(local[:, 1], local[:, 0])
+    octant = np.minimum((theta / np.pi + 1.0) * 0.5 * OCTANTS, OCTANTS - 1).astype(np.int64)
+    least = np.full(OCTANTS, np.inf)
+    np.minimum.at(least, octant, radius)
+    return bool(np.isfinite(least).all() and np.ptp(least) <= RING * least.max())
 
 
 def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:

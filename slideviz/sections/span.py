@@ -19,7 +19,7 @@ from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.spans import WALLS_KEY, span_ends
 from slideviz.case.zones import each_zone
 from slideviz.errors import CaseError
-from slideviz.machine.span import SpanCurves, SpanField, find_span
+from slideviz.machine.span import WHOLE, SpanCurves, SpanField, find_span
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import names_from
@@ -351,7 +351,7 @@ def find_walls(
                 )
             pair = None  # it was guessed: inflow and outflow match, too
         about = about or ((one.axis, one.origin) if pair is None else (pair.axis, pair.origin))
-        period = 2.0 * np.pi if pair is None else pair.period
+        period = WHOLE if pair is None else pair.period
         field = find_span(zone, hub, shroud, *about, period)
         channels.append(SpanChannel(label[hub], label[shroud], field, number))
     if not channels:

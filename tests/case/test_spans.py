@@ -1,12 +1,24 @@
 """Which boundaries a span goes between, and about which axis."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import slideviz as sv
+from slideviz.case.check import check_case
 from slideviz.case.spans import span_ends, span_field
-from slideviz.errors import CaseError
-from tests.builders import cube, passage
+from slideviz.cli import run as command
+from slideviz.errors import CaseError, MeshError, SlidevizError
+from slideviz.machine.span import SpanCurves, find_span
+from slideviz.sections.span import find_walls
+from slideviz.session.opening import open_mesh
+from slideviz.session.run_messages import run_requirements
+from slideviz.session.state import StepFrame
+from tests.builders import cube, grid, passage, ring
 
 SIDES = {"per1": "periodic", "per2": "periodic"}
 
@@ -50,3 +62,77 @@ def test_a_cascade_has_no_axis():
     case = sv.Case(roles={"y_m": "periodic", "y_p": "periodic"}, span=("z_m", "z_p"))
     with pytest.raises(CaseError, match=r"repeats by a translation .*so it has no axis"):
         span_field(case, cube(4, block=False))
+
+
+def wing(seed=None):
+    """A square wing from one side of a box to the other, placed anyhow."""
+    mesh = grid((6, 6, 4), [(2, 4), (2, 4), (0, 4)])
+    if seed is None:
+        return mesh
+    random = np.random.default_rng(seed)
+    turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    return mesh.with_points((mesh.points - random.random(3)) @ turn.T * random.uniform(0.1, 9.0))
+
+
+TWIST = sv.Case(
+    roles={"BLOCK": "moving"},
+    span=("z_m", "z_p"),
+    motions=(sv.SpanMotion("BLOCK", "twist", (0.0, 1.0), (0.0, 3.0)),),
+)
+NO_AXIS = r"hub 'z_m' and shroud 'z_p' do not turn about the axis .* or move the boundaries of a w"
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.none() | st.integers(0, 2**32 - 1), st.sampled_from("xyz"))
+def test_walls_beside_a_wing_have_no_axis(seed, axis):
+    mesh = wing(seed)
+    case = TWIST.change(axis=tuple(float(axis == letter) for letter in "xyz"))
+    with pytest.raises(MeshError, match=NO_AXIS):
+        span_field(case, mesh)
+    (said,) = check_case(case, mesh)
+    assert re.search(NO_AXIS, said)
+
+
+def test_each_way_to_a_span_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sv.write("wing.su2", wing())
+    TWIST.change(mesh_file=Path("wing.su2")).write("wing.cfg")
+    ways = (
+        lambda: next(sv.deform(TWIST, wing())),
+        lambda: sv.Deformer(wing(), TWIST),
+        lambda: sv.SpanVariables(wing(), TWIST),
+        lambda: find_walls(wing(), TWIST),
+        lambda: sv.gaps(TWIST, wing()),
+    )
+    for way in ways:
+        with pytest.raises(SlidevizError, match=NO_AXIS):
+            way()
+    for arguments in (
+        ["run", "wing.cfg", "-o", "out.su2"],
+        ["gap", "wing.cfg"],
+        ["section", "wing.su2", "--span", "0.5", "--between", "z_m,z_p", "-o", "cut.svg"],
+        ["section", "wing.su2", "--meridional", "--between", "z_m,z_p", "-o", "cut.svg"],
+    ):
+        assert command(arguments) == 1
+        assert re.search(NO_AXIS, capsys.readouterr().err)
+    session = open_mesh(StepFrame(wing(), sv.quality(wing())), None, (), TWIST)
+    assert any(re.search(NO_AXIS, told.text) for told in run_requirements(session))
+
+
+def test_flat_walls_that_go_around_an_axis_have_it():
+    """A radial diffuser between two discs, as a whole ring, and as a passage that repeats."""
+    disc = grid((4, 24, 3), place=ring((4, 24, 3), angle_deg=360.0), wrap=1)
+    assert span_field(sv.Case(span=("z_m", "z_p")), disc).curves.m_prime.size > 10
+    part = passage((4, 4, 3), blade=False)
+    case = sv.Case(span=("inflow", "outflow"))
+    assert span_field(case.change(roles=SIDES, periodic_type="rotational"), part).revolved
+    with pytest.raises(MeshError, match="do not turn about the axis"):
+        span_field(case, part)
+
+
+def test_an_axis_too_near_to_where_curves_start_is_told():
+    mesh = grid((6, 4, 3), place=ring((6, 4, 3), low=1e-4))
+    field = find_span(mesh, "z_m", "z_p", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), np.pi / 6.0)
+    with pytest.raises(MeshError, match=r"cannot be traced from z = 0\.5, r = 0\.0001: the axis"):
+        SpanCurves(field, (0.5, 1e-4))
