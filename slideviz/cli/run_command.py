@@ -218,9 +218,9 @@ def _deform(
     steps = run_steps(arguments, case, mesh)
     last = steps[-1]
     seconds["quality"] = -time.perf_counter()
+    layers = walls(last.mesh, mesh, case.walls(mesh.marker_names))  # takes most memory: first
     measured = quality(last.mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
-    layers = walls(last.mesh, mesh, case.walls(mesh.marker_names))
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     cells, points = _fields(arguments, case, output, last.mesh, measured, mesh)

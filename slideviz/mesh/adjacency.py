@@ -63,9 +63,8 @@ def sides_of(cells: Cells) -> Sides:
     return Sides(sealed(first), sealed(neighbour))
 
 
-@weak_cache
 def cells_around(cells: Cells, n_points: int) -> CellsAround:
-    """Return the cells of each of ``n_points`` nodes, cached as long as the cells live."""
+    """Return the cells of each of ``n_points`` nodes; not cached, for it takes much memory."""
     offsets, count = np.zeros(n_points + 1, np.int64), len(cells.connectivity)
     owner, local = np.empty(count, np.int32), np.empty(count, np.int8)
     _write_around(cells.connectivity, cells.offsets, offsets, owner, local)

@@ -35,6 +35,7 @@ from slideviz.mesh.jacobians import (
     minus3,
     write_coefficients,
 )
+from slideviz.mesh.model import Cells
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import FARTHEST
@@ -42,7 +43,7 @@ from slideviz.terms import FARTHEST
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+    from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 GAP = 2.0**-9
 """Largest relative distance from a lower bound to the margin at which a cell is not cut again."""
@@ -211,9 +212,10 @@ def least_margin(
     for level, end in enumerate(ends):
         ids = np.flatnonzero(bounded == level)
         some = cells.take(ids)
-        motion = np.zeros_like(before.points)
-        motion[some.nodes] = after.points[some.nodes] - before.points[some.nodes]
-        found = margins(before.points, motion, some, cap, signs[ids])
+        nodes = some.nodes
+        here = Cells(some.types, some.offsets, np.searchsorted(nodes, some.connectivity))
+        start = before.points[nodes]
+        found = margins(start, after.points[nodes] - start, here, cap, signs[ids])
         if len(found) and (found.min(), ids[found.argmin()]) < (least, cell):
             least, cell = float(found.min()), int(ids[found.argmin()])
         if least < end:

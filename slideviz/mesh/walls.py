@@ -43,6 +43,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import checked_reference
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
 
 LAYERS = 5  # layers that growth and equal layers are found from
@@ -74,16 +75,17 @@ class Columns:
         """Return the places of a boundary, ascending: columns, then c + g for facets without."""
         return np.unique(self.corner[self.boundary.marker == self.boundary.names.index(marker)])
 
-    def stack_thickness(self, points: FloatArray) -> FloatArray:
+    def stack_thickness(self, points: FloatArray, most: int | None = None) -> FloatArray:
         """Return the thickness (f,) of the stack of flat cells on each facet, at ``points`` (n, d).
 
         That is the sum of the heights of the first layers whose height (mean length of the edges
         that lead through it) is below two thirds of their length (of the side nearer to the wall:
         the length of a line, else the square root of the area); 0 where there are none.
+        ``most``: layers that count at most; all by default.
         """
         facets, width = self.boundary.facets, self.boundary.facets.shape[1]
         thickness, flat = np.zeros(len(facets)), self.depth > 0
-        for layer in range(self.nodes.shape[1] - 1):
+        for layer in range(self.nodes.shape[1] - 1 if most is None else most):
             some = np.flatnonzero(flat & (self.depth > layer))
             below, above = (self.nodes[self.corner[some], layer + k] for k in (0, 1))
             edges = np.linalg.norm(points[above] - points[below], axis=2)
@@ -110,7 +112,12 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
     chain = np.full((*facets.shape, layers + 1), -1)
     off, depth = np.full((len(facets), 2), -1), np.zeros(len(facets), np.int64)
     table, around = (cells.types, cells.offsets, cells.connectivity), (near.offsets, near.cells)
-    _climb(facets, owner, table, around, use, _EDGES, chain, depth, off)
+
+    def climb(part: slice) -> None:
+        written = chain[part], depth[part], off[part]
+        _climb(facets[part], owner[part], table, around, use, _EDGES, *written)
+
+    in_parts(climb, len(facets))
     deep = depth > 0
     if facets.shape[1] == 4:
         triangle = facets[:, 2] == facets[:, 3]
@@ -196,10 +203,12 @@ def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type
     """Return the cell of ``use`` beyond a side (w,) of ``cell``, -1 if there is none."""
     for at in range(begin[side[0]], begin[side[0] + 1]):
         other = cells_at[at]
-        if other != cell and use[other]:
+        nodes = connectivity[offsets[other] : offsets[other + 1]]
+        # Few cells have the opposite corner of the side, too.
+        if other != cell and use[other] and _has(nodes, side[len(side) // 2]):
             shared = 0
-            for k in range(offsets[other], offsets[other + 1]):
-                shared += _has(side, connectivity[k])
+            for node in nodes:
+                shared += _has(side, node)
             if shared == len(side):
                 return np.int64(other)
     return np.int64(-1)
@@ -387,7 +396,7 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
 def _columns_of(mesh: Mesh) -> tuple[Columns, frozenset[str]]:
     """Return the columns of a mesh, and the boundaries with layers."""
     columns = find_columns(mesh)
-    boundary, flat = columns.boundary, columns.stack_thickness(mesh.points) > 0
+    boundary, flat = columns.boundary, columns.stack_thickness(mesh.points, 1) > 0
     names = (
         name
         for k, name in enumerate(boundary.names)
