@@ -214,6 +214,17 @@ METHODS: dict[Method, MethodTerm] = {
 }
 
 
+StiffnessType = Literal["SOLID_WALL_DISTANCE", "INVERSE_VOLUME", "CONSTANT_STIFFNESS"]
+STIFFNESS_TYPES: dict[StiffnessType, Term] = {
+    "SOLID_WALL_DISTANCE": Term("near walls", "One over the mean distance to the nearest wall."),
+    "INVERSE_VOLUME": Term("small cells", "One over the volume of the cell."),
+    "CONSTANT_STIFFNESS": Term("all alike", "The same for all cells."),
+}
+"""Which cells of an elastic body are stiff: how Young's modulus is found."""
+NOT_WALLS = ("far", "free", "inflow", "inlet", "outflow", "outlet", "exit", "sym")
+"""Words in names of fixed boundaries that are no walls, for the distance to these."""
+
+
 @dataclass(frozen=True)
 class KernelTerm(Term):
     """The words for a radial function.

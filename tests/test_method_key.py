@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from slideviz.errors import CaseError, DeformError
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import SAMPLES, sample, write_sample
 from slideviz.solver import deform as solver
+from slideviz.solver.setup import stiffness_of
 from slideviz.terms import METHODS
 from tests import builders
 from tests.slow import one_of_each_fast
@@ -52,6 +54,51 @@ def test_settings_that_the_method_does_not_use_are_told():
     )
     assert "acts like pseudo sliding" in idle_settings(Case(method="idw", sliding="ds"))[0]
     assert "acts like direct sliding" in idle_settings(Case(method="elastic", sliding="ps"))[0]
+
+
+@pytest.mark.parametrize("method", ["idw", "elastic"])
+@pytest.mark.parametrize("setting", [{"relax": "yes"}, {"layers": "keep"}])
+def test_what_only_radial_functions_have_is_refused_of_other_methods(method, setting):
+    mesh = builders.square(6)
+    case = Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),), method=method)
+    (name,) = setting
+    with pytest.raises(CaseError, match=rf"{name.upper()}= {setting[name].upper()} acts after"):
+        list(sv.deform(case.change(**setting), mesh))
+    assert KEYS[name.upper()].idle(case)  # so that the window shows that it is off
+    assert not KEYS[name.upper()].idle(case.change(**setting))  # and lets users switch it off
+    *_, left = sv.deform(case.change(relax="auto", layers="auto"), mesh)
+    *_, plain = sv.deform(case, mesh)
+    assert left.mesh.points.tobytes() == plain.mesh.points.tobytes()
+    assert any("is not relaxed" in text for text in left.warnings)
+
+
+def test_stiffness_of_su2_is_read_written_and_only_for_elasticity(tmp_path):
+    case = set_key(Case(method="elastic"), "DEFORM_STIFFNESS_TYPE", "wall_distance")
+    case = set_key(case, "DEFORM_COEFF", "1e6")
+    case.write(tmp_path / "a.cfg")
+    again = Case.read(tmp_path / "a.cfg")
+    assert (again.deform_stiffness_type, again.deform_coeff) == ("SOLID_WALL_DISTANCE", 1e6)
+    for text in ("0.5", "0.7", "1", "-0.1", "nan"):
+        with pytest.raises(CaseError, match=r"below 0\.5, or above 1|not a number"):
+            set_key(case, "DEFORM_COEFF", text)
+    said = "METHOD= rbf does not use DEFORM_STIFFNESS_TYPE, DEFORM_COEFF"
+    assert idle_settings(case.change(method="rbf")) == (said,)
+    assert idle_settings(case.change(sliding="ds")) == ()
+
+
+def test_walls_are_moving_boundaries_and_fixed_ones_by_their_names():
+    """Cells near these are the stiffer ones, not those near a far field."""
+    mesh = builders.square(12)
+    names = dict(zip(("x_m", "x_p", "y_m", "y_p"), ("Far", "OUTLET", "wall", "sym"), strict=True))
+    markers = tuple(replace(m, name=names.get(m.name, m.name)) for m in mesh.markers)
+    mesh = replace(mesh, markers=markers)
+    case = Case(roles={"BLOCK": "moving"}, method="elastic")
+    found = stiffness_of(case, mesh).walls
+    nodes = np.concatenate([mesh.marker(name).nodes for name in ("BLOCK", "wall")])
+    np.testing.assert_array_equal(found, np.unique(nodes))
+    sliding = case.change(roles={"BLOCK": "moving", "wall": "sliding"})
+    expected = np.unique(mesh.marker("BLOCK").nodes)
+    np.testing.assert_array_equal(stiffness_of(sliding, mesh).walls, expected)
 
 
 def test_settings_without_effect_are_told_and_change_no_result():

@@ -49,6 +49,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
         return tuple(_problems_of_zones(case, mesh))
     return (
         *_radius_problems(case, mesh),
+        *_method_problems(case),
         *(sentence for _, sentence in contradictions(case, exact=True)),
         *marker_problems(case, mesh),
         *motion_problems(case, mesh),
@@ -86,6 +87,18 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     for number, (one, part) in enumerate(zip(cases, mesh.zone_parts, strict=True), 1):
         if one.markers_with("moving"):
             yield from (f"zone {number}: {text}" for text in check_case(one, part.mesh))
+
+
+def _method_problems(case: Case) -> Iterator[str]:
+    """Yield why the method of a case cannot relax or keep layers, as it is asked to."""
+    if case.method == "rbf":
+        return
+    for key, value in (("RELAX", case.relax), ("LAYERS", case.layers)):
+        if value in ("yes", "keep"):
+            yield (
+                f"{key}= {value.upper()} acts after METHOD= rbf only, and METHOD= {case.method} "
+                f"is there to be compared with as it is; use {key}= AUTO or NO, or METHOD= rbf"
+            )
 
 
 def require_valid(case: Case, mesh: Mesh) -> None:

@@ -14,6 +14,7 @@ from slideviz import terms
 from slideviz.case.key import METHOD, REDUCTION, Key, field_row, other_method, setting
 from slideviz.case.model import Case
 from slideviz.case.values import MAX_STEPS, YES_NO, Kind, integer, one_of, real
+from slideviz.case.words import number
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 
@@ -238,18 +239,28 @@ def automatic_radius(case: Case) -> bool:
     return case.method == "rbf" and case.support_radius is None and not case.influence_factor
 
 
+_RATIOS = "a number of at least 0 and below 0.5, or above 1 up to 1e12"
+
+
+def _read_ratio(text: str) -> float:
+    value = number(text)
+    if not (0.0 <= value < 0.5 or 1.0 < value <= 1e12):
+        raise CaseError(f"{text} is out of range; expected {_RATIOS}")
+    return value
+
+
 _setting = partial(setting, METHOD)
 
 METHOD_ROWS = (
     _setting(
         "METHOD",
         "Radial basis functions, or for comparison inverse distance weighting, or linear "
-        "elasticity with stiffer small cells (as in SU2 by default). With these two, ps and ds do "
-        "the same, and kernel, radius and data reduction have no effect.",
+        "elasticity (as in SU2; DEFORM_STIFFNESS_TYPE, DEFORM_COEFF). With these two, ps and ds do "
+        "the same, kernel, radius and data reduction have no effect, and nothing is relaxed.",
         form="main",
         tip="How the inner nodes follow: by radial basis functions, or for comparison by inverse "
-        "distance weighting, or as an elastic body whose small cells are stiffer (as in SU2 by "
-        "default).",
+        "distance weighting, or as an elastic body whose small cells are stiffer (a choice of "
+        "SU2's, not its default).",
         run_label="",
     ),
     _setting(
@@ -288,7 +299,7 @@ METHOD_ROWS = (
         "an elastic body: better in the mean, and boundary layers keep their heights. A safeguard "
         "keeps the worst cells.",
         run_label="relaxation {}",
-        method="rbf",
+        idle_reason=lambda case: "" if case.relax == "yes" else other_method(case, "rbf"),
     ),
     _setting(
         "STEPS",
@@ -369,7 +380,7 @@ METHOD_ROWS = (
         tip="Whether nodes near walls go with the wall's own displacement and rotation: this keeps "
         "the heights of boundary layers.",
         run_label="layers {}",
-        method="rbf",
+        idle_reason=lambda case: "" if case.layers == "keep" else other_method(case, "rbf"),
     ),
     _setting(
         "LAYER_THICKNESS",
@@ -427,6 +438,24 @@ METHOD_ROWS = (
         real(1e-12, 1e12),
         run_label="fixed weight {}",
         method="idw",
+    ),
+    _setting(
+        "DEFORM_STIFFNESS_TYPE",
+        "With METHOD= elastic, which cells are stiff, as in SU2: Young's modulus is one over the "
+        "mean distance of the cell's nodes to the nearest node of a wall (SU2's default), one over "
+        "the cell's volume, or the same everywhere. Walls are moving boundaries, and fixed ones "
+        f"whose names have none of {', '.join(terms.NOT_WALLS)}.",
+        one_of(terms.STIFFNESS_TYPES, {"WALL_DISTANCE": "SOLID_WALL_DISTANCE"}),
+        run_label="stiffness {}",
+        method="elastic",
+    ),
+    _setting(
+        "DEFORM_COEFF",
+        "With METHOD= elastic, Poisson's ratio. With SU2's default of 1e6 cells may grow and "
+        "shrink freely, and keep their angles instead.",
+        Kind(_RATIOS, _read_ratio, lambda value: repr(float(value)), entry="real"),
+        run_label="Poisson's ratio {}",
+        method="elastic",
     ),
     _setting(
         "CURVED",

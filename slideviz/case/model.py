@@ -404,6 +404,10 @@ class Case(CheckedFields):
     repair_steps: bool = False
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
+    deform_stiffness_type: terms.StiffnessType = field(
+        default="INVERSE_VOLUME", metadata=terms.STIFFNESS_TYPES
+    )
+    deform_coeff: float = 0.3
     quality_metric: terms.SkewMetric = field(default="knupp", metadata=terms.SKEW_METRICS)
     generate_quality: bool = True
     limits: Annotated[tuple[Limit, ...], 'limits, or a text as "min > 0.3, inverted = 0"'] = ()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from slideviz.elastic.stiffness import Conditions, ShapeBlock
+from slideviz.elastic.stiffness import Conditions, ShapeBlock, Stiffness
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.classify import RANK_TOLERANCE
@@ -23,6 +23,7 @@ class Body:
     parts: list[ShapeBlock]  # its elements
     frame: Frame  # the frame of the problem's displacements; the body is solved in Cartesian ones
     axis: np.ndarray  # (n,): nodes on the axis of a cylindrical frame, which move along it only
+    stiffness: Stiffness = field(default_factory=Stiffness)  # of its elements
 
 
 def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:

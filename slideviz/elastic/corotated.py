@@ -58,7 +58,7 @@ class Corotated:
     points: FloatArray  # (n, d): undeformed positions X
     parts: list[ShapeBlock]  # the elements
     moduli: tuple[FloatArray, ...]
-    """(m,) of each part: Young's modulus times the share of each element."""
+    """(m,) of each part: Young's modulus of each element."""
 
     @classmethod
     def of(cls, points: FloatArray, parts: list[ShapeBlock]) -> Corotated:
@@ -70,7 +70,7 @@ class Corotated:
                 replace(part, nodes=sealed(part.nodes[some]), cell=part.cell[some])
                 for part, some in zip(parts, solid, strict=True)
             ]
-        moduli = tuple(sealed(part.share / volume[part.cell]) for part in parts)
+        moduli = tuple(sealed(1.0 / volume[part.cell]) for part in parts)
         return cls(frozen_array(points, np.float64), parts, moduli)
 
     def rotations(self, x: FloatArray) -> FloatArray:

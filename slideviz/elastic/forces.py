@@ -53,7 +53,7 @@ class Forces:
         for part in self.parts:
             each = np.empty(len(part.nodes))
             swell(self._elements(part), by, each)
-            np.add.at(swelling, part.cell, part.share * each)
+            swelling[part.cell] = each
         rate = swelling / self.volume
         for part in self.parts:
             modulus = self._modulus(part)
@@ -66,10 +66,10 @@ class Forces:
         for part in self.parts:
             each = np.empty(len(part.nodes))
             pull(self._elements(part), self._modulus(part), moved, weights, out, each)
-            np.add.at(work, part.cell, each)
+            work[part.cell] = each
         rate = work / self.volume
         for part in self.parts:
-            press(self._elements(part), -part.share * rate[part.cell], out)
+            press(self._elements(part), -rate[part.cell], out)
         return out
 
     def _elements(self, part: ShapeBlock) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
@@ -78,8 +78,8 @@ class Forces:
         return points, nodes, part.shape.gradients, part.shape.weights
 
     def _modulus(self, part: ShapeBlock) -> FloatArray:
-        """Return Young's modulus times the share of each element, (m,)."""
-        return np.asarray(part.share / self.volume[part.cell])
+        """Return Young's modulus of each element, (m,)."""
+        return np.asarray(1.0 / self.volume[part.cell])
 
 
 @njit(**OPTIONS)

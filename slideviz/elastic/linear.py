@@ -1,6 +1,6 @@
-"""Linear elasticity: the mesh as an elastic body, as SU2 deforms it by default.
+"""Linear elasticity: the mesh as an elastic body, as SU2 deforms it.
 
-Small cells are stiff: Young's modulus is the inverse of the cell's volume. The displacement of
+Small cells, or those near walls, are stiff (`slideviz.elastic.stiffness`). The displacement of
 moving and fixed nodes is known, that of sliding nodes is zero along their normals, and periodic
 images have equal displacements, turned where the mesh repeats by rotation; all other nodes are
 free. Each step begins with the deformed mesh, without stresses.
@@ -23,8 +23,8 @@ from slideviz.elastic.conditions import (
     unknowns,
 )
 from slideviz.elastic.forces import Forces
-from slideviz.elastic.multigrid import Level, LinearSolution, conjugate_gradients, hierarchy, solve
-from slideviz.elastic.stiffness import assemble
+from slideviz.elastic.multigrid import LIMIT, Level, conjugate_gradients, hierarchy, solve
+from slideviz.elastic.stiffness import POISSON, ElasticMesh, Stiffness
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -53,9 +53,9 @@ from slideviz.rbf.tape import (
     value,
 )
 
-EXACT = 1e-13  # residual ratio at which the solver ends: derivatives are to be exact
+EXACT = 1e-13  # error at which the solver ends: derivatives are to be exact
 
-ENOUGH = 1e-8  # largest residual ratio that is accepted
+ENOUGH = 1e-8  # largest error that is accepted
 
 
 class Equilibrium:
@@ -69,6 +69,12 @@ class Equilibrium:
 
     def __init__(self, problem: Problem, body: Body, nodes: IntArray, *, name: str) -> None:
         assert problem.frozen is not None
+        if (body.stiffness.kind, body.stiffness.poisson) != (Stiffness().kind, POISSON):
+            raise DeformError(
+                "derivatives of METHOD= elastic are there for small cells alone; use "
+                f"DEFORM_STIFFNESS_TYPE= {Stiffness().kind} and DEFORM_COEFF= {POISSON}, or "
+                "METHOD= rbf"
+            )
         self._body, self._coords, self._same = body, problem.coords, problem.same_as
         self._nodes, self._name = nodes, name
         self._place, self._turn = unknowns(problem, body, nodes)
@@ -102,20 +108,18 @@ class Equilibrium:
         held_by = [(at, value(direction)) for at, direction in self._held]
         free = np.moveaxis(value(_without(axes, held_by)), 0, 1)
         given = held(self._place, self._turn, free, np.zeros_like(at))
-        matrix = assemble(at, self._body.parts, given)[0]
+        matrix = ElasticMesh.at(at, self._body.parts, self._body.stiffness).matrix(given)
         return hierarchy(matrix, rigid_motions(at, given))
 
     def _solved(self, right: FloatArray) -> FloatArray:
         """Return the unknowns (k, d) for a right-hand side (k, d); DeformError above `ENOUGH`."""
         if not right.any():
             return np.zeros_like(right)
-        start = np.zeros(right.size)
-        solved = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
-        if not solved.residual_ratio <= ENOUGH:
+        solved = conjugate_gradients(self._levels, right.ravel(), tolerance=EXACT)
+        if not solved.error <= ENOUGH:
             raise DeformError(
-                f"the equations of linear elasticity were solved to {solved.residual_ratio:.1g} "
-                f"only, in {solved.iterations} iterations, so that derivatives would not be exact; "
-                "use more STEPS, or METHOD= rbf"
+                f"the equations of linear elasticity were solved to {solved.error:.1g} only, so "
+                "that derivatives would not be exact; use more STEPS, or METHOD= rbf"
             )
         return solved.x.reshape(right.shape)
 
@@ -233,9 +237,6 @@ def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
     return unit(total)
 
 
-HOPELESS = 1e-3
-"""Largest residual ratio of a usable solution; above ``multigrid.TOLERANCE`` there is a warning."""
-
 ASSEMBLING = 0.2  # the part of the phase solve that the matrix takes
 
 
@@ -248,7 +249,7 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
     coinciding nodes are asked to move differently.
     """
     nodes, values = problem.known, problem.values
-    displacement, warnings = _equilibrium(problem, timer, body, nodes, values)
+    displacement = _equilibrium(problem, timer, body, nodes, values)
     sliding = np.concatenate([problem.edge, problem.surface])
     if len(sliding):
         free = within(problem, sliding, take(displacement, sliding))
@@ -257,14 +258,13 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
         nodes, values = np.concatenate([nodes, sliding]), join(values, slid)
         gap = np.abs(value(slid) - value(free)).max()
         if problem.choose("again", lambda: gap > AGREE * problem.basis.radius):
-            displacement, warnings = _equilibrium(problem, timer, body, nodes, values, displacement)
+            displacement = _equilibrium(problem, timer, body, nodes, values, displacement)
     return Solution(
         put(displacement, nodes, values, overwrite=True),
         len(merge(problem, nodes, values)[0]),
         0.0,
         np.empty(0, np.int64),
         float("nan"),
-        warnings=warnings,
     )
 
 
@@ -275,10 +275,11 @@ def _equilibrium(
     nodes: IntArray,
     values: Array,
     start: Array | None = None,
-) -> tuple[Array, tuple[str, ...]]:
-    """Return the displacement of all nodes in the frame (..., n, d), and warnings of the solver.
+) -> Array:
+    """Return the displacement of all nodes in the frame (..., n, d).
 
     In a frozen step it is solved to rounding, for derivatives are to be exact (`Equilibrium`).
+    Raises DeformError if the solver's error is above `LIMIT` of the largest displacement.
     ``nodes``, ``values`` (m,), (..., m, d): nodes with known displacement, in the frame.
     ``start`` (n, d): a guess of the displacement, in the frame.
     """
@@ -288,48 +289,44 @@ def _equilibrium(
         equilibrium: Equilibrium = problem.frozen.fixed(
             f"{name} body", lambda: Equilibrium(problem, body, merged, name=name)
         )
-        return equilibrium.displacement(data), ()
+        return equilibrium.displacement(data)
     coords = value(problem.coords)
     with timer.phase("solve") as tick:
         at = body.frame.points(coords)
         prescribed = conditions(problem, body, nodes, value(values))
-        matrix, right = assemble(at, body.parts, prescribed, lambda f: tick(ASSEMBLING * f))
-        guess = np.zeros((len(prescribed.free), at.shape[1]))
+        mesh = ElasticMesh.at(at, body.parts, body.stiffness)
+        matrix = mesh.matrix(prescribed, lambda f: tick(ASSEMBLING * f))
         inside = np.flatnonzero(prescribed.place >= 0)
+        place, turn = prescribed.place[inside], prescribed.turn[inside]
+        guess = np.zeros((len(prescribed.free), at.shape[1]))
         if start is not None:
             moved = body.frame.points(coords + value(start)) - at
-            turned = np.einsum("mji,mj->mi", prescribed.turn[inside], moved[inside])
-            guess[prescribed.place[inside]] = turned
+            guess[place] = np.einsum("mji,mj->mi", turn, moved[inside])
+
+        def shifted(unknown: FloatArray) -> FloatArray:
+            shift = prescribed.known.copy()
+            shift[inside] = np.einsum("mij,mj->mi", turn, unknown.reshape(guess.shape)[place])
+            return shift
+
+        def residual(unknown: FloatArray) -> FloatArray:
+            forces = np.einsum("mji,mj->mi", turn, mesh.forces(shifted(unknown))[inside])
+            out = np.zeros_like(guess)
+            np.subtract.at(out, place, forces)
+            return out.ravel()
+
         solved = solve(
             matrix,
-            right,
+            residual,
             rigid_motions(at, prescribed),
             guess.ravel(),
+            float(np.abs(prescribed.known).max(initial=0.0)),
             lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
         )
-        warnings = _warnings(solved)
-        shift = prescribed.known.copy()
-        unknown = solved.x.reshape(guess.shape)[prescribed.place[inside]]
-        shift[inside] = np.einsum("mij,mj->mi", prescribed.turn[inside], unknown)
-        displacement = body.frame.difference(at, shift)
-    return displacement, warnings
-
-
-def _warnings(found: LinearSolution) -> tuple[str, ...]:
-    """Return a warning if the solver did not reach its tolerance; empty if it did.
-
-    Raises DeformError if the residual ratio is above `HOPELESS`.
-    """
-    if found.converged:
-        return ()
-    if not found.residual_ratio <= HOPELESS:
-        raise DeformError(
-            f"the equations of linear elasticity were not solved: after {found.iterations} "
-            f"iterations the residual is {found.residual_ratio:.2g} of what it was; cells much "
-            "smaller or flatter than their neighbours do this, so use more STEPS, or METHOD= rbf"
-        )
-    sentence = (
-        f"the equations of linear elasticity were solved to {found.residual_ratio:.1g} only, in "
-        f"{found.iterations} iterations; look at the result with care, or use more STEPS"
-    )
-    return (sentence,)
+        if not solved.error <= LIMIT:
+            raise DeformError(
+                "the equations of linear elasticity were not solved: the error is about "
+                f"{solved.error:.2g} of the largest displacement, more than {LIMIT:.0e}; cells "
+                "much smaller or flatter than their neighbors do this, so use METHOD= rbf, or "
+                "DEFORM_STIFFNESS_TYPE= CONSTANT_STIFFNESS"
+            )
+        return body.frame.difference(at, shifted(solved.x))

@@ -1,7 +1,8 @@
-"""Conjugate gradients, preconditioned by multigrid cycles (smoothed aggregation).
+"""Sparse linear systems: a factorisation, or conjugate gradients with multigrid cycles.
 
-pyamg makes the hierarchy of levels from the rigid motions. The cycles are computed here, because
-pyamg's own sweeps hold the interpreter lock for seconds on large meshes, and freeze a window.
+Cycles are those of smoothed aggregation. pyamg makes the hierarchy of levels from the rigid
+motions. The cycles are computed here, because pyamg's own sweeps hold the interpreter lock for
+seconds on large meshes, and freeze a window.
 """
 
 from __future__ import annotations
@@ -9,14 +10,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Thread
 from typing import Any, TypeVar
 
 import numpy as np
 from numba import prange
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigvalsh_tridiagonal
 from scipy.sparse import bsr_array, bsr_matrix
+from scipy.sparse.linalg import splu
 
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import one_at_a_time
@@ -24,10 +26,21 @@ from slideviz.rbf.evaluate import Tick, no_tick
 from slideviz.rbf.solve import enough_threads
 from slideviz.system.jit_cache import njit
 
-TOLERANCE = 1e-8
-"""Residual ratio, in the energy norm of the preconditioner, at which the iteration ends."""
+TOLERANCE = 1e-9
+"""Error, as a part of the largest unknown, at which the iteration ends."""
+
+LIMIT = 1e-7
+"""Largest error of a solution that is accepted, as a part of the largest displacement."""
 
 MAX_ITERATIONS = 300
+
+REFINEMENTS = 6  # most solutions with one factorisation, each of what the last one left
+
+DIRECT = {2: 400_000, 3: 10_000}
+"""Largest number of unknowns of a system that is factorised at once, by the size of its blocks: in
+2D this is faster than iterations, and exact."""
+
+LAST = 5  # systems larger than that by this factor are factorised where iterations fail
 
 COARSE = 600  # largest number of unknowns of the coarsest level, which has a dense factor
 
@@ -46,17 +59,15 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
-    """What the iteration found."""
+    """What the solver found."""
 
     x: FloatArray  # (n,): the solution
-    iterations: int
-    residual_ratio: float
-    """Last residual over that of x = 0, in the energy norm of the preconditioner: small is good."""
-
-    @property
-    def converged(self) -> bool:
-        """Return whether the residual ratio is at most `TOLERANCE`."""
-        return self.residual_ratio <= TOLERANCE
+    error: float
+    """Estimate of the largest error, as a part of the largest displacement; inf or nan where the
+    iteration broke down."""
+    smallest: float = 1.0
+    """Smallest eigenvalue, at most 1, of the preconditioned matrix: how little of an error a cycle
+    may see."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +83,79 @@ class Level:
     factor: Any = None  # dense Cholesky factor, on the coarsest level only
 
 
-def solve(
-    matrix: bsr_array, right: FloatArray, modes: FloatArray, start: FloatArray, tick: Tick = no_tick
-) -> LinearSolution:
-    """Solve a symmetric positive definite system; x = 0 where the right-hand side is zero.
+Residual = Callable[[FloatArray], FloatArray]
+"""Takes unknowns (n,); returns what is left of the right-hand side (n,)."""
 
-    ``matrix`` (n, n): in blocks.
-    ``right``, ``start`` (n,): right-hand side, and a guess of the solution.
+
+def solve(
+    matrix: bsr_array,
+    residual: Residual,
+    modes: FloatArray,
+    start: FloatArray,
+    scale: float,
+    tick: Tick = no_tick,
+) -> LinearSolution:
+    """Solve a symmetric system.
+
+    Small ones by a sparse factorisation, others by conjugate gradients, and where these do not
+    come to `LIMIT`, by a factorisation again, if they are not too large.
+    ``matrix`` (n, n): in blocks; ``residual`` may be more accurate than its products are.
     ``modes`` (n, m): vectors of nearly no energy: the rigid motions.
+    ``start`` (n,): a guess of the solution.
+    ``scale``: the largest displacement that is known.
     """
+    right = residual(start)
     if not np.any(right):
-        return LinearSolution(np.zeros_like(right), 0, 0.0)
-    levels = while_ticking(lambda: hierarchy(matrix, modes), tick)
-    return conjugate_gradients(levels, right, start, tick)
+        return LinearSolution(start, 0.0)
+
+    def iterated() -> LinearSolution:
+        try:
+            levels = while_ticking(lambda: hierarchy(matrix, modes), tick)
+        except LinAlgError:  # the coarsest matrix is not positive definite
+            return LinearSolution(start, np.inf)
+        found = conjugate_gradients(levels, right, tick, scale=scale)
+        x = start + found.x
+        left = _part(_cycle(levels, residual(x)), x, scale) / found.smallest
+        return replace(found, x=x, error=max(found.error, left))
+
+    def exact() -> LinearSolution:
+        return while_ticking(lambda: factorised(matrix, residual, start, scale), tick)
+
+    size, at_once = len(right), DIRECT[matrix.blocksize[0]]
+    ways = [exact, iterated] if size <= at_once else [iterated, exact]
+    found = ways[0]()
+    if found.error <= LIMIT or size > LAST * at_once:
+        return found
+    return ways[1]()
+
+
+def factorised(
+    matrix: bsr_array, residual: Residual, start: FloatArray, scale: float
+) -> LinearSolution:
+    """Solve a system by a sparse factorisation, refined until corrections are small.
+
+    The error is the last correction, so that the solution is better than it says; inf where the
+    matrix is singular.
+    """
+    x, before = start, np.inf
+    with enough_threads(0.0):  # the same bits for any number of threads
+        try:
+            factor = splu(matrix.tocsc())
+        except RuntimeError:
+            return LinearSolution(x, np.inf)
+        for _ in range(REFINEMENTS):
+            change = factor.solve(residual(x))
+            x = x + change
+            error = _part(change, x, scale)
+            if not TOLERANCE < error < before:
+                break
+            before = error
+    return LinearSolution(x, error)
+
+
+def _part(change: FloatArray, x: FloatArray, scale: float) -> float:
+    """Return the largest of changes (n,) as a part of the largest displacement."""
+    return float(np.abs(change).max() / max(np.abs(x).max(), scale, 1e-300))
 
 
 def while_ticking(work: Callable[[], Made], tick: Tick) -> Made:
@@ -187,44 +258,71 @@ def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
 def conjugate_gradients(
     levels: list[Level],
     right: FloatArray,
-    start: FloatArray,
     tick: Tick = no_tick,
     *,
     tolerance: float = TOLERANCE,
+    scale: float = 0.0,
 ) -> LinearSolution:
     """Solve by conjugate gradients, preconditioned by V-cycles.
 
-    Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.
+    Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1. The error is judged by what a
+    V-cycle makes of the residual, divided by the smallest eigenvalue of the preconditioned matrix,
+    which the iteration finds (section 6.7.3: Lanczos' tridiagonal matrix): a cycle that does not
+    see an error has a small one.
     ``levels``: of the matrix, as ``hierarchy`` returns them.
-    ``right``, ``start`` (n,): right-hand side, and a guess of the solution.
-    ``tolerance``: residual ratio at which the iteration ends.
+    ``right`` (n,): right-hand side.
+    ``tolerance``: error at which the iteration ends, as a part of the largest displacement.
+    ``scale``: the largest displacement that is known.
     """
     with enough_threads(0.0):  # the same bits for any number of threads
-        return _conjugate_gradients(levels, right, start, tick, tolerance)
+        return _conjugate_gradients(levels, right, tick, tolerance, scale)
 
 
 def _conjugate_gradients(
-    levels: list[Level], right: FloatArray, start: FloatArray, tick: Tick, tolerance: float
+    levels: list[Level],
+    right: FloatArray,
+    tick: Tick,
+    tolerance: float,
+    scale: float,
 ) -> LinearSolution:
-    matrix = levels[0].matrix
-    first = float(right @ _cycle(levels, right))
-    x = np.array(start, float)
-    left = right - _product(matrix, x) if np.any(start) else right.copy()
+    matrix, x, left = levels[0].matrix, np.zeros_like(right), right.copy()
     z = _cycle(levels, left)
-    energy, along, ratio = float(left @ z), z, np.inf
-    for count in range(MAX_ITERATIONS + 1):
-        ratio = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
-        if not ratio > tolerance or count == MAX_ITERATIONS:
-            return LinearSolution(x, count, ratio)
-        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(ratio, 1.0)) / np.log(tolerance)))
+    energy, along = float(left @ z), z
+    sizes, turns = [1.0], [0.0]
+    for _ in range(MAX_ITERATIONS):
+        part = _part(z, x, scale)
+        if not energy > 0.0 or part <= tolerance * _smallest(sizes, turns):
+            break
+        done = np.log(min(part, 1.0)) / np.log(tolerance)
+        tick(MAKING + (1.0 - MAKING) * min(1.0, done))
         image = _product(matrix, along)
-        size = energy / float(along @ image)
+        curvature = float(along @ image)
+        if not curvature > 0.0:
+            return LinearSolution(x, np.inf)  # the matrix is not positive definite
+        size = energy / curvature
         x += size * along
         left -= size * image
         z = _cycle(levels, left)
         before, energy = energy, float(left @ z)
         along = z + (energy / before) * along
-    raise AssertionError
+        sizes.append(size)
+        turns.append(energy / before)
+    smallest = _smallest(sizes, turns)
+    return LinearSolution(x, _part(z, x, scale) / smallest, smallest)
+
+
+def _smallest(sizes: list[float], turns: list[float]) -> float:
+    """Return the smallest eigenvalue, at most 1, that conjugate gradients found.
+
+    ``sizes``, ``turns``: of each iteration alpha and beta, after a first one of 1 and 0.
+    """
+    alpha, beta = np.array(sizes[1:]), np.array(turns)[: len(sizes) - 1]
+    if not len(alpha):
+        return 1.0
+    diagonal = 1.0 / alpha + beta / np.array(sizes[:-1])
+    off = np.sqrt(beta[1:]) / alpha[:-1]
+    least = eigvalsh_tridiagonal(diagonal, off, select="i", select_range=(0, 0))[0]
+    return float(min(1.0, least))
 
 
 @njit(**_OPTIONS)

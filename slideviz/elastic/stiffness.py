@@ -1,8 +1,14 @@
 """Stiffness matrix of the mesh as an elastic body, with its boundary conditions, as in SU2.
 
-Young's modulus of a cell is the inverse of its volume, Poisson's ratio 0.3, plane strain in two
-dimensions (SU2's DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME and DEFORM_POISSONS_RATIO). Conditions
-are eliminated during assembly, node by node: the displacement of node i is
+Young's modulus E of a cell comes from its volume or its distance to walls (`MODULI`), Poisson's
+ratio nu is one number, with plane strain in two dimensions (SU2's DEFORM_STIFFNESS_TYPE and
+DEFORM_COEFF):
+
+    mu = E / (2 (1 + nu)),    lam = nu E / ((1 + nu) (1 - 2 nu)).
+
+Beyond nu = 1, as in SU2's default of 1e6, lam is about -mu: enlarging a cell alike along all axes
+costs nothing in 2D, and in 3D gains energy. Conditions are eliminated during assembly, node by
+node: the displacement of node i is
 
     u_i = T_i z_k + g_i,      k = place_i
 
@@ -13,7 +19,8 @@ unknowns, only g_i. The matrix is symmetric with blocks d by d, as the multigrid
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -23,11 +30,9 @@ from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
 from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.terms import StiffnessType
 
 PYRAMID = 14
-TETRAHEDRON = 10
-PYRAMID_PARTS = ((0, 1, 2, 4), (0, 2, 3, 4), (0, 1, 3, 4), (1, 2, 3, 4))
-"""The tetrahedra of both divisions of a pyramid, by its corners; each counts half."""
 
 _CORNERS = {
     5: ((0, 0), (1, 0), (0, 1)),
@@ -38,6 +43,7 @@ _CORNERS = {
         *((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
     ),
     13: ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
+    14: ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1)),
 }
 """The corners of the reference elements in the order of SU2's (VTK's) nodes."""
 
@@ -58,6 +64,8 @@ class ReferenceShape:
 @cache
 def shape(vtk: int) -> ReferenceShape:
     """Return the shape functions of a VTK element type, in the order of SU2's nodes."""
+    if vtk == PYRAMID:
+        return _pyramid()
     import skfem
 
     element = {
@@ -92,34 +100,88 @@ def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
     return x, np.repeat(area, len(length)) * np.tile(length, len(area))
 
 
+def _pyramid() -> ReferenceShape:
+    """Return the pyramid of SU2: rational shape functions, five integration points.
+
+    With p = 1 - z the function of the corner at x = 1 is ((p + x)^2 - y^2) / (4 p), others by
+    symmetry, and z that of the apex.
+    """
+    side, near, far = 0.5, 0.1531754163448146, 0.6372983346207416
+    places = [(side, 0, near), (0, side, near), (-side, 0, near), (0, -side, near), (0, 0, far)]
+    gradients = np.zeros((len(places), 5, 3))
+    for q, (x, y, z) in enumerate(places):
+        p = 1.0 - z
+        for a, (s, t, _) in enumerate(_CORNERS[PYRAMID][:4]):
+            along, across = p + s * x + t * y, t * x + s * y
+            gradients[q, a, 0] = (s * along - t * across) / (2.0 * p)
+            gradients[q, a, 1] = (t * along - s * across) / (2.0 * p)
+            gradients[q, a, 2] = (along**2 - across**2) / (4.0 * p**2) - along / (2.0 * p)
+        gradients[q, 4, 2] = 1.0
+    return ReferenceShape(gradients, np.full(len(places), 2.0 / 15.0))
+
+
 @dataclass(frozen=True, eq=False)
 class ShapeBlock:
     """The elements of a mesh that have one shape."""
 
     shape: ReferenceShape
     nodes: IntArray  # (m, a)
-    cell: IntArray  # (m,): the cell of the mesh that each element is (a part of)
-    share: float  # weight of each element: 1, or 1/2 for the parts of pyramids
+    cell: IntArray  # (m,): the cell of the mesh that each element is
 
 
 def blocks(cells: Cells) -> list[ShapeBlock]:
-    """Return all cells as elements, a block for each type; pyramids as parts of tetrahedra."""
-    shapes = []
-    for vtk, (ids, nodes) in cells.by_type.items():
-        if vtk == PYRAMID:
-            # Read-only like the mesh's own, for which the loops are compiled.
-            parts = frozen_array(np.concatenate([nodes[:, p] for p in PYRAMID_PARTS]), np.int64)
-            shapes.append(
-                ShapeBlock(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5)
-            )
-        else:
-            shapes.append(ShapeBlock(shape(vtk), nodes, ids, 1.0))
-    return shapes
+    """Return all cells as elements, a block for each type."""
+    return [ShapeBlock(shape(vtk), nodes, ids) for vtk, (ids, nodes) in cells.by_type.items()]
 
 
 CHUNK = 20_000  # elements between two calls of tick: some tens of milliseconds
 
-POISSON = 0.3  # Poisson's ratio, SU2's default
+POISSON = 0.3  # Poisson's ratio of a case that names none, and of relaxation
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """How stiff the cells of a body are."""
+
+    kind: StiffnessType = "INVERSE_VOLUME"
+    poisson: float = POISSON
+    walls: IntArray = field(default_factory=lambda: np.empty(0, np.int64))  # their nodes, (w,)
+
+    def moduli(self, points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
+        """Return Young's modulus (c,) of each cell at positions (n, d); inf without volume."""
+        with np.errstate(divide="ignore"):
+            return np.where(
+                cell_volumes(points, parts) > 0.0, MODULI[self.kind](points, parts, self), np.inf
+            )
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Return mu and lam for a modulus of 1."""
+        nu = self.poisson
+        return 1.0 / (2.0 * (1.0 + nu)), nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+
+def _near_walls(points: FloatArray, parts: list[ShapeBlock], stiffness: Stiffness) -> FloatArray:
+    """Return one over the mean distance (c,) of the cells' nodes to the nearest node of a wall.
+
+    A cell between nodes of walls alone is as stiff as the stiffest of the others.
+    """
+    from scipy.spatial import KDTree
+
+    distance = np.asarray(KDTree(points[stiffness.walls]).query(points, workers=-1)[0])
+    mean = np.zeros(_count(parts))
+    for part in parts:
+        mean[part.cell] = distance[part.nodes].mean(axis=1)
+    some = mean > 0.0
+    return np.asarray(1.0 / np.where(some, mean, mean[some].min(initial=np.inf)))
+
+
+MODULI: dict[StiffnessType, Callable[[FloatArray, list[ShapeBlock], Stiffness], FloatArray]] = {
+    "SOLID_WALL_DISTANCE": _near_walls,
+    "INVERSE_VOLUME": lambda points, parts, _: 1.0 / cell_volumes(points, parts),
+    "CONSTANT_STIFFNESS": lambda _, parts, __: np.ones(_count(parts)),
+}
+"""Young's modulus (c,) of each cell, by kind of stiffness, from positions (n, d) and elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,52 +197,89 @@ class Conditions:
     free: FloatArray  # (k, d, d): P_k of each block of unknowns
 
 
-def assemble(
-    points: FloatArray, parts: list[ShapeBlock], conditions: Conditions, tick: Tick = no_tick
-) -> tuple[bsr_array, FloatArray]:
-    """Return the matrix (k d, k d) and the right-hand side (k d,) of the unknowns z.
+@dataclass(frozen=True, eq=False)
+class ElasticMesh:
+    """A mesh as an elastic body, at given positions."""
 
-    Raises DeformError if an element has no volume.
-    ``points`` (n, d): current positions. Inverted elements count with the absolute value of their
-    Jacobian, so that the matrix stays positive definite.
-    """
-    count, d = len(conditions.free), points.shape[1]
-    indptr, indices = _pattern(parts, conditions.place, count)
-    data = np.zeros((len(indices), d, d))
-    right = np.zeros((count, d))
-    entry = conditions.place, conditions.turn, conditions.plain, conditions.known
-    points = frozen_array(points, np.float64)  # as those of a mesh are: the loops compile once
-    total = sum(len(part.nodes) for part in parts)
-    done, volume = 0, cell_volumes(points, parts)
-    for part in parts:
-        for start in range(0, len(part.nodes), CHUNK):
-            rows = slice(start, start + CHUNK)
-            with np.errstate(divide="ignore"):  # found below
-                modulus = part.share / volume[part.cell[rows]]
-            nodes = sealed(part.nodes[rows])
-            elements = points, nodes, part.shape.gradients, part.shape.weights
-            bad = add(elements, modulus, entry, (indptr, indices), data, right)
-            if bad >= 0:
-                raise DeformError(
-                    f"cell {part.cell[start + bad]} has no volume, so linear elasticity cannot "
-                    "give it a stiffness; use more STEPS, or METHOD= rbf, or repair the mesh"
-                )
-            done += len(part.nodes[rows])
-            tick(done / total)
-    _fill_held_diagonal(indptr, indices, data, conditions.free)
-    matrix = bsr_array((data, indices, indptr), shape=(count * d, count * d))
-    return matrix, right.ravel()
+    points: FloatArray  # (n, d)
+    parts: list[ShapeBlock]  # the elements
+    moduli: FloatArray  # (c,): Young's modulus of each cell
+    lame: tuple[float, float]  # mu and lam for a modulus of 1
+
+    @classmethod
+    def at(cls, points: FloatArray, parts: list[ShapeBlock], stiffness: Stiffness) -> ElasticMesh:
+        """Return the body at positions (n, d). Raises DeformError if an element has no volume."""
+        points = frozen_array(points, np.float64)  # as those of a mesh are: the loops compile once
+        moduli = stiffness.moduli(points, parts)
+        if not (moduli < np.inf).all():
+            raise _no_volume(int(np.flatnonzero(~(moduli < np.inf))[0]))
+        return cls(points, parts, moduli, stiffness.lame)
+
+    def matrix(self, conditions: Conditions, tick: Tick = no_tick) -> bsr_array:
+        """Return the matrix (k d, k d) of the unknowns z.
+
+        Raises DeformError if an element has no volume. Inverted elements count with the absolute
+        value of their Jacobian, so that the matrix stays positive definite (with nu below 0.5).
+        """
+        count, d = len(conditions.free), self.points.shape[1]
+        indptr, indices = _pattern(self.parts, conditions.place, count)
+        data = np.zeros((len(indices), d, d))
+        entry = conditions.place, conditions.turn, conditions.plain
+        total = sum(len(part.nodes) for part in self.parts)
+        done = 0
+        for part in self.parts:
+            for start in range(0, len(part.nodes), CHUNK):
+                rows = slice(start, start + CHUNK)
+                cell = part.cell[rows]
+                elements = self._elements(part, rows)
+                bad = add(elements, self.moduli[cell], self.lame, entry, (indptr, indices), data)
+                if bad >= 0:
+                    raise _no_volume(int(cell[bad]))
+                done += len(cell)
+                tick(done / total)
+        _fill_held_diagonal(indptr, indices, data, conditions.free)
+        return bsr_array((data, indices, indptr), shape=(count * d, count * d))
+
+    def forces(self, moved: FloatArray) -> FloatArray:
+        """Return the forces (n, d) of a displacement (n, d), by its differences in each element.
+
+        So a body that moves as a whole has none, to the bit. The entries of the matrix cancel to
+        rounding only, and what the stiffest cells leave pulls soft ones far away.
+        """
+        out = np.zeros(moved.shape)
+        for part in self.parts:
+            elements = self._elements(part, slice(None))
+            add_forces(elements, self.moduli[part.cell], self.lame, moved, out)
+        return out
+
+    def _elements(
+        self, part: ShapeBlock, rows: slice
+    ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+        shape = part.shape
+        return self.points, sealed(part.nodes[rows]), shape.gradients, shape.weights
+
+
+def _no_volume(cell: int) -> DeformError:
+    return DeformError(
+        f"cell {cell} has no volume, so linear elasticity cannot give it a stiffness; use more "
+        "STEPS, or METHOD= rbf, or repair the mesh"
+    )
 
 
 def cell_volumes(points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
     """Return the volume (area in 2D) of each cell, (c,)."""
-    out = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
+    out = np.zeros(_count(parts))
     for part in parts:
         each = np.empty(len(part.nodes))
         shape = part.shape
         volumes(sealed(points), sealed(part.nodes), shape.gradients, shape.weights, each)
-        np.add.at(out, part.cell, part.share * each)
+        out[part.cell] = each
     return out
+
+
+def _count(parts: list[ShapeBlock]) -> int:
+    """Return the number of cells."""
+    return max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0)
 
 
 def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -292,15 +391,15 @@ def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-
 
 
 @njit(**OPTIONS)
-def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no-untyped-def]
-    """Add elements to the matrix blocks ``data`` and the right-hand side ``right`` (k, d).
+def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-untyped-def]
+    """Add elements to the matrix blocks ``data``.
 
     Returns the first element without volume, at which it ends, or -1. ``elements``: points, nodes,
-    gradients and weights; ``conditions``: place, turn, plain and known; ``pattern``: indptr and
-    indices.
+    gradients and weights; ``modulus`` (m,); ``lame``: mu and lam for a modulus of 1;
+    ``conditions``: place, turn and plain; ``pattern``: indptr and indices.
     """
     points, nodes, gradients, weights = elements
-    place, turn, plain, known = conditions
+    place, turn, plain = conditions
     indptr, indices = pattern
     n, d = nodes.shape[1], points.shape[1]
     inverse, x = np.empty((3, 3)), np.empty((n, d))
@@ -308,16 +407,19 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
     block, half = np.empty((d, d)), np.empty((d, d))
     for e in range(len(nodes)):
         _gather(points, nodes, e, x)
-        if not (modulus[e] < np.inf and _products(x, gradients, weights, inverse, g, m)):
+        if not _products(x, gradients, weights, inverse, g, m):
             return e
-        mu = modulus[e] / (2.0 * (1.0 + POISSON))
-        lam = modulus[e] * POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
+        mu, lam = modulus[e] * lame[0], modulus[e] * lame[1]
         for a in range(n):
             first = nodes[e, a]
             row = place[first]
             if row < 0:
                 continue
             for b in range(n):
+                second = nodes[e, b]
+                column = place[second]
+                if column < 0:
+                    continue
                 trace = 0.0
                 for i in range(d):
                     trace += m[a * d + i, b * d + i]
@@ -327,13 +429,6 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
                     block[i, i] += mu * trace
                 if not plain[first]:
                     _into(turn[first], block, half, True)
-                second = nodes[e, b]
-                for i in range(d):
-                    for j in range(d):
-                        right[row, i] -= block[i, j] * known[second, j]
-                column = place[second]
-                if column < 0:
-                    continue
                 if not plain[second]:
                     _into(turn[second], block, half, False)
                 low, high = indptr[row], indptr[row + 1] - 1
@@ -347,6 +442,43 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
                     for j in range(d):
                         data[low, i, j] += block[i, j]
     return -1
+
+
+@njit(**OPTIONS)
+def add_forces(elements, modulus, lame, moved, out):  # type: ignore[no-untyped-def]
+    """Add the forces of a displacement (n, d) to ``out`` (n, d); parameters as of ``add``."""
+    points, nodes, gradients, weights = elements
+    n, d = nodes.shape[1], points.shape[1]
+    inverse, x, y = np.empty((3, 3)), np.empty((n, d)), np.empty((n, d))
+    g, slopes, f = np.empty((d, d)), np.empty((n, d)), np.empty((n, d))
+    for e in range(len(nodes)):
+        _gather(points, nodes, e, x)
+        _gather(moved, nodes, e, y)
+        f[:] = 0.0
+        for q in range(len(weights)):
+            size = modulus[e] * abs(_jacobian(x, gradients, q, inverse)) * weights[q]
+            g[:] = 0.0
+            for a in range(n):
+                for i in range(d):
+                    slopes[a, i] = 0.0
+                    for j in range(d):
+                        slopes[a, i] += inverse[i, j] * gradients[q, a, j]
+                for i in range(d):
+                    for j in range(d):
+                        g[i, j] += (y[a, i] - y[0, i]) * slopes[a, j]
+            trace = 0.0
+            for i in range(d):
+                trace += g[i, i]
+            for a in range(1, n):
+                for i in range(d):
+                    total = lame[1] * trace * slopes[a, i]
+                    for j in range(d):
+                        total += lame[0] * (g[i, j] + g[j, i]) * slopes[a, j]
+                    f[a, i] += size * total
+                    f[0, i] -= size * total
+        for a in range(n):
+            for i in range(d):
+                out[nodes[e, a], i] += f[a, i]
 
 
 @njit(**OPTIONS)

@@ -31,10 +31,9 @@ __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
 COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)  # numbers of steps that STEPS= auto tries, in this order
 
-ELASTIC_BYTES = {2: 2_000, 3: 8_000}
-"""Bytes of memory that linear elasticity takes for each node, by dimension: measured on
-quadrilaterals and hexahedra, whose matrix has the most entries."""
-
+ELASTIC_BYTES = 8_000
+"""Bytes of memory that linear elasticity takes for each node: measured on quadrilaterals, whose
+factor takes most of it, and on hexahedra, whose matrix has the most entries."""
 
 RELAX_BYTES = 1_700  # bytes of memory that relaxation takes for each node: measured on hexahedra
 
@@ -225,7 +224,7 @@ def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
     """Raise DeformError when a step's systems would not fit into memory; ``lasting``: `Problem`."""
     if case.method == "elastic":
         _require_free(
-            ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
+            ELASTIC_BYTES * len(setup.coords),
             f"linear elasticity of {len(setup.coords)} nodes needs",
             "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
         )

@@ -41,10 +41,12 @@ from slideviz.solver.prescribed import (
     support_radius,
 )
 from slideviz.solver.rims import find_rims
+from slideviz.terms import NOT_WALLS
 
 if TYPE_CHECKING:
     from slideviz.elastic.conditions import Body
     from slideviz.elastic.relaxation import Relaxation
+    from slideviz.elastic.stiffness import Stiffness
 
 EXACT_NODES = 2000
 """Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
@@ -327,14 +329,30 @@ def _method(
     if case.method == "elastic":
         from slideviz.elastic.linear import deform_elastic
 
-        return partial(deform_elastic, body=elastic_body(mesh, frame, axis))
+        body = replace(elastic_body(mesh, frame, axis), stiffness=stiffness_of(case, mesh))
+        return partial(deform_elastic, body=body)
     return SLIDING_METHODS[case.sliding]
+
+
+def stiffness_of(case: Case, mesh: Mesh) -> Stiffness:
+    """Return how stiff the cells of an elastic body are."""
+    from slideviz.elastic.stiffness import Stiffness
+
+    walls = [np.empty(0, np.int64)]
+    for marker in mesh.markers:
+        role, name = case.roles.get(marker.name, "fixed"), marker.name.lower()
+        if role == "moving" or (role == "fixed" and not any(word in name for word in NOT_WALLS)):
+            walls.append(marker.nodes)
+    nodes = np.unique(np.concatenate(walls))
+    return Stiffness(case.deform_stiffness_type, case.deform_coeff, nodes)
 
 
 def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return the note that RELAX= AUTO relaxes no such mesh."""
-    if case.relax == "no" or case.method != "rbf":
+    if case.relax == "no":
         return ()
+    if case.method != "rbf":
+        return (Note(f"METHOD= {case.method} is not relaxed, as RELAX= AUTO would do with rbf"),)
     if mesh.part is not None:
         return (Note("RELAX= AUTO relaxes no mesh that goes from file to file"),)
     if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:

@@ -162,7 +162,10 @@ COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     sliding: (term.name, {"method": "rbf", "sliding": sliding})
     for sliding, term in terms.SLIDING.items()
 } | {
-    method: (term.name, {"method": method, "sliding": term.slides_by})
+    method: (
+        term.name,
+        {"method": method, "sliding": term.slides_by, "relax": "no", "layers": "no"},
+    )
     for method, term in terms.METHODS.items()
     if method != "rbf"
 }

@@ -9,7 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.su2.config import read_config
+from slideviz.design.su2.config import own_changes, read_config
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.mesh.topology import find_boundary, vertex_normals
@@ -533,6 +533,37 @@ def test_elasticity_that_su2_is_asked_for_is_noted(here):
     Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_KIND= ELASTIC\n")
     (said,) = read_config(Path("a.cfg")).case.warnings
     assert said.startswith("DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; wr")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", ("SOLID_WALL_DISTANCE", 1e6, 1)),
+        (
+            "DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME\nDEFORM_COEFF= 0.3\nDEFORM_NONLINEAR_ITER= 4\n",
+            ("INVERSE_VOLUME", 0.3, 4),
+        ),
+        ("DEFORM_STIFFNESS_TYPE= WALL_DISTANCE\nSTEPS= 2\n", ("SOLID_WALL_DISTANCE", 1e6, 2)),
+    ],
+)
+def test_elasticity_of_a_configuration_is_that_of_su2(text, expected, here):
+    Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\n{text}")
+    own, others = own_changes(["METHOD=elastic", "LAYERS=NO"])
+    assert (own, others) == ({"METHOD": "elastic"}, ["LAYERS=NO"])
+    found = read_config(Path("a.cfg"), own)
+    case = found.case
+    assert (case.deform_stiffness_type, case.deform_coeff, case.steps) == expected
+    assert found.ignored == ()
+    plain = read_config(Path("a.cfg"))  # SU2's keys are not for radial functions
+    assert (plain.case.deform_coeff, plain.case.steps) == (0.3, 2 if "STEPS" in text else 1)
+    assert set(plain.ignored) == {line.split("=")[0] for line in text.split() if "DEFORM" in line}
+
+
+def test_wrong_elasticity_of_a_configuration_is_told(here):
+    Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_COEFF= 0.6\n")
+    assert read_config(Path("a.cfg")).ignored == ("DEFORM_COEFF",)
+    with pytest.raises(CaseError, match=r"a.cfg:6: DEFORM_COEFF: 0.6 is out of range; expected"):
+        read_config(Path("a.cfg"), {"METHOD": "elastic"})
 
 
 def turned(points, numbers, degrees):

@@ -25,13 +25,16 @@ def prism_rule():
     return np.array(points).T, np.array(weights)
 
 
-def stiffness(points, vtk: int, nodes, poisson: float = 0.3) -> np.ndarray:
-    """Dense matrix (n d, n d), dofs node by node; Young's modulus is the inverse of the volume."""
+def stiffness(points, vtk: int, nodes, poisson: float = 0.3, modulus=None) -> np.ndarray:
+    """Dense matrix (n d, n d), dofs node by node.
+
+    ``modulus`` (m,): Young's modulus of each cell; None: the inverse of its volume.
+    """
     mesh_type, element, order = MESHES[vtk]
     mesh = mesh_type(points.T, np.asarray(nodes)[:, order].T.copy())
     rule = {"quadrature": prism_rule()} if vtk == 13 else {"intorder": 4}
     basis = skfem.Basis(mesh, skfem.ElementVector(element()), **rule)
-    modulus = (1.0 / basis.dx.sum(axis=1))[:, None]
+    modulus = (1.0 / basis.dx.sum(axis=1) if modulus is None else modulus)[:, None]
 
     @skfem.BilinearForm
     def form(u, v, w):

@@ -46,12 +46,21 @@ METHODS: Mapping[str, Mapping[str, Any]] = {
     "auto": {"relax": "auto", "layers": "auto"},
     "elastic": {"method": "elastic", "relax": "no", "layers": "no", "steps": 1},
     "elastic-10": {"method": "elastic", "relax": "no", "layers": "no", "steps": 10},
+    "su2": {
+        "method": "elastic",
+        "relax": "no",
+        "layers": "no",
+        "steps": 1,
+        "deform_stiffness_type": "SOLID_WALL_DISTANCE",
+        "deform_coeff": 1e6,
+    },
 }
-"""Settings of each method. Those of the first four keep the number of steps of the row."""
+"""Settings of each method. Those of the first four keep the number of steps of the row; ``su2`` is
+linear elasticity with SU2's defaults, ``elastic`` with small cells stiff."""
 
 LAYERED, BARE = (
-    ("rbf", "layers", "relax", "auto", "elastic", "elastic-10"),
-    ("rbf", "relax", "elastic"),
+    ("rbf", "layers", "relax", "auto", "elastic", "elastic-10", "su2"),
+    ("rbf", "relax", "elastic", "su2"),
 )
 """Methods for rows with boundary layers, and without."""
 

@@ -51,25 +51,30 @@ FOCUS = 0.5 * 1.1019 * 0.12**2
 
 
 def c_mesh(
-    outline: Outline = naca_0012, around: int = 120, wake: int = 24, first: float = FIRST
+    outline: Outline = naca_0012,
+    around: int = 120,
+    wake: int = 24,
+    first: float = FIRST,
+    far: float = FAR,
 ) -> sv.Mesh:
     """Return a C-mesh with layers around an airfoil.
 
     It is a sheared grid in the plane of w = sqrt(z - z0), where the airfoil and its wake are nearly
     a straight line. ``around`` and ``wake`` are the numbers of cells around the airfoil and along
-    the wake; ``first`` is the height of the first cells, as a part of the whole height.
+    the wake; ``first`` is the height of the first cells, as a part of the whole height, and
+    ``far`` the radius of the far field.
     """
     z = outline(np.linspace(-1.0, 1.0, around + 1)) - FOCUS
     z[0] = z[-1]
     w = np.sqrt(np.abs(z)) * np.exp(0.5j * (np.unwrap(np.angle(z))))
     w *= np.sign(w[-1].real)
-    ratio = _ratio((np.sqrt(FAR) - w[-1].real) / (w[-1] - w[-2]).real, wake)
+    ratio = _ratio((np.sqrt(far) - w[-1].real) / (w[-1] - w[-2]).real, wake)
     behind = w[-1].real + (w[-1] - w[-2]).real * np.cumsum(ratio ** np.arange(1, wake + 1))
     base = np.r_[-behind[::-1], w, behind]
     steps = first * GROWTH ** np.arange(80)
     steps = steps[np.cumsum(steps) < 1.0]
     way = np.r_[0.0, np.cumsum(steps)] / steps.sum()
-    height = (np.sqrt(FAR) - base.imag)[:, None] * way
+    height = (np.sqrt(far) - base.imag)[:, None] * way
     z = (base[:, None] + 1j * height) ** 2 + FOCUS
     number = np.arange(z.size).reshape(z.shape)
     number[-wake - 1 :, 0] = number[wake::-1, 0]  # both sides of the wake are one

@@ -55,19 +55,26 @@ READ_ALWAYS = {
 }
 READ_WITH_RBF = {"RADIAL_BASIS_FUNCTION_PARAMETER": real(0.0), "DEFORM_NONLINEAR_ITER": integer(1)}
 """Kinds of values; of keys that mean something else unless DEFORM_KIND is RBF."""
+ELASTIC = {
+    "DEFORM_STIFFNESS_TYPE": "SOLID_WALL_DISTANCE",
+    "DEFORM_COEFF": "1e6",
+    "DEFORM_NONLINEAR_ITER": "1",
+}
+"""Keys that are read with METHOD= elastic, with SU2's defaults (version 8.5)."""
 FUNCTION = "KIND_RADIAL_BASIS_FUNCTION"
 
 
 def radial_keys(rows: Mapping[str, Entry]) -> set[str]:
     """Return the names of the keys that are read, given all of a configuration."""
     with_rbf = {FUNCTION, *READ_WITH_RBF} if _word(rows, "DEFORM_KIND") == "RBF" else set()
-    return {"DEFORM_KIND", *READ_ALWAYS, *with_rbf}
+    elastic = ELASTIC if _word(rows, "METHOD") == "ELASTIC" else ()
+    return {"DEFORM_KIND", *READ_ALWAYS, *with_rbf, *elastic}
 
 
 def radial_settings(
     case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str], None], warnings: list[str]
 ) -> Case:
-    """Return the case with SU2's settings of radial functions, where slideviz's own are not given.
+    """Return the case with SU2's settings of its method, where slideviz's own are not given.
 
     ``note`` takes a key with a wrong value, and a why about it.
     """
@@ -95,7 +102,22 @@ def radial_settings(
             case = case.change(support_radius=factor * radius)
         if "DEFORM_NONLINEAR_ITER" in fields and "STEPS" not in rows:
             case = case.change(steps=fields["DEFORM_NONLINEAR_ITER"])
+    if case.method == "elastic":
+        case = _elastic(case, rows, note)
     return _reduced(case, rows, fields)
+
+
+def _elastic(case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str], None]) -> Case:
+    """Return the case with SU2's settings of linear elasticity, or its defaults."""
+    for name, default in ELASTIC.items():
+        key = KEYS["STEPS" if name == "DEFORM_NONLINEAR_ITER" else name]
+        if key.name in rows and key.name != name:
+            continue
+        try:
+            case = key.put(case, key.kind.read(rows[name].value if name in rows else default))
+        except CaseError as problem:
+            note(rows[name], str(problem))
+    return case
 
 
 def _reduced(case: Case, rows: Mapping[str, Entry], given: Mapping[str, Any]) -> Case:
@@ -166,7 +188,7 @@ NUMBERS = {
 """Keys of numbers among them, and what these must be above."""
 COUNTS = ("_ITER", "_DEPTH")  # endings of those whose number is a whole one
 LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
-NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES)
+NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES, *ELASTIC)
 """Keys of case files that mean something else in SU2, or are read in another way."""
 OURS = {
     name: key
@@ -237,7 +259,7 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
         key = name.strip().upper()
         if sign and key == "MARKER_MOVING":
             raise CaseError(f"--set {text}: DV_MARKER says what moves here; set that")
-        if sign and key in (known - set(KEYS)) | listed:
+        if sign and key in (known - set(KEYS)) | listed | {"METHOD"}:
             found[key] = value.strip()
             continue
         if sign and key not in {*known, *KEYS}:
