@@ -79,6 +79,7 @@ def zone_designs(
     motion, designs = InterfaceMotion(case, mesh), list[ZoneDesign]()
     shared = np.concatenate([nodes[:0], *(each.nodes for each in motion.interfaces)])
     shift = np.zeros((len(references), *mesh.points.shape))
+    deformed = np.zeros(len(mesh.points), bool)
     for index, ahead in motion.in_order():
         part, own = mesh.zone_parts[index], motion.cases[index]
         points = np.arange(part.points.start, part.points.stop)
@@ -87,11 +88,15 @@ def zone_designs(
         leaders = motion.leader[mine]
         place = np.searchsorted(nodes, leaders).clip(max=len(nodes) - 1)
         rows = np.where(nodes[place] == leaders, place, -1)
-        led = np.flatnonzero(motion.led[mine] & (rows < 0))
+        # Rims that are kept on walls go otherwise than the design says.
+        follows = motion.led[mine] & ((rows < 0) | (own.rims == "slide") & deformed[leaders])
+        rows[follows] = -1
+        led = np.flatnonzero(follows)
         leaders = leaders[led]
         asked = value(zone_rows(rows, references))
         asked[:, led] = shift[:, leaders]
         deformer = make(part.mesh, own, asked)
+        deformed[points] = True
         designs.append(ZoneDesign(index + 1, points, rows, led, leaders, deformer))
         at = np.intersect1d(points, shared)
         for k, each in enumerate(asked if len(at) and ahead else ()):

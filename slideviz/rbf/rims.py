@@ -97,6 +97,10 @@ class Bodies:
         )
         return factor.solve, rows[:, self.rim]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: not the factor, which is computed again."""
+        return {name: part for name, part in self.__dict__.items() if name != "_harmonic"}
+
     def prepare(self) -> None:
         """Compute what `spread` keeps."""
         self.spread(np.ones((len(self.rim), 1)))

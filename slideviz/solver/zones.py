@@ -72,14 +72,20 @@ class InterfaceMotion:
         return [index for index in zones if self.cases[index].markers_with("moving")]
 
     def first(self, zones: list[int]) -> int:
-        """Return the zone to deform first: the one whose fixed boundaries fewest others lead."""
+        """Return the zone to deform first: the one whose fixed boundaries fewest others lead.
+
+        Where rims are kept on walls (RIMS= SLIDE), those that others lead by moving count, too.
+        """
+        leading = {("fixed", "sliding")}
+        if any(case.rims == "slide" for case in self._alone):
+            leading |= {(role, "moving") for role in FOLLOWING}
 
         def led(index: int) -> int:
             return sum(
                 self._zone[each.marker] == index
                 and each.zone - 1 in zones
-                and self.roles.get(each.marker, "fixed") == "fixed"
-                and self.roles.get(each.other, "fixed") == "sliding"
+                and (self.roles.get(each.marker, "fixed"), self.roles.get(each.other, "fixed"))
+                in leading
                 for each in self.interfaces
             )
 

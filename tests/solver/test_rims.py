@@ -1,6 +1,8 @@
 """Rims: nodes that moving boundaries share with walls; they leave these, or stay on them."""
 
+import pickle
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.motion import displacements
+from slideviz.mesh.zones import join_zones
 from slideviz.rbf.rims import Bodies, side_weights
 from slideviz.session.motions import Ghosts
 from slideviz.solver.growth import wall_warnings
@@ -250,6 +253,30 @@ def test_derivatives(name, steps):
     other = rng.standard_normal((len(rims.bodies.share), mesh.dim))
     there, back = rims.bodies.spread(one), rims.bodies.gathered(other)
     assert (there * other).sum() == pytest.approx((one * back).sum(), rel=1e-12)
+
+
+def test_what_follows_a_moving_boundary_follows_its_rim(tmp_path):
+    """Two channels, of which the first follows the bottom of the second, that leaves its sides."""
+    lower = builders.grid((4, 3), place=lambda p: p / [4.0, 3.0] - [0.0, 1.0])
+    zones = [
+        replace(mesh, zone=k, zones=2)
+        for k, mesh in enumerate((lower, builders.square(4, block=False)), 1)
+    ]
+    mesh = join_zones(zones)
+    roles = {f"{zone}:{side}": "sliding" for zone in (1, 2) for side in ("x_m", "x_p")}
+    case = case_of(roles | {"2:y_m": "moving"}, [sv.Translate("2:y_m", (0.05, 0.02))], steps=2)
+    step, deformer = last(case, mesh), sv.Deformer(mesh, case)
+    for points in (
+        step.mesh.points,
+        deformer.deform(),
+        deformer.deform(0.7 * deformer.displacement),
+    ):
+        one, two = (points[mesh.marker(name).nodes] for name in ("1:y_p", "2:y_m"))
+        np.testing.assert_allclose(one, two, rtol=0, atol=1e-15)
+        assert set(two[[0, -1], 0]) == {0.0, 1.0}
+    np.testing.assert_allclose(deformer.deform(), step.mesh.points, rtol=0, atol=1e-13)
+    copy = pickle.loads(pickle.dumps(deformer))
+    assert np.array_equal(copy.deform(), deformer.deform())
 
 
 def test_a_correction_is_between_those_of_the_rim_and_linear_in_them():
