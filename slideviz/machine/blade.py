@@ -25,6 +25,7 @@ from slideviz.machine.span import SpanCurves, SpanField
 from slideviz.mesh.model import FloatArray, IntArray
 
 SECTIONS = 24  # sections of a blade, of which centroids and edges are found
+TIED = 1e-6  # distances are equal up to this part of the largest one
 Complex = NDArray[np.complex128]
 
 TOTALS = 5
@@ -213,12 +214,25 @@ def _centroid(cut: Complex) -> complex:
 
 
 def _edges(outline: Complex) -> tuple[complex, complex]:
-    """Return the two points that are farthest apart, the one with the smaller m' first."""
+    """Return the two points that are farthest apart, the one with the smaller m' first.
+
+    Of several pairs, such as the diagonals of a blunt section, it is one in the middle of them, so
+    that rounding does not decide.
+    """
     ends = np.unique(np.concatenate([_extreme(outline, a) for a in np.linspace(0, np.pi, 181)]))
     far = np.abs(ends[:, None] - ends)
-    one, two = np.unravel_index(int(np.argmax(far)), far.shape)
-    first, last = sorted((ends[one], ends[two]), key=lambda end: (end.real, end.imag))
-    return complex(first), complex(last)
+    size = far.max()
+    one, two = np.nonzero(far >= (1.0 - TIED) * size)
+    chord, middle = ends[two] - ends[one], 0.5 * (ends[one] + ends[two])
+    steep = np.abs(chord.real) <= TIED * size
+    ahead = np.where(steep, chord.imag >= 0.0, chord.real > 0.0)
+    centre = _mid_range(middle[ahead].real) + 1j * _mid_range(middle[ahead].imag)
+    half = 0.5 * size * np.exp(1j * _mid_range(np.angle(chord[ahead])))
+    return complex(centre - half), complex(centre + half)
+
+
+def _mid_range(values: FloatArray) -> float:
+    return 0.5 * float(values.min() + values.max())
 
 
 def _extreme(outline: Complex, angle: float) -> Complex:

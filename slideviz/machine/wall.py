@@ -16,6 +16,7 @@ REVOLUTION = 0.02
 """A wall is a surface of revolution if its normals at nodes have a smaller component along theta,
 as a root of the mean square: facets of a curved profile have some, too."""
 APART = 1e-3  # least distance of points of a profile, as a part of its extent
+ROUGH = 1e-6  # places count as equal up to this part of a length
 STRAIGHT = 0.5  # least cosine of the bend of a profile at a point
 FLAT = 1e-7  # a rim that is so narrow, as a part of its length, is of a blade without thickness
 
@@ -70,6 +71,7 @@ def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
         return None
     places = coords[nodes, :2]
     apart = APART * float(np.linalg.norm(np.ptp(places, axis=0)))
+    places = places[_order(places, apart)]
     _, first = np.unique(np.round(places / (0.5 * apart)), axis=0, return_index=True)
     places = places[first]
     last = int(np.argmax(np.sum((places - places[0]) ** 2, axis=1)))
@@ -135,8 +137,10 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
         steps = np.diff(coords[[*rim, start]], axis=0)
         steps[:, 2] -= turn * np.round(steps[:, 2] / turn)
         if node == start and abs(steps[:, 2].sum()) < 0.5 * turn:  # else it goes round the axis
-            places = coords[start] + np.cumsum(steps, axis=0)
-            rims.setdefault(int(part[start]), []).append((places, np.array([*rim[1:], start])))
+            first = _order(coords[rim], APART * turn)[0]
+            steps, rim = np.roll(steps, -first, axis=0), np.roll(rim, -first)
+            places = coords[rim[0]] + np.cumsum(steps, axis=0)
+            rims.setdefault(int(part[start]), []).append((places, np.roll(rim, -1)))
     for several in rims.values():
         several.sort(key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))))
         for places, nodes in several[:-1]:
@@ -146,6 +150,15 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
                 triangles = Delaunay(flat).simplices
                 inside = _inside(flat, flat[triangles].mean(axis=1))
                 yield nodes[triangles[inside][:, [0, 1, 2, 2]]]
+
+
+def _order(places: FloatArray, length: float) -> IntArray:
+    """Return the order (n,) of places (n, k) by coordinates, however their nodes are numbered.
+
+    Differences far below a length, such as those of rounding, count only where others vanish.
+    """
+    rough = np.round(places / (ROUGH * length))
+    return np.lexsort([*places.T[::-1], *rough.T[::-1]])
 
 
 def _inside(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:

@@ -69,7 +69,10 @@ def block():
     mesh = passage((4, 6, 8))
     x, y, z = mesh.points.T
     turned = (x + 1j * y) * np.exp(0.2j * z)
-    mesh = mesh.with_points(np.stack([turned.real, turned.imag, z], axis=1))
+    return laid_flat(mesh.with_points(np.stack([turned.real, turned.imag, z], axis=1)))
+
+
+def laid_flat(mesh):
     nodes = mesh.marker("blade").nodes
     field = find_span(mesh, "hub", "shroud", AXIS, ORIGIN, np.radians(30.0))
     boundary = boundary_of(mesh)
@@ -134,6 +137,20 @@ def test_camber_bends_the_middle_by_its_part_of_the_chord_and_keeps_the_edges(bl
     expected = 0.1 * 4.0 * place * (1.0 - place) * 1j * (last - first)
     assert np.abs(bent - flat - expected).max() < 1e-5
     assert np.abs(bent - flat)[ends].max() < 1e-5
+
+
+def test_rounding_does_not_choose_one_of_the_diagonals_of_a_blunt_section():
+    mesh = passage((4, 6, 8))
+    results = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        points = mesh.points * (1.0 + 1e-14 * rng.normal(size=mesh.points.shape))
+        field, at, triangles, before = laid_flat(mesh.with_points(points))
+        results.append(moved((field, at, triangles, before), CAMBER, 0.1)[2])
+    assert np.ptp(results, axis=0).max() < 1e-9
+    # Camber bends both long sides alike: along theta, as the middle line.
+    assert np.abs(results[0][:, 2]).max() > 0.01
+    assert np.abs(results[0][:, 0]).max() < 1e-9
 
 
 def test_what_has_no_sections_is_refused(block):

@@ -7,7 +7,7 @@ import slideviz as sv
 from slideviz.errors import MeshError
 from slideviz.machine.span import SpanCurves, find_span
 from slideviz.samples.impeller import impeller_mesh
-from tests.builders import passage, square
+from tests.builders import passage, shuffled, square
 
 AXIS, ORIGIN = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 PERIOD = np.radians(30.0)
@@ -172,3 +172,20 @@ def test_the_hole_below_a_blade_in_a_contoured_wall_is_closed():
     away = solid.points[np.abs(solid.points[:, 2] - 0.5) > 0.3]
     away = field.meridional(away[np.hypot(*away[:, :2].T) < 0.52])
     assert np.array_equal(field.span(away)[0], whole.span(away)[0])
+
+
+@pytest.mark.parametrize(
+    ("mesh", "ends", "period"),
+    [
+        (impeller_mesh(3000), ("HUB", "SHROUD"), 2 * np.pi / 13),
+        (contoured(passage((6, 12, 8))), ("hub", "shroud"), PERIOD),
+    ],
+)
+def test_span_does_not_depend_on_numbers_of_nodes(mesh, ends, period):
+    spans = []
+    for order, other in ((slice(None), mesh), shuffled(mesh, 1), shuffled(mesh, 2)):
+        field = find_span(other, *ends, AXIS, ORIGIN, period)
+        span = np.empty(len(mesh.points))
+        span[order] = field.span(field.meridional(other.points))[0]
+        spans.append(span)
+    assert np.ptp(spans, axis=0).max() < 1e-13

@@ -21,7 +21,7 @@ from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.mesh.repair.repair import WORTH, repair
 from slideviz.samples.table import sample
 from slideviz.system.threads import core_limit
-from tests.builders import grid
+from tests.builders import grid, shuffled
 
 SHAPES = [
     ((12, 12), "plain"),
@@ -385,7 +385,7 @@ def squeezed(seed):
 @given(st.integers(0, 10**6))
 @settings(max_examples=25)
 def test_a_stricter_limit_never_gives_a_worse_mesh(seed):
-    """The lowest quality may be lower by 0.01, or where the weaker limit was met."""
+    """The lowest quality may be lower by 3 % or 0.01, or where the weaker limit was met."""
     mesh, bad, sliding = squeezed(seed)
     start, before = quality(bad, mesh), None
     for below in (0.0, 0.1, 0.2, 0.3, 0.5, 0.7):
@@ -394,7 +394,7 @@ def test_a_stricter_limit_never_gives_a_worse_mesh(seed):
         folded = len(mesh.cells) - after.valid
         if before is not None:
             assert folded <= before[0]
-            assert after.min >= min(before[1:]) - 0.01
+            assert after.min >= min(0.97 * before[1], before[1] - 0.01, before[2])
         if len(done.left) > len(done.cells):  # not without reason
             assert folded < len(done.folded) or after.min > WORTH * start.min
         assert "-" not in done.words()
@@ -405,16 +405,7 @@ def test_a_stricter_limit_never_gives_a_worse_mesh(seed):
 @settings(max_examples=20)
 def test_numbers_of_nodes_and_cells_change_no_bit_of_a_repair(seed):
     mesh, bad, sliding = squeezed(seed)
-    rng = np.random.default_rng(seed)
-    old = rng.permutation(len(mesh.points))  # numbers of nodes before, by those after
-    new = np.argsort(old)
-
-    def numbered(cells):
-        return Cells.from_types(cells.types, new[cells.connectivity])
-
-    markers = tuple(replace(marker, cells=numbered(marker.cells)) for marker in mesh.markers)
-    cells = numbered(mesh.cells).take(rng.permutation(len(mesh.cells)))
-    other = sv.Mesh(mesh.points[old], cells, markers)
+    old, other = shuffled(mesh, seed)
     first = sv.repair(bad, mesh, sliding=sliding, below=0.3)
     second = sv.repair(other.with_points(bad.points[old]), other, sliding=sliding, below=0.3)
     assert np.array_equal(first.mesh.points[old], second.mesh.points)
