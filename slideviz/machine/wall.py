@@ -138,9 +138,9 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
         steps[:, 2] -= turn * np.round(steps[:, 2] / turn)
         if node == start and abs(steps[:, 2].sum()) < 0.5 * turn:  # else it goes round the axis
             first = _order(coords[rim], APART * turn)[0]
-            steps, rim = np.roll(steps, -first, axis=0), np.roll(rim, -first)
-            places = coords[rim[0]] + np.cumsum(steps, axis=0)
-            rims.setdefault(int(part[start]), []).append((places, np.roll(rim, -1)))
+            places = coords[rim[first]] + np.cumsum(np.roll(steps, -first, axis=0), axis=0)
+            nodes = np.roll(np.array(rim), -first - 1)
+            rims.setdefault(int(part[start]), []).append((places, nodes))
     for several in rims.values():
         several.sort(key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))))
         for places, nodes in several[:-1]:
