@@ -27,6 +27,7 @@ from slideviz.mesh.walls import Walls, statistics_of, wall_words
 from slideviz.mesh.zones import marker_zones
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
+from slideviz.solver.layers import height_warnings
 from slideviz.solver.steps import MeshRepair, safe_fraction_of
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
@@ -66,6 +67,7 @@ def run_report(
     ``walls``: the layers at the boundaries; None where the mesh is in a file.
     """
     last, safe = steps[-1], safe_fraction_of(steps)
+    changed = [] if walls is None else height_warnings(case, walls, last.mesh)
     each = [step.relaxed for step in steps if step.relaxed is not None]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
@@ -115,7 +117,7 @@ def run_report(
         "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
-        "warnings": list(last.warnings),
+        "warnings": [*last.warnings, *changed],
         "convergence": [
             {"step": step.index, **_fields(cycle, CYCLE_KEYS)}
             for step in steps

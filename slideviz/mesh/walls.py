@@ -75,6 +75,13 @@ class Columns:
         """Return the places of a boundary, ascending: columns, then c + g for facets without."""
         return np.unique(self.corner[self.boundary.marker == self.boundary.names.index(marker)])
 
+    def at(self, points: FloatArray, place: int) -> FloatArray:
+        """Return the point (d,) of one of the places on its boundary; ``points`` (n, d): nodes."""
+        count = len(self.nodes)
+        if place < count:
+            return points[self.nodes[place, 0]]
+        return _middles(points, self.boundary.facets[self.bare[[place - count]]])[0]
+
     def stack_thickness(self, points: FloatArray, most: int | None = None) -> FloatArray:
         """Return the thickness (f,) of the stack of flat cells on each facet, at ``points`` (n, d).
 

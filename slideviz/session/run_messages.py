@@ -16,6 +16,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.motion_scale import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
+from slideviz.solver.layers import height_warnings
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
 from slideviz.terms import KERNELS
@@ -161,7 +162,11 @@ def notes_of(run: Run) -> tuple[str, ...]:
 
 
 def _remarks(run: Run, notes: bool) -> tuple[str, ...]:
-    texts = () if run.last_step is None else run.last_step.warnings
+    if run.last is None or run.last_step is None:
+        return ()
+    layers, texts = run.last.walls, run.last_step.warnings
+    if layers is not None:
+        texts += tuple(height_warnings(run.case, layers, run.last.mesh))
     return tuple(with_field_labels(text) for text in texts if isinstance(text, Note) == notes)
 
 

@@ -13,7 +13,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import facet_vectors
-from slideviz.mesh.walls import Columns, find_columns
+from slideviz.mesh.walls import BADNESS, Columns, Walls, find_columns
 from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
 from slideviz.solver.domain import Domain
 
@@ -21,6 +21,7 @@ STEEP = 3.0  # largest first height that is kept, over the median of the wall
 SHARP = -0.25
 """Cosine between the normals of the sides of a sharp edge, at most: it has an angle below 75°. The
 sides of blunter edges turn as one: nodes that see both would come nearer to the edge else."""
+CHANGED = 1.5  # ratio of first heights, after over before or reverse, from which on a run warns
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
@@ -118,3 +119,34 @@ def _first_heights(
     column = column[column < len(rise)]
     np.maximum.at(first, np.searchsorted(nodes, columns.nodes[column, 0]), rise[column])
     return np.where(first > 0.0, np.minimum(first, STEEP * usual), usual)
+
+
+def height_warnings(case: Case, walls: Walls, mesh: Mesh) -> list[str]:
+    """Return warnings of layers whose first heights a run changed by more than `CHANGED`.
+
+    ``walls``: of the deformed ``mesh``, beside the undeformed one. At moving and fixed walls.
+    """
+    warnings = []
+    for name in walls.markers:
+        if name not in walls.layered or case.roles.get(name, "fixed") not in ("moving", "fixed"):
+            continue
+        at = walls.columns.places(name)
+        ratio = walls.values["height_ratio"][at]
+        k = int(np.argmax(np.nan_to_num(BADNESS["height_ratio"](ratio), nan=0.0)))
+        if not 1.0 / CHANGED <= ratio[k] <= CHANGED and np.isfinite(ratio[k]):
+            where = ", ".join(f"{x:.6g}" for x in walls.columns.at(mesh.points, at[k]))
+            warnings.append(
+                f"the first height of the layers at {name} is {ratio[k]:.3g} times that before at "
+                f"({where}), beyond {1.0 / CHANGED:.2g} to {CHANGED}: {_remedy(case, name)}"
+            )
+    return warnings
+
+
+def _remedy(case: Case, name: str) -> str:
+    """Return what keeps first heights that a run changed."""
+    if case.method != "rbf":
+        return "METHOD= rbf with LAYERS= AUTO keeps it"
+    if case.layers == "no":
+        return "LAYERS= AUTO keeps it"
+    away = f"move {name} less" if case.roles.get(name) == "moving" else f"stay farther from {name}"
+    return f"{away}, or set a smaller LAYER_THICKNESS"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +12,12 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Prescribed, Rotate, Translate
+from slideviz.cli import run
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.samples.table import sample
+from slideviz.session import jobs
+from slideviz.session.run_messages import warnings_of
+from slideviz.session.state import Run, StepFrame
 from slideviz.solver.setup import make_setup
 from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
@@ -251,6 +258,47 @@ def carried(mesh, moved, **changes):
 
 def lifted(x):
     return np.stack([0 * x[:, 0], 0.08 * x[:, 0] ** 2], axis=1)
+
+
+THICKER = sv.Scale("w", (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("motion", "settings", "remedy"),
+    [
+        (THICKER, {"layers": "no"}, "LAYERS= AUTO keeps it"),
+        (sv.Scale("w", (1.0, 0.4)), {"layers": "no"}, "LAYERS= AUTO keeps it"),
+        (THICKER, {"method": "elastic", "layers": "no"}, "METHOD= rbf with LAYERS= AUTO keeps it"),
+        (THICKER, {"layers": "auto"}, None),
+        (sv.Scale("w", (1.0, 1.3)), {"layers": "no"}, None),
+    ],
+)
+def test_first_heights_that_changed_much_are_a_warning_with_wall_place_and_remedy(
+    motion, settings, remedy, tmp_path, capsys
+):
+    mesh = around(ellipse, 30, 60)
+    case = Case(roles={"w": "moving"}, motions=(motion,), mesh_file=tmp_path / "mesh.su2")
+    case = case.change(mesh_out=tmp_path / "out.su2", **settings)
+    sv.write(case.mesh_file, mesh)
+    case.write(tmp_path / "case.cfg")
+    assert run(["run", str(tmp_path / "case.cfg"), "--json", str(tmp_path / "report.json")]) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    said = [text for text in report["warnings"] if "the first height" in text]
+    frames = []
+    jobs.compute(case, mesh, frames.append, lambda: False)
+    ended = Run(1, case, tuple(x for x in frames if isinstance(x, StepFrame)), "done")
+    shown = [text for text in warnings_of(ended) if "the first height" in text]
+    assert len(said) == len(shown) == (remedy is not None)
+    if remedy is None:
+        return
+    assert said[0] in capsys.readouterr().err
+    assert said[0].endswith(remedy)
+    ratios = report["walls"]["w"]["first_height"]["ratio"]
+    worst = max((ratios["min"], ratios["max"]), key=lambda ratio: abs(np.log(ratio)))
+    place = re.search(rf"layers at w is {worst:.3g} times that before at \((.*), (.*)\)", said[0])
+    moved = sv.read(case.mesh_out)
+    away = moved.points[moved.marker("w").nodes] - [float(place[1]), float(place[2])]
+    assert np.abs(away).max(axis=1).min() < 1e-5
 
 
 def sharp(edge_deg, camber):
