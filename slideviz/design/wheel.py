@@ -193,22 +193,36 @@ def _repeated_zone(case: Case, mesh: Mesh, passages: Count) -> tuple[Mesh, tuple
         raise CaseError("the case has no periodic boundaries; passages are merged at these")
     base = without_halo(mesh)[0]
     known = [name for name in names if len(base.marker(name).cells)]  # halos have none
+    shift = None
+    with suppress(MeshError):
+        shift = pair_up(base, known, "translational")[0].describe()
     try:
         pairs = pair_up(base, known, "rotational", case.axis, case.origin)
     except MeshError:
-        with suppress(MeshError):
-            shift = pair_up(base, known, "translational")[0].describe()
-            raise CaseError(
-                f"{mesh.name}: its periodic boundaries are images by a translation ({shift}), so "
-                "there is no wheel; a wheel needs passages that are turned about an axis"
-            ) from None
-        raise
+        if shift is None:
+            raise
+        raise CaseError(
+            f"{mesh.name}: its periodic boundaries are images by a translation ({shift}), so "
+            "there is no wheel; a wheel needs passages that are turned about an axis"
+        ) from None
+    if shift is not None and case.periodic_type != "rotational":
+        raise CaseError(
+            f"{mesh.name}: its periodic boundaries are images by a translation ({shift}) and by a "
+            f"rotation ({pairs[0].describe()}), and PERIODIC_TYPE= {case.periodic_type.upper()} "
+            "takes the translation; a wheel needs PERIODIC_TYPE= ROTATIONAL"
+        )
     period = Wheel((base,), pairs).period
     count = round(2.0 * np.pi / period) if passages == "all" else passages
     if passages == "all" and abs(count * period - 2.0 * np.pi) > 1e-9:
         raise CaseError(
             f"the period is {np.degrees(period):.6g}°, which is no whole part of a turn; give "
             "the number of passages"
+        )
+    most = int(2.0 * np.pi / period + 1e-9)
+    if count > most:
+        raise CaseError(
+            f"{mesh.name}: {count} passages of {np.degrees(period):.6g}° are more than a turn; use "
+            f"{most} or fewer"
         )
     if count < 1:
         raise CaseError(f"{count} passages; expected 1 or more, or all")

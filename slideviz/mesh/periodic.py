@@ -186,6 +186,23 @@ def _match_kind(
     return pair, float(distance.max()) if one_to_one and not trivial else np.inf
 
 
+def turned_too(
+    mesh: Mesh, pairs: Sequence[Pair], axis: Sequence[float], origin: Sequence[float]
+) -> Pair | None:
+    """Return a pair of the rotation by which translated sides match as well; None if they do not.
+
+    So do the sides of half a wheel, whose passages are turned by 180°.
+    """
+    allowed, turned = TOLERANCE * mesh.extent, None
+    for each in pairs:
+        turned, worst = _match_kind(
+            mesh, each.first, each.second, "rotational", axis=axis, origin=origin, bound=2 * allowed
+        )
+        if each.kind == "rotational" or not worst <= allowed:
+            return None
+    return turned
+
+
 def pair_up(
     mesh: Mesh,
     names: Sequence[str],

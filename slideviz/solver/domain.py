@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.errors import MeshError
+from slideviz.errors import MeshError, Note
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.nearest import near_duplicates
-from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.periodic import Pair, pair_up, turned_too
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.classify import Classes, classify, directions, fan_roles
 from slideviz.rbf.frames import Frame, hold_on_axis, make_frame, on_axis
@@ -69,6 +69,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs, frame, coords, representative = find_period(case, mesh, boundary)
+    notes += _ambiguous_period(case, mesh, pairs)
     classes = find_classes(case, mesh, boundary, fans, frame, representative)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
@@ -152,6 +153,21 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
     if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
         return ()
     return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
+
+
+def _ambiguous_period(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> tuple[str, ...]:
+    """Return a note where PERIODIC_TYPE= AUTO takes a translation, and a rotation fits as well."""
+    if case.periodic == "none" or case.periodic_type != "auto":
+        return ()
+    turned = turned_too(without_halo(mesh)[0], pairs, case.axis, case.origin)
+    if turned is None:
+        return ()
+    text = (
+        f"{turned.first} and {turned.second} match by a translation ({pairs[0].describe()}) and by "
+        f"a rotation ({turned.describe()}); PERIODIC_TYPE= AUTO takes the translation: write "
+        "TRANSLATIONAL or ROTATIONAL"
+    )
+    return (Note(text),)
 
 
 def find_classes(

@@ -1,6 +1,7 @@
 """``sv.wheel`` and ``slideviz wheel``: deformed passages in one file."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.zones import join_zones
-from tests.builders import passage, square, stage
+from tests.builders import passage, sector, square, stage
 
+SIDES = {"per1": "periodic", "per2": "periodic"}
 MOVED = sv.Rotate("blade", 4.0, (0.75, 0.2, 0.5), (1.0, 0.3, 0.0))
 
 
@@ -68,9 +70,30 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
         sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 35.0))
     with pytest.raises(CaseError, match="0 passages; expected 1 or more, or all"):
         sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 40.0), passages=0)
+    with pytest.raises(CaseError, match=r"1000000000 passages of 40° are more .*; use 9 or fewer"):
+        sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 40.0), passages=1_000_000_000)
     with pytest.raises(CaseError, match="no MESH_FILENAME; give the mesh"):
         sv.wheel(path, case_of())
     assert not path.exists()
+
+
+@pytest.mark.parametrize("mesh", [passage((4, 6, 4), 180.0), sector(8, 180.0)])
+def test_sides_that_match_by_a_shift_and_by_a_turn_are_one_of_both(tmp_path, mesh):
+    both = r"translation \(1\.5 along .* rotation \(180° about z\)"
+    case = case_of(periodic_type="auto", periodic="fixed", motions=())
+    moved = next(name for name in ("blade", "BLOCK") if name in mesh.marker_names)
+    shift = sv.Translate(moved, (0.0, 0.01, 0.0)[: mesh.dim])
+    case = case.change(roles={**SIDES, moved: "moving"}, motions=(shift,))
+    note = f"per1 and per2 match by a {both}; PERIODIC_TYPE= AUTO takes the translation: write"
+    for kind, count in (("auto", 1), ("translational", 0), ("rotational", 0)):
+        *_, step = sv.deform(case.change(periodic_type=kind), mesh)
+        assert sum(bool(re.match(note, text)) for text in step.warnings) == count
+    for kind in ("auto", "translational"):
+        one = case.change(periodic_type=kind)
+        with pytest.raises(CaseError, match=rf"{both}, and PERIODIC_TYPE= {kind.upper()} takes"):
+            sv.wheel(tmp_path / "wheel.su2", one, mesh)
+    made = sv.wheel(tmp_path / "wheel.su2", case.change(periodic_type="rotational"), mesh)
+    assert (made.passages, made.is_closed) == (2, True)
 
 
 def test_the_command_writes_and_reports_it(tmp_path, capsys, monkeypatch):
@@ -144,7 +167,7 @@ def test_zones_have_numbers_of_passages_and_rows_of_a_table_of_their_own(tmp_pat
     assert {"per1", "1:blade_2", "blade_12"} <= set(made.boundaries)
     with pytest.raises(CaseError, match="3 numbers of passages for 2 zones; give one for all"):
         sv.wheel(path, case, mesh, passages=[1, 2, 3])
-    with pytest.raises(MeshError, match=r"zone 1: .*10 passages of 40° are more than a turn"):
+    with pytest.raises(CaseError, match=r"zone 1: .*10 passages of 40° are more than a turn"):
         sv.wheel(path, case, mesh, passages=10)
     motions = tuple(sv.Translate(f"{zone}:blade", (0.0, 0.0, 0.0)) for zone in (1, 2))
     case = case.change(motions=motions)
