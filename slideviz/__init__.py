@@ -12,24 +12,13 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from slideviz.case.limits import Limit, LimitResult, quality
-    from slideviz.case.model import (
-        Bump,
-        Case,
-        Cst,
-        Ffd,
-        FfdCamber,
-        FfdThickness,
-        FfdTwist,
-        FromFile,
-        HicksHenne,
-        Onto,
-        Prescribed,
-        Radial,
-        Rotate,
-        Scale,
-        SpanMotion,
-        Translate,
-    )
+    from slideviz.case.model import Case
+    from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+    from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
+    from slideviz.case.motions.file import FromFile, Prescribed
+    from slideviz.case.motions.onto import Onto
+    from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+    from slideviz.case.motions.span import SpanMotion
     from slideviz.design.deformer import Constraint, Deformer
     from slideviz.design.gap import Gap, gaps
     from slideviz.design.span_variables import SpanVariables
@@ -57,8 +46,13 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "case.limits": "Limit LimitResult quality",
-    "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
-    "Onto Prescribed Radial Rotate Scale SpanMotion Translate",
+    "case.model": "Case",
+    "case.motions.airfoil": "Bump Cst HicksHenne",
+    "case.motions.box": "Ffd FfdCamber FfdThickness FfdTwist",
+    "case.motions.file": "FromFile Prescribed",
+    "case.motions.onto": "Onto",
+    "case.motions.rigid": "Radial Rotate Scale Translate",
+    "case.motions.span": "SpanMotion",
     "design.deformer": "Constraint Deformer",
     "design.gap": "Gap gaps",
     "design.span_variables": "SpanVariables",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set, Sized
 from contextlib import suppress
+from dataclasses import fields as dataclass_fields
 from functools import cache, wraps
 from inspect import get_annotations
 from numbers import Integral, Real
@@ -32,6 +33,7 @@ _WORDS = {
     "Case": "a Case, as slideviz.Case.read returns it",
     "Executor": "an executor of concurrent.futures",
     "Mesh": "a Mesh, as slideviz.read returns it",
+    "Motion": "a motion, e.g. Translate(...)",
     "NoneType": "None",
     "Path": "the name of a file",
     "bool": "True or False",
@@ -85,7 +87,8 @@ def check_fields(value: Any) -> None:
     enumeration has another value.
     """
     kind: Any = type(value)
-    fields, hints = value.__dataclass_fields__, _annotations(kind)
+    fields = {field.name: field for field in dataclass_fields(value)}
+    hints = _annotations(kind)
     given = [
         (name, field)
         for name in fields

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.cli import run
 from slideviz.mesh.quality import INVERTED
 from slideviz.samples.table import sample, write_sample

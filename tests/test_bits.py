@@ -7,7 +7,8 @@ for rounding is not enough.
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, Rotate, Scale
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Scale
 from slideviz.mesh.topology import find_boundary
 from slideviz.solver.setup import make_setup
 from tests import builders

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import find_boundary

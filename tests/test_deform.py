@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.rbf.reduction import Reduction

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
 from slideviz.case.motion import displacements
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.cli import run as command
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh

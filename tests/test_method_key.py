@@ -12,7 +12,8 @@ import slideviz as sv
 from slideviz.case.cfg import set_key
 from slideviz.case.check import effective, idle_settings
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Rotate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate
 from slideviz.cli import run
 from slideviz.errors import CaseError, DeformError
 from slideviz.rbf.reduction import Reduction

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
 from slideviz.rbf.reduction import Reduction

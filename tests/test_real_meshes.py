@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import corners

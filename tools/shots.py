@@ -20,7 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.case.model import Case, FromFile, Motion, Onto, Rotate, SpanMotion, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.motion import Motion
+from slideviz.case.motions.onto import Onto
+from slideviz.case.motions.rigid import Rotate, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.cli import run
 from slideviz.errors import SlidevizError
 from slideviz.formats.files import read, write

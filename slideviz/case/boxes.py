@@ -1,31 +1,29 @@
-"""The FFD boxes that a case can use (of its mesh, or its own), and the displacements they give."""
+"""The FFD boxes that a case can use: of its mesh, or its own; and the nodes in them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements, mean_of
-from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, applies_to, named
-from slideviz.errors import CaseError, Note, SlidevizError, nearest
+from slideviz.errors import CaseError, nearest
 from slideviz.ffd.box import (
     CARTESIAN,
     Box,
     CoordinateSystem,
     Embedding,
-    Index,
     plane_corners,
     polar_corners,
     regular_box,
 )
 from slideviz.ffd.deformation import parametric
-from slideviz.ffd.kinds import Turn
-from slideviz.ffd.section import boxes_of, with_boxes
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.ffd.section import boxes_of
+from slideviz.mesh.model import Mesh
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 OFF = 1e-6
 """Largest distance between a node and the point that the mesh file's parametric coordinates give
@@ -85,87 +83,6 @@ def _defined(
         raise CaseError(f"FFD_DEFINITION: box {name!r}: {problem}") from problem
 
 
-def box_motions(case: Case) -> tuple[BoxMotion, ...]:
-    """Return the motions of a case that move control points of boxes."""
-    return tuple(motion for motion in case.motions if isinstance(motion, BoxMotion))
-
-
-def ffd_problems(case: Case, mesh: Mesh, motion: BoxMotion) -> tuple[str, ...]:
-    """Return why a motion of a box is impossible with a mesh, a sentence for each reason."""
-    try:
-        boxes = boxes_for(case, mesh)
-    except SlidevizError as problem:
-        return (str(problem),)
-    if motion.box not in boxes:
-        none = "none is in it, or in FFD_DEFINITION"
-        return (missing_box(mesh, motion.box, boxes, none),)
-    box = boxes[motion.box]
-    unknown = box.problem(_lattice_index(motion, mesh.dim))
-    problems = [unknown] if unknown else []
-    name, across = ("dz", 2) if box.system.kind == "CARTESIAN" else ("dθ", 1)
-    if isinstance(motion, Ffd) and mesh.dim == 2 and (shift := motion.vector[across]):
-        problems.append(f"{name} is {shift:g}, which leaves the plane; in 2D write 0")
-    if isinstance(motion, FfdTwist) and mesh.dim == 2:
-        problems.append("a box in 2D has no span to twist along; write rotate")
-    if isinstance(motion, FfdTwist) and case.ffd_system != "CARTESIAN":
-        problems.append(
-            f"ffd-twist turns control points in x, y and z, and FFD_COORD_SYSTEM is "
-            f"{case.ffd_system}; move them along θ with ffd"
-        )
-    if not isinstance(motion, Ffd | FfdTwist) and mesh.dim == 2 and case.ffd_system != "CARTESIAN":
-        problems.append(f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}")
-    return tuple(problems)
-
-
-def _lattice_index(motion: BoxMotion, dim: int) -> Index:
-    """Return the index (i, j, k) of the control points that a motion moves; -1 means all."""
-    if isinstance(motion, Ffd):
-        return motion.index
-    if isinstance(motion, FfdTwist):
-        return -1, motion.plane, -1
-    i, j = motion.index
-    return i, (j if dim == 3 else -1), -1
-
-
-def _change_of(motion: BoxMotion, box: Box, q: FloatArray, dim: int) -> FloatArray:
-    """Return the change (I, J, K, 3) of control points, now at ``q``, by a motion."""
-    index = _lattice_index(motion, dim)
-    if isinstance(motion, Ffd):
-        return box.change(index, motion.vector)
-    if isinstance(motion, FfdTwist):
-        chosen = box.change(index, (1.0, 1.0, 1.0))[..., 0] > 0.0
-        point = (*motion.point, 0.0)[:3]
-        turn = Turn(chosen, np.array(point), np.array(motion.axis), math.pi / 180.0)
-        return turn.change(q, motion.angle_deg)
-    across = 2 if dim == 3 else 1
-    change = box.change(index, tuple(float(axis == across) * motion.amount for axis in range(3)))
-    if isinstance(motion, FfdThickness):  # from the lowest layer to the highest one
-        sides = np.linspace(-1.0, 1.0, box.points.shape[across])
-        change *= np.expand_dims(sides, [axis for axis in range(4) if axis != across])
-    return change
-
-
-def box_changes(
-    case: Case, mesh: Mesh, boxes: Mapping[str, Box]
-) -> dict[str, list[tuple[int, FloatArray, FloatArray]]]:
-    """Return how motions change control points, for each box that some move, in their order.
-
-    Place of the motion, the control points (I, J, K, 3) before it, in the box's coordinates, and
-    their change by it. Motions that do not fit their box change nothing.
-    """
-    changes: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
-    for place, motion in enumerate(case.motions):
-        if not isinstance(motion, BoxMotion) or motion.box not in boxes:
-            continue
-        box = boxes[motion.box]
-        if box.problem(_lattice_index(motion, mesh.dim)):
-            continue
-        mine = changes.setdefault(motion.box, [])
-        q = mine[-1][1] + mine[-1][2] if mine else box.q
-        mine.append((place, q, _change_of(motion, box, q, mesh.dim)))
-    return changes
-
-
 def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
     """Return the message that there is no box of a name, with those there are.
 
@@ -216,85 +133,3 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
         f"box again; if it is in other coordinates, set FFD_COORD_SYSTEM"
     )
     return [sentence] if off > OFF else []
-
-
-def ffd_displacements(
-    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
-) -> dict[object, Displacements]:
-    """Return the displacements of the nodes ``on`` moving markers, by motion of a box.
-
-    Equal motions have one entry, with the mean of their displacements. Raises CaseError if none of
-    the nodes that a motion should move is in its box; a line for each such motion.
-    """
-    motions = box_motions(case)
-    boxes = boxes_for(case, mesh) if motions else {}
-    displacements: dict[object, list[Displacements]] = {}
-    problems = {}
-    alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
-    for name, changes in box_changes(case, mesh, boxes).items():
-        for place, q, change in changes:
-            motion = case.motions[place]
-            mine = {name: nodes for name, nodes in on.items() if applies_to(motion, name)}
-            moved = _moved(boxes[name], mesh, q, change, mine)
-            if moved is not None:
-                if not alone and any(b.name == name for b in boxes_of(mesh, system_of(case))):
-                    stays = Note(_STAYS.format(repr(name)))
-                    moved = replace(moved, warnings=(*moved.warnings, stays))
-                displacements.setdefault(motion, []).append(moved)
-            elif mine:
-                of = " or ".join(repr(one) for one in named(motion.marker)) or "a moving marker"
-                problems[place] = (
-                    f"motion {place + 1}: no node of {of} is in the FFD box {name!r}; move the "
-                    "box, or take another boundary"
-                )
-    if problems:
-        raise CaseError("\n".join(problems[place] for place in sorted(problems)))
-    return {motion: mean_of(several) for motion, several in displacements.items()}
-
-
-_STAYS = (
-    "the FFD box {} in the deformed mesh stays where it was, because boxes are nested or other "
-    "motions move boundaries, too; define it again to use it with that mesh"
-)
-
-
-def _moved(
-    box: Box, mesh: Mesh, q: FloatArray, change: FloatArray, on: Mapping[str, IntArray]
-) -> Displacements | None:
-    """Return the displacements that a change of control points gives all nodes of some markers.
-
-    None where no node is in the box. ``q`` (I, J, K, 3) are the control points before, ``on`` has
-    the nodes (k,) of each marker.
-    """
-    nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
-    vectors = np.zeros((len(nodes), mesh.dim))
-    warnings, any_inside = [], False
-    for name in on:
-        inside, _ = embedding(box, mesh, name)
-        any_inside |= bool(len(inside.nodes))
-        shift = inside.sums(change)
-        if box.system.kind != "CARTESIAN":
-            before = inside.sums(q)
-            shift = box.system.points_of(before + shift) - box.system.points_of(before)
-        vectors[np.searchsorted(nodes, inside.nodes)] = shift[:, : mesh.dim]
-        warnings += off_points(box, mesh, name)
-    return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None
-
-
-def moved_boxes(case: Case, mesh: Mesh, part: float = 1.0) -> Mesh:
-    """Return the mesh with its boxes deformed by the motions of the case times ``part``, 0 to 1.
-
-    Where the case has motions of other kinds too, or boxes are nested, they are left as they are:
-    no control points could follow these.
-    """
-    motions = box_motions(case)
-    if not motions or len(motions) < len(case.motions):
-        return mesh
-    boxes = {box.name: box for box in boxes_of(mesh, system_of(case))}
-    if any(box.level for box in boxes.values()):
-        return mesh
-    moved = []
-    for name, changes in box_changes(case, mesh, boxes).items():
-        total = np.sum([change for _, _, change in changes], axis=0)
-        moved.append(boxes[name].moved(part * total))
-    return with_boxes(mesh, moved) if moved else mesh

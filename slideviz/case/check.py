@@ -5,31 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from slideviz.case.boxes import ffd_problems
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.limits import not_walls
 from slideviz.case.method_keys import FACTORS, why_no_tolerance
-from slideviz.case.model import (
-    BoxMotion,
-    FromFile,
-    Motion,
-    Onto,
-    PlacedMotion,
-    Prescribed,
-    Radial,
-    Rotate,
-    SpanMotion,
-    Translate,
-    applies_to,
-    named,
-)
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
-from slideviz.case.spans import span_problems
+from slideviz.case.motions.box import box_motions
+from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Note, nearest
 from slideviz.mesh.zones import without_zone
@@ -193,22 +177,26 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each moving marker without motion, and each motion that is unfit."""
     found = _without_motion(case)
-    for place, motion in enumerate(case.motions, start=1):
-        problems = [*_motion_problems(motion, mesh.dim)]
-        if isinstance(motion, BoxMotion) and not problems:
-            problems += ffd_problems(case, mesh, motion)
-        elif isinstance(motion, SpanMotion) and not problems:
-            problems += span_problems(case, mesh)
-        elif isinstance(motion, Prescribed):
-            problems += _prescribed_problems(case, mesh, motion)
-        elif isinstance(motion, Onto):
-            problems += _onto_problems(case, place)
-        found += [f"motion {place}: {text}" for text in problems]
+    for place, motion in enumerate(case.motions):
+        wrong = motion.incomplete() or _text_problem(motion)
+        problems = [wrong] if wrong else motion.problems(case, mesh, place)
+        found += [f"motion {place + 1}: {text}" for text in problems]
     return tuple(found)
 
 
+def _text_problem(motion: Motion) -> str:
+    """Return why a motion has values that cannot be read from a case file; "" if it has none."""
+    if not motion.checked_as_text:
+        return ""
+    try:
+        read_motions(write_motions((motion,)))
+    except (CaseError, TypeError, ValueError) as problem:
+        return str(problem).removeprefix("motion 1: ")
+    return ""
+
+
 def _without_motion(case: Case) -> list[str]:
-    boxed = any(isinstance(motion, BoxMotion) for motion in case.motions)
+    boxed = bool(box_motions(case))
     of_all = ", or move all moving markers in the box with (*, ffd, ...)" if boxed else ""
     return [
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
@@ -216,58 +204,6 @@ def _without_motion(case: Case) -> list[str]:
         for marker in case.markers_with("moving")
         if not any(applies_to(motion, marker) for motion in case.motions)
     ]
-
-
-def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
-    if isinstance(motion, FromFile | Prescribed) and not isinstance(motion, Onto):
-        return
-    if isinstance(motion, BoxMotion) and not motion.box:
-        yield "it names no FFD box; choose one of the mesh, or define one with FFD_DEFINITION"
-        return
-    try:
-        read_motions(write_motions((motion,)))
-    except (CaseError, TypeError, ValueError) as problem:
-        yield str(problem).removeprefix("motion 1: ")
-        return
-    if isinstance(motion, SpanMotion) and dim == 2:
-        yield f"{motion.kind} changes a blade over its span, and the mesh has none: it is 2D"
-    if isinstance(motion, PlacedMotion | Onto):
-        return
-    needed = f"the mesh has {dim} dimensions"
-    if isinstance(motion, Translate):
-        if len(motion.vector) != dim:
-            yield f"the shift has {len(motion.vector)} components, and {needed}; give {dim}"
-        return
-    if motion.point != "centroid" and len(motion.point) != dim:
-        yield f"the point has {len(motion.point)} coordinates, and {needed}; give {dim}"
-    if isinstance(motion, Rotate | Radial):
-        if dim == 2 and any(motion.axis[:2]):
-            yield f"the axis {motion.axis} leaves the plane; in 2D leave the axis out"
-    elif len(motion.factors) not in (1, dim):
-        yield f"{len(motion.factors)} factors are given, and {needed}; give 1 or {dim}"
-
-
-def _onto_problems(case: Case, place: int) -> Iterator[str]:
-    motion = case.motions[place - 1]
-    for marker in case.markers_with("moving"):
-        before = [one for one in case.motions[: place - 1] if applies_to(one, marker)]
-        if before and applies_to(motion, marker):
-            yield (
-                f"it begins at the undeformed places of {marker!r}, which another motion leaves "
-                "before; put this one first"
-            )
-
-
-def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator[str]:
-    if motion.vectors.shape[1] != mesh.dim:
-        has = motion.vectors.shape[1]
-        yield f"its vectors have {has} components, and the mesh {mesh.dim} dimensions"
-    names = (name for name in case.markers_with("moving") if applies_to(motion, name))
-    on = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
-    stray = np.setdiff1d(motion.nodes, np.concatenate([*on, np.empty(0, np.int64)]))
-    if len(stray):
-        more = f" (and {len(stray) - 1} more)" if len(stray) > 1 else ""
-        yield f"node {stray[0]}{more} is on none of the markers that it moves; remove it"
 
 
 def key_problems(case: Case) -> Iterator[str]:
@@ -394,12 +330,12 @@ def file_before_motions(case: Case) -> tuple[Note, ...]:
             sequences.setdefault(sequence, []).append(marker)
     return tuple(
         Note(
-            f"{first.path.name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), and "
-            f"then MOTION does so: {'; '.join(map(describe, others))}; DEFORMATION_FILENAME= NONE "
-            "leaves the file out"
+            f"{first.files[0].name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), "
+            f"and then MOTION does so: {'; '.join(map(describe, others))}; "
+            "DEFORMATION_FILENAME= NONE leaves the file out"
         )
         for (first, *others), markers in sequences.items()
-        if type(first) is FromFile and not first.marker
+        if first.is_case_file
     )
 
 

@@ -14,8 +14,9 @@ from slideviz.case.ffd_keys import FFD_ROWS
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, PERIODICITY, QUALITY, Key, role, setting
 from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case
 from slideviz.case.motion_text import MOTIONS
+from slideviz.case.motions.file import FromFile
 from slideviz.case.values import (
     AXIS,
     COUPLES,

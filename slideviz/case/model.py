@@ -4,276 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Annotated, Any
 
 from slideviz import terms
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.limits import Limit, read_limits
+from slideviz.case.motions.motion import Motion
 from slideviz.errors import CaseError, nearest, not_one_of
 from slideviz.formats.table import FILE_FORMATS
-from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, frozen_array
+from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG
 from slideviz.rbf.reduction import AUTO, Reduction
-
-Point = tuple[float, ...] | Literal["centroid"]
-Target = str | tuple[str, ...]
-"""The markers a motion moves: one, several as one body, or, where it is empty, all moving ones."""
-
-
-@dataclass(frozen=True)
-class Translate(CheckedFields):
-    """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
-
-    marker: Target
-    vector: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Rotate(CheckedFields):
-    """Rotate a marker by ``angle_deg`` about an axis through ``point`` (right-handed; any length).
-
-    In 2D the axis is z: positive angles turn counter-clockwise. Several markers have one common
-    centroid.
-    """
-
-    marker: Target
-    angle_deg: float
-    point: Point = "centroid"
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Scale(CheckedFields):
-    """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
-
-    marker: Target
-    factors: tuple[float, ...]
-    point: Point = "centroid"
-
-
-@dataclass(frozen=True)
-class Radial(CheckedFields):
-    """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
-
-    ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``; in 2D it
-    is z. ``distance`` is in the mesh's length unit. Nodes on the axis stay on it.
-    """
-
-    marker: Target
-    factor: float = 1.0
-    distance: float = 0.0
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    point: tuple[float, ...] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class FromFile(CheckedFields):
-    """Displace nodes as a file lists: node index, then the Cartesian displacement.
-
-    ``marker`` empty: the file serves all moving markers (RBF-SliDe's DEFORMATION_FILENAME).
-    """
-
-    path: Path
-    marker: Target = ""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "path", Path(self.path))
-
-
-@dataclass(frozen=True)
-class Onto(FromFile):
-    """Lay a marker onto the surface in a file: an STL or VTU surface, or a boundary of a mesh.
-
-    Nodes move to closest points, smoothly, from their undeformed places, so that no other motion of
-    the marker may come before. Those at the rim stay on the boundaries that they have in common
-    with. Of a mesh, the boundary with the marker's name counts, or its only one. ``limit`` is how
-    far a node may stay from the surface, in the mesh's length unit; 0 is 1 % of the marker's size.
-    """
-
-    limit: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0.0 <= self.limit < inf:
-            raise CaseError(
-                f"the limit {self.limit:g} is not above 0; leave it out for 1 % of the size"
-            )
-
-
-@dataclass(frozen=True)
-class Ffd(CheckedFields):
-    """Move control points of a box for free-form deformation, and with them the nodes inside.
-
-    ``box`` is the name of a box of the mesh or of ``Case.ffd_boxes``, ``index`` the control point
-    (i, j, k), where -1 takes all of a direction, ``vector`` its shift (dx, dy, dz), dz 0 in 2D. The
-    displacement of a node depends on its undeformed place in the undeformed box, whatever motions
-    come before.
-    """
-
-    marker: Target
-    box: str
-    index: tuple[int, int, int]
-    vector: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class HicksHenne(CheckedFields):
-    """Raise one side of an airfoil outwards by a bump (Hicks and Henne 1978).
-
-    It is ``height`` at ``peak``, a part of the ``chord`` between two x, and 0 at its ends. Nodes
-    move along y, from their undeformed places, whatever motions come before; the upper side is
-    where normals into the flow point to +y.
-    """
-
-    marker: Target
-    height: float
-    peak: float = 0.5
-    side: terms.Side = field(default="upper", metadata=terms.SIDES)
-    chord: tuple[float, float] = (0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Cst(CheckedFields):
-    """Add ``height`` times a class and shape function to y of one side of an airfoil (Kulfan 2008).
-
-    The function is the square root of t times (1 - t), times Bernstein polynomial k of n (from 1)
-    of ``term``, with t from 0 to 1 along the ``chord``; otherwise as `HicksHenne`.
-    """
-
-    marker: Target
-    height: float
-    term: tuple[int, int] = (1, 1)
-    side: terms.Side = field(default="upper", metadata=terms.SIDES)
-    chord: tuple[float, float] = (0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Bump(CheckedFields):
-    """Raise all sides of an airfoil towards +y by a bump; otherwise as `HicksHenne`."""
-
-    marker: Target
-    height: float
-    peak: float = 0.5
-    chord: tuple[float, float] = (0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class _FfdColumn(CheckedFields):
-    marker: Target
-    box: str
-    index: tuple[int, int]
-    amount: float
-
-
-@dataclass(frozen=True)
-class FfdCamber(_FfdColumn):
-    """Shift a column of control points of a box as one, and with it the nodes inside.
-
-    ``index`` (i, j) is the column, which goes along z; in 2D that of i, along y. -1 takes all.
-    """
-
-
-@dataclass(frozen=True)
-class FfdThickness(_FfdColumn):
-    """Stretch a column of control points of a box, and with it the nodes inside.
-
-    Its first control point goes by -``amount``, its last one by ``amount``. ``index`` as in
-    `FfdCamber`.
-    """
-
-
-@dataclass(frozen=True)
-class FfdTwist(CheckedFields):
-    """Rotate a plane j of control points of a box in 3D, and with it the nodes inside.
-
-    It turns by ``angle_deg`` about the axis through ``point`` (right-handed; any length). A
-    ``plane`` of -1 takes all.
-    """
-
-    marker: Target
-    box: str
-    plane: int
-    angle_deg: float
-    point: tuple[float, ...] = (0.0, 0.0, 0.0)
-    axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
-
-
-@dataclass(frozen=True)
-class SpanMotion(CheckedFields):
-    """Change the sections of a blade, each at its span, by a curve over the span.
-
-    The curve is the monotone cubic through ``values`` at ``spans``, from 0 at the hub to 1 at the
-    shroud, and constant beyond them; a single value holds for the whole span. By ``kind``:
-
-    * ``twist``, ``stagger``: turned about the stacking line, in degrees, from the direction of m
-      towards that of growing theta; ``stagger`` has a single value.
-    * ``lean``, ``sweep``: shifted along theta, or along the meridional direction, by a length.
-    * ``chord``: scaled about the stacking line by a factor.
-    * ``camber``: bent towards growing theta, by a part of the chord.
-
-    Nodes keep their span, so those of hub and shroud stay on them. ``point``: a point of the
-    stacking line, which then follows the line from hub to shroud through it; None: a straight line
-    fitted to the sections' centroids. Displacements depend on the undeformed blade, whatever
-    motions come before; several of one blade add up in any order.
-    """
-
-    marker: Target
-    kind: terms.SpanKind = field(metadata=terms.SPAN_KINDS)
-    spans: tuple[float, ...]
-    values: tuple[float, ...]
-    point: tuple[float, float, float] | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        spans = self.spans
-        if not spans or len(spans) != len(self.values):
-            raise CaseError(
-                f"{len(spans)} spans and {len(self.values)} values are given; a curve needs a "
-                "value for each span, and one or more"
-            )
-        if not (spans[0] >= 0.0 and spans[-1] <= 1.0) or (np.diff(spans) <= 0.0).any():
-            raise CaseError(
-                f"the spans {', '.join(f'{span:g}' for span in spans)} do not ascend from 0 (hub) "
-                "to 1 (shroud); sort them, each once"
-            )
-        if self.kind == "stagger" and len(spans) > 1:
-            raise CaseError("stagger has one angle for the whole span; a curve of them is a twist")
-        if self.kind == "chord" and min(self.values) <= 0.0:
-            raise CaseError(
-                f"the chord's factor {min(self.values):g} is not above 0: it would fold the blade"
-            )
-
-
-@dataclass(frozen=True, eq=False)
-class Prescribed(CheckedFields):
-    """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
-
-    Nodes are ascending, each once. Nodes of the markers that are not among them stay in place.
-    """
-
-    nodes: NDArray[np.int64]
-    vectors: NDArray[np.float64]
-    marker: Target = ""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        nodes = frozen_array(self.nodes, np.int64)
-        vectors = frozen_array(self.vectors, np.float64)
-        if nodes.ndim != 1 or vectors.ndim != 2 or len(nodes) != len(vectors):
-            raise CaseError(
-                f"nodes and vectors have the shapes {nodes.shape} and {vectors.shape}; expected "
-                "(k,) and (k, d)"
-            )
-        if (np.diff(nodes) <= 0).any() or not np.isfinite(vectors).all():
-            raise CaseError("nodes must be ascending, each once, and their vectors finite")
-        object.__setattr__(self, "nodes", nodes)
-        object.__setattr__(self, "vectors", vectors)
-
 
 _NUMBERS = (
     "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
@@ -282,22 +23,6 @@ _NUMBERS = (
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
 _ROLES = 'a role for each marker, as {"blade": "moving"}'
-OnAirfoil = HicksHenne | Cst | Bump
-BoxMotion = Ffd | FfdCamber | FfdThickness | FfdTwist
-"""Motions of control points of boxes; those of one box act one after the other."""
-PlacedMotion = OnAirfoil | BoxMotion | SpanMotion
-"""Motions that depend on undeformed places, whatever motions come before."""
-Motion = Translate | Rotate | Scale | Radial | PlacedMotion | FromFile | Prescribed
-
-
-def named(target: Target) -> tuple[str, ...]:
-    """Return the names of the markers in a target; () where it is all moving markers."""
-    return (target,) * bool(target) if isinstance(target, str) else target
-
-
-def applies_to(motion: Motion, marker: str) -> bool:
-    """Return whether a motion moves the moving marker ``marker``."""
-    return not motion.marker or marker in named(motion.marker)
 
 
 def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
@@ -305,10 +30,7 @@ def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
     return case.change(
         mesh_file=change(case.mesh_file) if case.mesh_file else None,
         mesh_out=change(case.mesh_out) if case.mesh_out else None,
-        motions=tuple(
-            replace(motion, path=change(motion.path)) if isinstance(motion, FromFile) else motion
-            for motion in case.motions
-        ),
+        motions=tuple(motion.with_files(change) for motion in case.motions),
     )
 
 
@@ -468,7 +190,7 @@ class Case(CheckedFields):
         inputs = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
         if self.source is not None:
             inputs[self.source] = "the case file"
-        files = (motion.path for motion in self.motions if isinstance(motion, FromFile))
+        files = (path for motion in self.motions for path in motion.files)
         return inputs | dict.fromkeys(files, "a file of a motion")
 
     @classmethod

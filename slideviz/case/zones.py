@@ -5,19 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from slideviz.case.boxes import boxes_for
-from slideviz.case.model import (
-    BoxMotion,
-    Case,
-    FromFile,
-    Motion,
-    Onto,
-    Prescribed,
-    Rotate,
-    Scale,
-    applies_to,
-    named,
-)
+from slideviz.case.model import Case
+from slideviz.case.motions.motion import Motion, applies_to, named
+from slideviz.case.motions.onto import Onto
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
@@ -126,10 +116,9 @@ def of_several_zones(motion: Motion, case: Case, mesh: Mesh) -> bool:
 
     So do those about their common centroid, and displacement files.
     """
-    about = isinstance(motion, Rotate | Scale) and motion.point == "centroid"
     moved = [name for name in case.markers_with("moving") if applies_to(motion, name)]
     zones = [not names_in(mesh, part).keys().isdisjoint(moved) for part in mesh.zone_parts]
-    return (about or isinstance(motion, FromFile)) and sum(zones) > 1
+    return motion.joins_zones and sum(zones) > 1
 
 
 def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
@@ -168,11 +157,7 @@ def zone_motion(
     moved = [names[name] for name in moving if name in names and applies_to(motion, name)]
     if not moved:
         return None
-    box = motion.box if isinstance(motion, BoxMotion) and not motion.marker else None
-    if box is not None and box not in boxes_for(zone, part.mesh):
-        return None  # that of another zone
-    if isinstance(motion, Prescribed):
-        nodes = motion.nodes - part.points.start
-        here = (nodes >= 0) & (nodes < len(part.mesh.points))
-        motion = replace(motion, nodes=nodes[here], vectors=motion.vectors[here])
-    return replace(motion, marker=moved[0] if len(moved) == 1 else tuple(moved))
+    here = motion.of_zone(part, zone)
+    if here is None:
+        return None
+    return here.with_marker(moved[0] if len(moved) == 1 else tuple(moved))

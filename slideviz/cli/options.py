@@ -212,7 +212,7 @@ def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:
     ``taken`` has, for markers that came into another role, the option that did it and the role
     before.
     """
-    from slideviz.case.model import named
+    from slideviz.case.motions.motion import named
     from slideviz.terms import ROLES
 
     periodic = case.markers_with("periodic")

@@ -16,7 +16,7 @@ import numpy as np
 from slideviz.case.limits import LimitResult, check_case_limits, names_text, value_words
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
-from slideviz.case.onto import Remaining
+from slideviz.case.motions.onto import Remaining
 from slideviz.case.words import counted
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS

@@ -13,7 +13,8 @@ from slideviz.case import motion
 from slideviz.case.check import require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.case.zones import with_marker_names
 from slideviz.design.checks import (
     Checks,

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from slideviz.argument_types import check_types
-from slideviz.case.model import Case, Radial, Rotate, Scale, SpanMotion
+from slideviz.case.model import Case
 from slideviz.case.motion import displacements
-from slideviz.case.spans import blades_of
+from slideviz.case.motions.span import SpanMotion, blades_of
 from slideviz.design.sweeps.columns import numbers_of
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -143,7 +143,7 @@ class SpanVariables:
 def _require_last(case: Case, first: int) -> None:
     """Raise CaseError if motion ``first``, over the span, comes before one of moved places."""
     for place, motion in enumerate(case.motions[first:], start=first + 1):
-        if isinstance(motion, Rotate | Scale | Radial):
+        if motion.depends_on_place:
             raise CaseError(
                 f"motion {place} turns or scales what motion {first + 1} has moved over the span, "
                 "so derivatives would have to go through it; put it before"

@@ -80,7 +80,7 @@ def zone_designs(
     shared = np.concatenate([nodes[:0], *(each.nodes for each in motion.interfaces)])
     shift = np.zeros((len(references), *mesh.points.shape))
     deformed = np.zeros(len(mesh.points), bool)
-    for index, ahead in motion.in_order():
+    for index, ahead in motion.leaders_first():
         part, own = mesh.zone_parts[index], motion.cases[index]
         points = np.arange(part.points.start, part.points.stop)
         on = [part.mesh.marker(name).nodes for name in own.markers_with("moving")]

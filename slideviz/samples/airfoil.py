@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.case.model import Case, Rotate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.case.model import Case, SpanMotion
+from slideviz.case.model import Case
+from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.samples.passage import (

@@ -21,7 +21,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 

@@ -19,7 +19,8 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
 from slideviz.errors import CaseError
 from slideviz.formats.table import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.spatial import Delaunay, cKDTree
 
-from slideviz.case.model import Case, FfdTwist, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.box import FfdTwist
+from slideviz.case.motions.rigid import Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.rbf.reduction import Reduction

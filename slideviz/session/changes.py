@@ -10,7 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from slideviz.case.model import Case, Motion, named, with_paths
+from slideviz.case.model import Case, with_paths
+from slideviz.case.motions.motion import Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.formats.source import Source
 from slideviz.formats.su2.read import read_su2

@@ -18,8 +18,8 @@ import numpy as np
 
 from slideviz.case.check import check_case
 from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_limits
-from slideviz.case.model import Case, FromFile, Onto
-from slideviz.case.spans import prepare_span
+from slideviz.case.model import Case
+from slideviz.case.motions.span import prepare_span
 from slideviz.case.zones import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
@@ -139,7 +139,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
     file has mistakes. The second does not: what moves crosses itself. Both are "" where the case
     has other problems, which are reported elsewhere.
     """
-    files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
+    files = [path for motion in case.motions for path in motion.files]
     prepare_spans(case, mesh)
     try:
         ready = case.motions and not check_case(case, mesh) and not stopped()
@@ -168,7 +168,7 @@ def prepare_spans(case: Case, mesh: Mesh) -> None:
 def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
     case = session.case
-    laid: tuple[object, ...] = tuple(one for one in case.motions if isinstance(one, Onto))
+    laid: tuple[object, ...] = tuple(one for one in case.motions if one.takes_time)
     if case.rims == "slide":
         laid = *laid, rims_key(case)
     same = (session.intersection, session.folding, session.laid) == (*found, laid)

@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import FromFile, Motion, SpanMotion
-from slideviz.terms import SPAN_KINDS
+from slideviz.case.motions.motion import Motion
 
-LINEAR = ("vector", "angle_deg", "distance", "height", "amount")
-"""Fields of motions to which the displacement is proportional: exactly, or nearly (angles)."""
-RATIOS = ("factor", "factors")  # fields that are 1 where nothing moves
 DIGITS = 10  # significant digits of a scaled value
 
 
 def can_scale(motions: Sequence[Motion]) -> bool:
     """Return whether motions can be scaled: displacements in files cannot."""
-    return not any(isinstance(motion, FromFile) for motion in motions)
+    return not any(motion.lists_nodes for motion in motions)
 
 
 def scaled(motions: Sequence[Motion], part: float) -> tuple[Motion, ...] | None:
     """Return motions that go ``part`` times as far; None where not all can (`can_scale`)."""
     if not can_scale(motions):
         return None
-    changed = ({k: _times(v, part, rest) for k, v, rest in _values(motion)} for motion in motions)
+    changed = ({k: _times(v, part, rest) for k, v, rest in motion.amounts()} for motion in motions)
     return tuple(replace(motion, **new) for motion, new in zip(motions, changed, strict=True))
 
 
 def moves_nothing(motion: Motion) -> bool:
     """Return whether a motion leaves its boundary in place; False for displacement files."""
-    far = [one for _, value, rest in _values(motion) for one in _list(value, rest)]
+    far = [one for _, value, rest in motion.amounts() for one in _list(value, rest)]
     return bool(far) and not any(far)
 
 
@@ -42,7 +38,7 @@ def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | No
     if at_rest is None or at_rest != scaled(others, 0.0):
         return None
     now, before = (
-        np.array([v for m in each for _, value, rest in _values(m) for v in _list(value, rest)])
+        np.array([v for m in each for _, value, rest in m.amounts() for v in _list(value, rest)])
         for each in (motions, others)
     )
     if now.shape != before.shape or not before.any():
@@ -50,14 +46,6 @@ def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | No
     factor = float(now @ before / (before @ before))
     alike = np.abs(now - factor * before).max() <= 1e-6 * np.abs(now).max()
     return factor if alike and factor > 0 else None
-
-
-def _values(motion: Motion) -> list[tuple[str, Any, float]]:
-    """Return name and value of the fields that say how far, and their value at rest."""
-    if isinstance(motion, SpanMotion):
-        return [("values", motion.values, SPAN_KINDS[motion.kind].neutral)]
-    names = [(field.name, float(field.name in RATIOS)) for field in fields(motion)]
-    return [(k, getattr(motion, k), rest) for k, rest in names if k in LINEAR or rest]
 
 
 def _list(value: Any, rest: float) -> list[float]:

@@ -7,18 +7,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from slideviz.case import model
 from slideviz.case.boxes import box_definition, boxes_for
-from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
+from slideviz.case.displacement import Displacements, parse_displacements
 from slideviz.case.lines import read_text
-from slideviz.case.model import Case, Motion, Target, applies_to, named
-from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
-from slideviz.case.motion_words import direction_words
-from slideviz.case.onto import is_laid, laid_displacements
+from slideviz.case.model import Case
+from slideviz.case.motion import displacements, moved_together, placed_displacements
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import IN_ZONES
+from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
+from slideviz.case.motions.onto import Onto, is_laid
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
@@ -117,9 +117,6 @@ def table_text(path: Path) -> str:
 DIGITS = 12
 """Significant digits of a centroid, relative to the extent of the mesh, and of a direction."""
 
-Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""An axis: its direction, and a point on it."""
-
 
 def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
     """Return the mean of the nodes of some boundaries together, rounded to `DIGITS`."""
@@ -167,40 +164,6 @@ def new_target(session: Session) -> Target:
 def _target(names: tuple[str, ...]) -> Target:
     """Return the target with some boundaries; a single one is a name, not a tuple."""
     return names[0] if len(names) == 1 else names or ""
-
-
-def new_motion(
-    kind: type,
-    marker: Target,
-    dim: int,
-    machine: Axis | None = None,
-    boxes: Sequence[str] = (),
-    chord: tuple[float, float] = (0.0, 1.0),
-) -> Motion:
-    """Return a motion of a kind with zero displacement, to be edited.
-
-    Rotations and radial motions are about ``machine``, the axis about which the mesh repeats, if
-    there is one; a free-form deformation moves a control point of the first of ``boxes``, a bump
-    is one of an airfoil along ``chord``.
-    """
-    if kind in (model.HicksHenne, model.Cst, model.Bump):
-        return kind(marker, 0.0, chord=chord)
-    if kind in (model.FromFile, model.Onto):
-        return kind(Path(), marker)
-    axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    box, last = (*boxes, "")[0], 0 if dim == 3 else -1
-    values: dict[type, tuple[Any, ...]] = {
-        model.Translate: ((0.0,) * dim,),
-        model.Rotate: (0.0, "centroid" if machine is None else origin[:dim], axis),
-        model.Radial: (1.0, 0.0, axis, origin[:dim]),
-        model.Scale: ((1.0,) * dim,),
-        model.Ffd: (box, (0, 0, last), (0.0, 0.0, 0.0)),
-        model.FfdCamber: (box, (0, last), 0.0),
-        model.FfdThickness: (box, (0, last), 0.0),
-        model.FfdTwist: (box, 0, 0.0),
-        model.SpanMotion: ("twist", (0.0, 1.0), (0.0, 0.0)),
-    }
-    return kind(marker, *values[kind])
 
 
 def targets(session: Session) -> tuple[Target, ...]:
@@ -324,15 +287,11 @@ def support_words(session: Session) -> str:
 
 
 class Ghosts:
-    """Computes where motions take the boundaries of a mesh, to be drawn before a run.
-
-    Displacement files are read once, and again when they have changed.
-    """
+    """Computes where motions take the boundaries of a mesh, to be drawn before a run."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._nodes = {marker.name: marker.nodes for marker in mesh.markers}
-        self._files: dict[tuple[Path, tuple[str, ...], float], Displacements | None] = {}
 
     def moved(self, case: Case, wait: bool = False) -> dict[str, FloatArray]:
         """Return the moved points (u, d) of the nodes of each boundary with motions, by name.
@@ -347,20 +306,15 @@ class Ghosts:
             for name in case.markers_with("moving")
             if name in self._nodes and any(applies_to(motion, name) for motion in case.motions)
         }
-        files: dict[object, Displacements] = {}
-        for motion in case.motions:
-            if isinstance(motion, model.Onto):
-                if wait or is_laid(case, self.mesh):
-                    with suppress(SlidevizError):
-                        files[key_of(motion)] = laid_displacements(motion, case, self.mesh, on)
-            elif (
-                isinstance(motion, model.FromFile) and (read := self._read(motion, on)) is not None
-            ):
-                files[key_of(motion)] = read
-        with suppress(SlidevizError):
-            files |= placed_displacements(case, self.mesh, on)
+        families = [*IN_ZONES, FromFile]
+        if wait or is_laid(case, self.mesh):
+            families.append(Onto)
+        placed: dict[int, Displacements] = {}
+        for family in families:
+            with suppress(SlidevizError):
+                placed |= placed_displacements(case, self.mesh, on, [], (family,))
         points = self.mesh.points
-        moved = moved_together(case.motions, points, on, files)
+        moved = moved_together(case.motions, points, on, placed)
         with suppress(SlidevizError):
             if on and (wait or are_ready(case, self.mesh)):
                 moved = self._on_walls(case, on, moved)
@@ -374,24 +328,6 @@ class Ghosts:
         together = Displacements(nodes, np.concatenate(list(moved.values()))[first])
         kept = on_walls(case, self.mesh, together)
         return {name: kept.at(nodes) for name, nodes in on.items()}
-
-    def _read(self, motion: model.FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
-        # A file for several boundaries may list the nodes of each of them.
-        names = tuple(name for name in on if applies_to(motion, name))
-        if not names:
-            return None
-        try:
-            key = (motion.path, names, motion.path.stat().st_mtime)
-        except OSError:
-            return None
-        if key not in self._files:
-            wanted = np.unique(np.concatenate([on[name] for name in names]))
-            of = f"boundaries {', '.join(names)}"
-            try:
-                self._files[key] = read_displacements(motion.path, self.mesh, wanted, of)
-            except SlidevizError:
-                self._files[key] = None
-        return self._files[key]
 
 
 def period_text(pair: Pair) -> str:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.model import NEW, BoxMotion, Case
+from slideviz.case.model import NEW, Case
+from slideviz.case.motions.box import box_motions
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
@@ -51,7 +52,7 @@ def open_mesh(
 
 def has_ffd(case: Case) -> bool:
     """Return whether a case has a motion of an FFD box."""
-    return any(isinstance(motion, BoxMotion) for motion in case.motions)
+    return bool(box_motions(case))
 
 
 def suggested_reduction(mesh: Mesh) -> Reduction:

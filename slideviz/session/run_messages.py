@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Onto, applies_to
+from slideviz.case.model import Case
+from slideviz.case.motions.motion import applies_to
 from slideviz.errors import Note
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
@@ -202,8 +203,10 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
             Requirement("Nothing moves yet: enter the values of the motion.", "motion")
         )
     for place, motion in enumerate(case.motions):
-        if isinstance(motion, FromFile) and not motion.path.is_file():
-            requirements.append(Requirement(_lacks_file(motion), "motion", motion=place))
+        for path in motion.files:
+            if not path.is_file():
+                text = _lacks_file(path, motion.file_words)
+                requirements.append(Requirement(text, "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         requirements.append(Requirement(text, "method"))
@@ -217,10 +220,8 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     return tuple(requirements)
 
 
-def _lacks_file(motion: FromFile) -> str:
-    """Return a sentence on a motion whose file is none."""
-    path = motion.path
-    what = "surface to lie on" if isinstance(motion, Onto) else "displacement file"
+def _lacks_file(path: Path, what: str) -> str:
+    """Return a sentence on a motion without its file; ``what``: words for the file."""
     if path == Path():
         return f"A motion lacks its {what}: choose it."
     if path.is_dir():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case
 from slideviz.case.view_keys import SectionText, hyphened
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
@@ -242,7 +242,7 @@ def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
     """
     if folder in path.parents:
         return {}
-    used = [case.mesh_file, *(m.path for m in case.motions if isinstance(m, FromFile))]
+    used = [case.mesh_file, *(path for m in case.motions for path in m.files)]
     return {
         file: path.with_suffix(file.suffix)
         if file == case.mesh_file

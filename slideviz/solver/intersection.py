@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import pairwise
 from math import ceil, floor, pi
 
 import numpy as np
 
-from slideviz.case.model import Case, Rotate
+from slideviz.case.model import Case
 from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
@@ -133,7 +132,7 @@ def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[
     if frame.cylindrical:
         start, shift = frame.coords(at), frame.difference(at, vectors)
         places = [frame.points(start + part * shift) for part in parts]
-    elif any(isinstance(motion, Rotate) for motion in case.motions):
+    elif any(motion.turned(0.0) is not motion for motion in case.motions):
         try:
             still, *turned = (_turned(case, mesh, part) for part in (0.0, *parts))
         except CaseError:
@@ -153,10 +152,7 @@ def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[
 
 def _turned(case: Case, mesh: Mesh, part: float) -> FloatArray:
     """Return the displacements (k, d) of the motions, with a part of all turns."""
-    motions = tuple(
-        replace(motion, angle_deg=part * motion.angle_deg) if isinstance(motion, Rotate) else motion
-        for motion in case.motions
-    )
+    motions = tuple(motion.turned(part) for motion in case.motions)
     return displacements(case.change(motions=motions), mesh).vectors
 
 

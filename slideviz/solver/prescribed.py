@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile, Prescribed
+from slideviz.case.model import Case
 from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.fans import components
@@ -75,7 +75,7 @@ def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
     Formulas displace images alike, except for the mismatch of their positions. Displacements from
     files or arrays may be rounded to few digits.
     """
-    if any(isinstance(motion, FromFile | Prescribed) for motion in case.motions):
+    if any(motion.lists_nodes for motion in case.motions):
         return TOLERANCE
     mismatch = max((pair.mismatch for pair in pairs), default=0.0)
     if mesh.halo is not None:

@@ -14,8 +14,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, SpanMotion, applies_to
-from slideviz.case.spans import moves_over_span, span_ends
+from slideviz.case.model import Case
+from slideviz.case.motions.motion import applies_to
+from slideviz.case.motions.span import moves_over_span
+from slideviz.case.spans import span_ends
 from slideviz.case.zones import each_zone
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -78,7 +80,7 @@ def _over_span(
     boundary, other = domain.boundary, np.zeros(len(mesh.points), bool)
     for name in case.markers_with("moving"):
         motions = [motion for motion in case.motions if applies_to(motion, name)]
-        if not all(isinstance(motion, SpanMotion) for motion in motions):
+        if not all(motion.keeps_span for motion in motions):
             other[mesh.marker(name).nodes] = True
     ends = [boundary.names.index(name) for name in span_ends(case, mesh)]
     return np.isin(boundary.marker[facet], ends) & ~other[node]

@@ -12,7 +12,8 @@ import numpy as np
 from slideviz.case.check import file_before_motions, idle_settings, require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.spans import moves_over_span, span_field
+from slideviz.case.motions.span import moves_over_span
+from slideviz.case.spans import span_field
 from slideviz.errors import Note
 from slideviz.machine.span import SpanField
 from slideviz.mesh.halo import without_halo

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.boxes import moved_boxes
 from slideviz.case.model import Case
+from slideviz.case.motions.box import moved_boxes
 from slideviz.case.words import wrong_by
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within

@@ -10,8 +10,9 @@ from math import isfinite, nan
 import numpy as np
 
 from slideviz.case.check import require_valid
-from slideviz.case.model import Case, Prescribed
+from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
+from slideviz.case.motions.file import Prescribed
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.interfaces import (
@@ -91,7 +92,7 @@ class InterfaceMotion:
 
         return min(zones, key=led)
 
-    def in_order(self) -> Iterator[tuple[int, set[int]]]:
+    def leaders_first(self) -> Iterator[tuple[int, set[int]]]:
         """Return each zone that moves, in the order to deform them, and those that come after it.
 
         Before the next one, `slid` says where the zone has come to.
@@ -171,7 +172,7 @@ def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     if not mesh.zone_parts:
         return check_motion(case, mesh)
     motion, folded = InterfaceMotion(case, mesh), None
-    for index, _ in motion.in_order():
+    for index, _ in motion.leaders_first():
         problem, overlap = check_motion(motion.cases[index], mesh.zone_parts[index].mesh)
         if problem:
             return problem, folded
@@ -198,7 +199,7 @@ def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[Interfa
     """Return the motion of interfaces, and the steps of those zones that move."""
     require_valid(case, mesh)
     motion, runs = InterfaceMotion(case, mesh), Runs()
-    for index, ahead in motion.in_order():
+    for index, ahead in motion.leaders_first():
         done, part = len(runs), mesh.zone_parts[index]
         count = 1 + len(motion.moving(ahead))
 

@@ -19,7 +19,8 @@ import numpy as np
 from slideviz import terms
 from slideviz.case.check import check_case
 from slideviz.case.limits import MET, check_case_limits, outcome
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import Cancelled, CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality

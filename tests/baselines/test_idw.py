@@ -7,7 +7,8 @@ import pytest
 
 import slideviz as sv
 from slideviz.baselines.idw import weighted_means
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import Cancelled, DeformError
 from slideviz.rbf import evaluate
 from slideviz.rbf.evaluate import Basis

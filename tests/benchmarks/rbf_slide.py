@@ -16,7 +16,8 @@ import numpy as np
 
 import slideviz as sv
 from slideviz.case.displacement import read_displacements
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
 from slideviz.rbf.reduction import Reduction
 
 SHARED = Path(__file__).parents[3] / "shared"

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from slideviz.case.check import check_case, contradictions, require_valid
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 

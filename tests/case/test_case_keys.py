@@ -5,7 +5,9 @@ import pytest
 from slideviz.case.cfg import describe_keys, set_key
 from slideviz.case.key import GROUPS
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 

@@ -10,13 +10,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from slideviz.case.check import contradictions
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case
 from slideviz.case.motion import (
     displacement_of,
     displacements,
     moved_together,
-    reference_displacements,
+    required_displacements,
 )
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.errors import CaseError
 
 coordinate = st.floats(-1e3, 1e3)
@@ -242,7 +244,7 @@ class TestDisplacements:
         found = displacements(one, square)
         assert found.vectors[:, 0].tolist() == [-0.5, 0.5, 1.5, 2.5]
         nodes = square.marker("UPPER").nodes
-        files = reference_displacements(one, square, {"UPPER": nodes})
+        files = required_displacements(one, square, {"UPPER": nodes})
         seen = moved_together(one.motions, square.points, {"UPPER": nodes}, files)["UPPER"]
         assert (seen == found.vectors).all()
         (tmp_path / "d.txt").write_text("3 1 0\n")

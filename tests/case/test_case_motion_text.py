@@ -4,20 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import (
-    Bump,
-    Cst,
-    Ffd,
-    FromFile,
-    HicksHenne,
-    Prescribed,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Translate,
-)
 from slideviz.case.motion_text import GRAMMAR, read_motions, write_motions
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd
+from slideviz.case.motions.file import FromFile, Prescribed
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

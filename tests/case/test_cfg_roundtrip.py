@@ -9,9 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
-from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, SpanMotion, Translate
+from slideviz.case.model import Case
 from slideviz.case.motion import displacement_of
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.motions.box import Ffd
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS

@@ -8,7 +8,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import ArgumentError, CaseError, UnsoundError
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import Reduction

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.design.checks import warn_of_condition, warn_of_error_estimate
 from slideviz.design.frozen.solve import full_factor
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning

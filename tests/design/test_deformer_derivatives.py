@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.design.frozen import fit
 from slideviz.elastic import multigrid
 from slideviz.errors import DeformError

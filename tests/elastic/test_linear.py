@@ -13,7 +13,9 @@ from scipy.sparse import bsr_array
 from threadpoolctl import ThreadpoolController
 
 import slideviz as sv
-from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.elastic import linear, multigrid
 from slideviz.elastic.forces import Forces
 from slideviz.elastic.stiffness import (

@@ -9,7 +9,8 @@ from qtpy.QtGui import QMouseEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.color_scheme import DARK
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.mesh.quality import quality

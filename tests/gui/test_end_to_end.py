@@ -11,7 +11,7 @@ from qtpy.QtCore import Qt, QTimer
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog, QDialogButtonBox, QFileDialog, QLineEdit
 
-from slideviz.case.model import Rotate, Translate
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.gui.widgets import questions
 
 ASK_SAVE = questions.ask_save

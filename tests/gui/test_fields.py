@@ -6,7 +6,7 @@ from qtpy.QtGui import QColor, QFocusEvent, QKeyEvent, QPalette
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
-from slideviz.case.model import Rotate, Scale
+from slideviz.case.motions.rigid import Rotate, Scale
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, short_text

@@ -5,7 +5,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QLineEdit
 
-from slideviz.case.model import Rotate, Scale, Translate
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes

@@ -9,7 +9,9 @@ from qtpy.QtGui import QContextMenuEvent, QImage
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
-from slideviz.case.model import Ffd, FfdCamber, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.motions.box import Ffd, FfdCamber
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -6,23 +6,13 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 import slideviz as sv
-from slideviz.case.model import (
-    Bump,
-    Case,
-    Cst,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
-    Onto,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Translate,
-)
+from slideviz.case.model import Case
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.onto import Onto
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.panels.motions import TableDialog

@@ -5,7 +5,7 @@ import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 
-from slideviz.case.model import Radial, Rotate
+from slideviz.case.motions.rigid import Radial, Rotate
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
 

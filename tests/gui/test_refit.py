@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.session import changes
 
 

@@ -11,7 +11,9 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog, QLabel
 
-from slideviz.case.model import Case, FromFile, Radial, Rotate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate
 from slideviz.gui import files
 from slideviz.gui.panels.worst import info_text
 from slideviz.gui.start import StartPage

@@ -10,7 +10,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QPushButton
 
-from slideviz.case.model import SpanMotion
+from slideviz.case.motions.span import SpanMotion
 from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
 from slideviz.gui.viewport.section_views import PlaneHandle, arrangement_for
 from slideviz.gui.widgets import questions

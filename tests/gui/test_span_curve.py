@@ -6,7 +6,9 @@ from qtpy.QtCore import QEvent, QPointF, Qt
 from qtpy.QtGui import QMouseEvent
 from qtpy.QtTest import QTest
 
-from slideviz.case.model import Case, Rotate, SpanMotion
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.machine.blade import curve_at
 from slideviz.session import jobs

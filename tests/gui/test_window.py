@@ -12,7 +12,8 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 
 from slideviz import Case, read
-from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.errors import Note
 from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst_table import CELL

@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from matplotlib.figure import Figure
 
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import MeshError
 from slideviz.formats.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up

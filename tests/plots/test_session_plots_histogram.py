@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from matplotlib.figure import Figure
 
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.mesh.quality import quality
 from slideviz.plots.session_plots import MOST_COMPARED, FrameCounts, compared, draw_histogram
 from slideviz.plots.style import ON_LIGHT

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.rbf import exact, level
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.frames import Frame, corners, hold_on_axis, on_axis
 from tests import builders

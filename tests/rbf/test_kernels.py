@@ -7,7 +7,8 @@ import pytest
 from scipy.sparse.linalg import onenormest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS

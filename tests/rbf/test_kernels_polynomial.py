@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.check import contradictions
-from slideviz.case.model import Case, Prescribed, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import Prescribed
+from slideviz.case.motions.rigid import Translate
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import Reduction
 from tests import builders

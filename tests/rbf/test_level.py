@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import DeformError
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis

@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.model import Case, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Scale, Translate
 from slideviz.rbf.classify import FansAround, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.case.model import Ffd, Rotate
+from slideviz.case.motions.box import Ffd
+from slideviz.case.motions.rigid import Rotate
 from slideviz.color_scheme import DARK, LIGHT
 from slideviz.ffd.box import CORNERS, regular_box
 from slideviz.ffd.section import with_boxes

@@ -4,7 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import AUTO
 from slideviz.sections.model import Section

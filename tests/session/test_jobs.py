@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from slideviz import read
-from slideviz.case.model import Case, FromFile, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import Cancelled, CaseError, MeshError
 from slideviz.mesh.quality import quality
 from slideviz.session import jobs

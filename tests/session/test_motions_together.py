@@ -5,18 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.case.model import (
-    Case,
-    FromFile,
-    Rotate,
-    Scale,
-    SpanMotion,
-    Translate,
-    applies_to,
-    named,
-)
+from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.motion import applies_to, named
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.case.zones import zone_cases
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes

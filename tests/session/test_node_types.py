@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.rbf.reduction import Reduction

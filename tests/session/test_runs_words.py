@@ -7,8 +7,11 @@ import pytest
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, SpanMotion, Translate
+from slideviz.case.model import Case
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.motions.span import SpanMotion
 from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes

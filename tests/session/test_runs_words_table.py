@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from slideviz.case.model import Rotate
 from slideviz.case.motion_words import describe
+from slideviz.case.motions.rigid import Rotate
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import Reduction

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes import UNDO_WORDS, undo_words

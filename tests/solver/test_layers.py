@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.model import Case, Prescribed, Rotate, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.file import Prescribed
+from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.cli import run
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.samples.table import sample

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from slideviz.case.model import Translate
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample

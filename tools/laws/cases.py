@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import Case, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.motion import Motion
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.reduction import Reduction

@@ -19,7 +19,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from slideviz.case.model import Case, Translate
+from slideviz.case.model import Case
+from slideviz.case.motions.rigid import Translate
 from slideviz.mesh.jacobians import INVERTED, VALID
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.orientation import reference_of

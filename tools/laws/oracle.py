@@ -6,7 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale
+from slideviz.case.model import Case
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.motion import Motion
+from slideviz.case.motions.rigid import Radial, Rotate, Scale
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
 from tools.laws.draw import Period

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import slideviz as sv
-from slideviz.case.model import Motion
+from slideviz.case.motions.motion import Motion
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.reduction import Reduction

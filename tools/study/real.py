@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 import slideviz as sv
-from slideviz.case.model import Motion
+from slideviz.case.motions.motion import Motion
 from slideviz.errors import SlidevizError
 from slideviz.terms import Method, Role
 

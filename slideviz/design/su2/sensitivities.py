@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.case.lines import read_text
-from slideviz.case.motion import normals_at
+from slideviz.case.motions.airfoil import normals_at
 from slideviz.design.su2.config import Su2Config
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate

@@ -8,8 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.motion import hicks_henne, kulfan, normals_at, side_of, surface_bump
-from slideviz.case.motion_text import require_peak
+from slideviz.case.motions.airfoil import (
+    hicks_henne,
+    kulfan,
+    normals_at,
+    require_peak,
+    side_of,
+    surface_bump,
+)
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError

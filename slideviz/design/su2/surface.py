@@ -16,7 +16,8 @@ import numpy as np
 from slideviz.case.check import raise_all
 from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.lines import read_text
-from slideviz.case.model import Case, Prescribed
+from slideviz.case.model import Case
+from slideviz.case.motions.file import Prescribed
 from slideviz.case.zones import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config

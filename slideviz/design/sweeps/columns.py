@@ -12,25 +12,22 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
-from slideviz.case import model
 from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Motion, named
-from slideviz.case.motion_text import VERB_OF, VERBS
+from slideviz.case.model import Case
+from slideviz.case.motions.kinds import KIND_OF
+from slideviz.case.motions.motion import Motion
 from slideviz.case.words import number
 from slideviz.errors import CaseError, nearest, shown
 
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""
 
-_AXES = "xyz"
-_SHORT = {"vector": "", "point": "point_", "axis": "axis_", "factors": "factor_"}
-"""Prefixes of the names of components, by field, where they are not the field's name."""
 _ALSO = {
     "angle": "angle_deg",
     "degrees": "angle_deg",
@@ -76,7 +73,7 @@ class NumberPlace:
 def numbers_of(case: Case) -> dict[str, NumberPlace]:
     """Return the places of all numbers of a case's motions, by their shortest unique name."""
     places: dict[str, NumberPlace] = {}
-    heads = [_head(motion) for motion in case.motions]
+    heads = [motion.design_name() for motion in case.motions]
     for at, (motion, head) in enumerate(zip(case.motions, heads, strict=True)):
         name = head if heads.count(head) == 1 else f"motion{at + 1}"
         places |= {f"{name}.{part}": place for part, place in _parts(motion, at)}
@@ -184,7 +181,7 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
         return places.pop()
     shortest = numbers_of(case)
     several = any(
-        f"{_head(motion)}.{part}".lower() == wanted.lower()
+        f"{motion.design_name()}.{part}".lower() == wanted.lower()
         for at, motion in enumerate(case.motions)
         for part, _ in _parts(motion, at)
     )
@@ -204,14 +201,14 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
 
 def _absent_motion(case: Case, name: str) -> str:
     """Return the motion of a moving boundary that a column is about, if the case has none such."""
-    match = re.match(rf"\s*(.+?)\.({'|'.join(VERBS)})(?:\.|\s*\Z)", name, re.IGNORECASE)
+    match = re.match(rf"\s*(.+?)\.({'|'.join(KIND_OF)})(?:\.|\s*\Z)", name, re.IGNORECASE)
     if match is None or match[1].lower() not in {
         "*",
         *(marker.lower() for marker in case.markers_with("moving")),
     }:
         return ""
     begin = f"{match[1]}.{match[2]}.".lower()
-    has = any(f"{_head(motion)}.".lower().startswith(begin) for motion in case.motions)
+    has = any(f"{motion.design_name()}.".lower().startswith(begin) for motion in case.motions)
     return "" if has else f"({match[1]}, {match[2].lower()}, ...)"
 
 
@@ -229,42 +226,9 @@ def _normalized_name(name: str) -> str:
     return f"{head}{dot}{_ALSO.get(part.lower(), part.lower())}"
 
 
-def _head(motion: Motion) -> str:
-    verb = motion.kind if isinstance(motion, model.SpanMotion) else VERB_OF.get(type(motion), "")
-    head = f"{'+'.join(named(motion.marker)) or '*'}.{verb}"
-    if isinstance(motion, model.BoxMotion):
-        at = (motion.plane,) if isinstance(motion, model.FfdTwist) else motion.index
-        return ".".join([head, motion.box, *map(str, at)])
-    if isinstance(motion, model.HicksHenne | model.Cst):
-        head = f"{head}.{motion.side}"
-    return f"{head}.{motion.term[0]}" if isinstance(motion, model.Cst) else head
-
-
-def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
-    if isinstance(motion, model.FromFile | model.Prescribed):
-        return
-    if isinstance(motion, model.SpanMotion):
-        for k, span in enumerate(motion.spans):
-            name = "value" if len(motion.spans) == 1 else f"{span:.15g}"
-            yield name, NumberPlace(at, "values", k)
-        return
-    for field in fields(motion):
-        if field.name in ("index", "plane", "term", "chord"):  # what it moves does not vary
-            continue
-        value = getattr(motion, field.name)
-        if _is_number(value):
-            yield field.name, NumberPlace(at, field.name)
-        elif isinstance(value, tuple) and value and all(map(_is_number, value)):
-            if field.name == "factors" and len(value) == 1:
-                yield "factor", NumberPlace(at, field.name, 0)
-                continue
-            head = _SHORT.get(field.name, f"{field.name}_")
-            for component, axis in zip(range(len(value)), _AXES, strict=False):
-                yield f"{head}{axis}", NumberPlace(at, field.name, component)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+def _parts(motion: Motion, place: int) -> Iterator[tuple[str, NumberPlace]]:
+    for name, field, component in motion.design_numbers():
+        yield name, NumberPlace(place, field, component)
 
 
 def _names_text(known: Iterable[str]) -> str:

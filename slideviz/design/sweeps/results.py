@@ -24,7 +24,9 @@ from slideviz.case.boxes import system_of
 from slideviz.case.check import effective
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import BoxMotion, Case, FromFile, Prescribed
+from slideviz.case.model import Case
+from slideviz.case.motions.box import box_motions
+from slideviz.case.motions.file import Prescribed
 from slideviz.design.sweeps.columns import Value
 from slideviz.design.sweeps.table import (
     WORDS,
@@ -258,7 +260,7 @@ def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
     A mesh that is None stays in its file, which counts by its size and its time of change.
     """
     prescribed = [motion for motion in case.motions if isinstance(motion, Prescribed)]
-    written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
+    written = tuple(motion for motion in case.motions if motion.verb)
     plain = effective(case.change(motions=written))
     if mesh is None:
         assert case.mesh_file is not None
@@ -268,17 +270,16 @@ def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
         parts = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
         cells = mesh.cells
         found = {"mesh": _digest(mesh.points, cells.types, cells.connectivity, *chain(*parts))}
-    if mesh is not None and any(isinstance(motion, BoxMotion) for motion in written):
+    if mesh is not None and box_motions(case):
         boxes = boxes_of(mesh, system_of(case))
         found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes))
     for at, one in enumerate(prescribed, start=1):
         found[f"displacement {at}"] = _digest(one.nodes, one.vectors)
-    for motion in written:
-        if isinstance(motion, FromFile):
-            try:
-                found[f"file {motion.path.name}"] = _digest(motion.path.read_bytes())
-            except OSError:
-                found[f"file {motion.path.name}"] = "not readable"
+    for path in (path for motion in written for path in motion.files):
+        try:
+            found[f"file {path.name}"] = _digest(path.read_bytes())
+        except OSError:
+            found[f"file {path.name}"] = "not readable"
     for key in KEYS.values():
         value = key.get(plain) if key.group not in (FILES, VIEW) else None
         if value is not None and key.name != "DEFORMATION_FILENAME":

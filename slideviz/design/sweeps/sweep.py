@@ -17,7 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.argument_types import check_types
-from slideviz.case.model import BoxMotion, Case, with_paths
+from slideviz.case.model import Case, with_paths
+from slideviz.case.motions.box import box_motions
 from slideviz.design.sweeps.processes import (
     Packed,
     Processes,
@@ -198,7 +199,7 @@ class _Tasks:
         self.packed = Packed("", b"")
         if mesh is None:
             return
-        boxes = any(isinstance(m, BoxMotion) for design in designs for m in design.case.motions)
+        boxes = any(box_motions(design.case) for design in designs)
         # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
         lean = replace(mesh, origin=Origin())
         self.packed = pack_mesh(mesh if boxes or folder is not None else lean)

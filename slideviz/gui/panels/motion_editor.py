@@ -11,37 +11,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QSizePolicy, QWidget
 
-from slideviz.case.model import (
-    BoxMotion,
-    Bump,
-    Cst,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
-    FromFile,
-    HicksHenne,
+from slideviz.case.motion_words import target_words
+from slideviz.case.motions.kinds import KINDS
+from slideviz.case.motions.motion import (
+    Axis,
     Motion,
-    OnAirfoil,
-    Onto,
-    Radial,
-    Rotate,
-    Scale,
-    SpanMotion,
+    NewMotion,
     Target,
-    Translate,
+    direction_words,
     named,
 )
-from slideviz.case.motion_text import VERB_OF, curve_text, read_curve
-from slideviz.case.motion_words import direction_words, target_words
+from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
 from slideviz.gui.widgets.build import as_widget, grow_fields, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.vector_field import VectorField, a_direction, control_point_problem
-from slideviz.session.motions import Axis, new_motion, radial
-from slideviz.terms import MOTION_KINDS, SIDES, SPAN_KINDS
+from slideviz.session.motions import radial
+from slideviz.terms import SIDES, SPAN_KINDS
 
 ABOUT = {
     "centroid": "its centroid",
@@ -54,13 +42,7 @@ ABOUT = {
 
 
 Z = (0.0, 0.0, 1.0)  # axis of rotations in 2D
-RAISED = {
-    True: ("Outwards by", "outwards, the lower side down,"),
-    False: ("Raised by", "towards +y"),
-}
-"""Title and direction of the height of an airfoil's motion, by whether it is `HicksHenne`."""
-KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_OF.items()}
-"""Labels of the kinds of motion, by class."""
+KIND_LABELS = {kind: kind.kind_term.label for kind in KINDS}
 
 
 Check = Callable[[Any], str]  # returns why a value is not allowed; "" if it is
@@ -180,25 +162,6 @@ ROWS: dict[str, FormRow] = {
 }
 # fmt: on
 """The rows of the form; each field is also an attribute of `MotionEditor`, by its name here."""
-FIELDS: dict[type, tuple[str, ...]] = {
-    Translate: ("vector",),
-    Rotate: ("angle",),
-    Scale: ("factors",),
-    Radial: ("percent", "distance"),
-    HicksHenne: ("raised", "side", "peak", "chord"),
-    Cst: ("raised", "side", "term", "chord"),
-    Bump: ("raised", "peak", "chord"),
-    Ffd: ("index", "box", "vector"),
-    FfdCamber: ("index", "box", "amount"),
-    FfdThickness: ("index", "box", "amount"),
-    FfdTwist: ("plane", "box", "angle", "point", "axis"),
-    SpanMotion: ("curve", "change"),
-    FromFile: ("path",),
-    Onto: ("path", "limit"),
-}
-"""Rows of each kind of motion, the one to be typed into first at the beginning. Those of point and
-axis of motions with ``about`` depend on what stays in place."""
-WITH_ABOUT = Rotate | Scale | Radial | SpanMotion
 
 
 class MotionEditor(QWidget):
@@ -246,7 +209,7 @@ class MotionEditor(QWidget):
             "centroid, select them in the table of boundaries first; then you can choose them "
             "here.",
         )
-        self.kind = Choice(KINDS)
+        self.kind = Choice(KIND_LABELS)
         for name, row in ROWS.items():
             setattr(self, name, row.make())
         self.drawn = SpanCurveField()
@@ -299,24 +262,25 @@ class MotionEditor(QWidget):
             return
         self._sync_targets(motion, targets)
         self.walls.show_for(named(motion.marker))
-        for kind in (FfdTwist, SpanMotion):  # a section has no span to twist along
-            self.kind.set_item_enabled(kind, dim == 3)
+        for kind in KINDS:
+            self.kind.set_item_enabled(kind, dim == 3 or not kind.only_3d)
         self.kind.show_value(type(motion))
-        for name in FIELDS.get(type(motion), ()):
+        for name in motion.rows:
             row = ROWS[name]
             self._show_value(name, row.shown(getattr(motion, row.attribute)))
-        self.table.setVisible(not isinstance(motion, Onto))
-        self.path.setToolTip(MOTION_KINDS[VERB_OF[type(motion)]].tip)
-        shown = {*FIELDS.get(type(motion), ())}
-        if isinstance(motion, OnAirfoil):
+        self.table.setVisible(motion.has_table)
+        self.path.setToolTip(motion.kind_term.tip)
+        shown = {*motion.rows}
+        if "raised" in shown:
             self._name_height(motion)
-        if isinstance(motion, WITH_ABOUT):
+        if motion.stays_at:
             shown |= {"about"} | self._show_place(motion, dim)
         for shared in (self.drawn, self.walls):
-            self.form.setRowVisible(shared, isinstance(motion, SpanMotion))
+            self.form.setRowVisible(shared, "curve" in shown)
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
-        self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))
+        if "index" in shown:
+            self.index.set_count(len(getattr(motion, ROWS["index"].attribute)) - (3 - dim))
         for name, widget in self._rows.items():
             self.form.setRowVisible(widget, name in shown)
 
@@ -333,38 +297,35 @@ class MotionEditor(QWidget):
         elif str(value) != self.path.text() and not self.path.hasFocus():
             self.path.setText("" if value == Path() else str(value))
 
-    def _name_height(self, motion: OnAirfoil) -> None:
+    def _name_height(self, motion: Motion) -> None:
         """Say in the row of the height in which direction an airfoil's side moves."""
-        title, way = RAISED[isinstance(motion, HicksHenne)]
+        title, way = motion.height_row
         label = self.form.labelForField(self.raised)
         assert isinstance(label, QLabel)
         label.setText(title)
         self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
 
-    def _show_place(self, motion: Rotate | Scale | Radial | SpanMotion, dim: int) -> set[str]:
+    def _show_place(self, motion: Motion, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
-        offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
-        if isinstance(motion, SpanMotion):
-            offered[0] = "line"
-        elif self.machine is not None and not isinstance(motion, Scale):
+        offered = list(motion.stays_at)
+        axis: tuple[float, float, float] | None = getattr(motion, "axis", None)
+        if self.machine is not None and axis is not None:
             offered.insert(-1, "axis")
         if self._radial(motion) is not None:
             offered.insert(-1, "radial")
         self.about.offer({what: self._about_words(what) for what in offered})
-        what = {"centroid": "centroid", None: "line"}.get(motion.point, "point")  # type: ignore[arg-type]
+        point = getattr(motion, ROWS["point"].attribute)
+        what = {"centroid": "centroid", None: "line"}.get(point, "point")
         if "axis" in offered and self._is_machine(motion) and not self._as_point:
             what = "axis"
-        elif "radial" in offered and what == "centroid" and motion.axis == self._radial(motion):
+        elif "radial" in offered and what == "centroid" and axis == self._radial(motion):
             what = "radial"
         self.about.show_value(what)
         if what == "point":
-            assert isinstance(motion.point, tuple)
-            self.point.show_value(motion.point)
-        if isinstance(motion, SpanMotion):
-            return {"point"} if what == "point" else set()
-        if not isinstance(motion, Scale):
-            self.axis.show_value(motion.axis)
-        turns = not isinstance(motion, Scale) and dim == 3 and what not in ("axis", "radial")
+            self.point.show_value(point)
+        if axis is not None:
+            self.axis.show_value(axis)
+        turns = axis is not None and dim == 3 and what not in ("axis", "radial")
         return ({"point"} if what == "point" else set()) | ({"axis"} if turns else set())
 
     def _radial(self, motion: Motion) -> tuple[float, float, float] | None:
@@ -372,7 +333,8 @@ class MotionEditor(QWidget):
 
         None if the motion is no rotation, or the mesh is 2D or does not repeat about an axis.
         """
-        if self.machine is None or self._dim == 2 or not isinstance(motion, Rotate):
+        turns = "centroid" in motion.stays_at and hasattr(motion, "axis")
+        if self.machine is None or self._dim == 2 or not turns:
             return None
         return radial(self.machine, self.centroid_of(motion.marker))
 
@@ -384,11 +346,12 @@ class MotionEditor(QWidget):
         axis, _ = self.machine
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
-    def _is_machine(self, motion: Rotate | Scale | Radial | SpanMotion) -> bool:
-        if self.machine is None or isinstance(motion, Scale | SpanMotion):
+    def _is_machine(self, motion: Motion) -> bool:
+        if self.machine is None:
             return False
         axis, origin = self.machine
-        return motion.axis == axis and motion.point == origin[: self._dim]
+        about = getattr(motion, "axis", None), getattr(motion, "point", None)
+        return about == (axis, origin[: self._dim])
 
     def _sync_targets(self, motion: Motion, targets: tuple[Target, ...]) -> None:
         self._targets = targets = tuple(dict.fromkeys((*targets, motion.marker)))
@@ -400,12 +363,12 @@ class MotionEditor(QWidget):
         self.box.offer({name: name or "(no box)" for name in (*self.boxes, chosen)})
         self.box.show_value(chosen)
 
-    def _kind_chosen(self, kind: type) -> None:
+    def _kind_chosen(self, kind: type[Motion]) -> None:
         if self._motion is not None and type(self._motion) is not kind:
             marker = self._motion.marker
             chord = self.chord_of(marker)
-            motion = new_motion(kind, marker, self._dim, self.machine, self.boxes, chord)
-            self.changed.emit(motion)
+            start = NewMotion(self._dim, self.machine, self.boxes, chord)
+            self.changed.emit(kind.new(marker, start))
 
     def _about_chosen(self, what: str) -> None:
         """Set the fixed point and axis to a choice, a key of `ABOUT`, and emit the motion."""
@@ -438,7 +401,7 @@ class MotionEditor(QWidget):
         """Put the cursor into the first number field of the shown motion, and select its text."""
         if self._motion is None:
             return
-        field = getattr(self, FIELDS[type(self._motion)][0])
+        field = getattr(self, self._motion.rows[0])
         first = field.fields[0] if isinstance(field, VectorField) else field
         first.setFocus()
         first.selectAll()
@@ -452,13 +415,13 @@ class MotionEditor(QWidget):
         """Emit the motion that the fields describe, if it differs from the shown one."""
         motion = self._motion
         assert motion is not None
-        values = {ROWS[name].attribute: self._typed(name) for name in FIELDS[type(motion)]}
-        if isinstance(motion, SpanMotion):
+        values = {ROWS[name].attribute: self._typed(name) for name in motion.rows}
+        if "curve" in motion.rows:
             values["spans"], values["values"] = read_curve(self.curve.value)
-        if isinstance(motion, WITH_ABOUT):
+        if motion.stays_at:
             fixed = {"centroid": "centroid", "radial": "centroid", "line": None}
             values["point"] = fixed.get(self.about.currentData(), self.point.value)
-        if isinstance(motion, Rotate | Radial):
+        if motion.stays_at and hasattr(motion, "axis"):
             values["axis"] = self._typed("axis") if self._dim == 3 else Z
         edited = replace(motion, marker=self._targets[self.marker.currentData()], **values)
         if edited != motion:
@@ -478,11 +441,12 @@ class MotionEditor(QWidget):
             return before
         value = row.read(field.value)
         # In 2D, indices and vectors of a box keep what is not shown of them.
-        boxed = isinstance(self._motion, BoxMotion) and isinstance(value, tuple)
+        boxed = hasattr(self._motion, "box") and isinstance(value, tuple)
         return (*value, *before[len(value) :]) if boxed else value
 
     def _browse(self) -> None:
-        title = "Surface" if isinstance(self._motion, Onto) else "Displacement file"
+        assert self._motion is not None
+        title = self._motion.file_words.capitalize()
         name, _ = QFileDialog.getOpenFileName(self, title, self.path.text())
         if name:
             self.path.setText(name)

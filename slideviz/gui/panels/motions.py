@@ -22,11 +22,14 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.model import FfdTwist, FromFile, Motion, SpanMotion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import KINDS
+from slideviz.case.motions.motion import Motion, NewMotion, Target, named
+from slideviz.case.motions.rigid import Translate
 from slideviz.errors import SlidevizError
-from slideviz.gui.panels.motion_editor import KINDS, MotionEditor
+from slideviz.gui.panels.motion_editor import KIND_LABELS, MotionEditor
 from slideviz.gui.responsiveness.timers import TABLE_MS, single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
@@ -50,7 +53,6 @@ from slideviz.session.motions import (
     centroid,
     chord_of,
     machine_axis,
-    new_motion,
     new_target,
     table_text,
     targets,
@@ -60,7 +62,6 @@ from slideviz.session.reach import TYPED_TIP, typed_words
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import SPAN_KINDS
 
 FILTERS = "Displacements (*.txt)"
 ABOUT = (
@@ -186,8 +187,8 @@ class MotionPanel(Panel):
         menu = QMenu()
         self.add = tool_button("", image="add", text="Add motion", menu=menu, name="add_motion")
         self.add_actions = {}
-        for kind, label in KINDS.items():
-            words = label if kind is not SpanMotion else f"{label}: {', '.join(SPAN_KINDS)}"
+        for kind, label in KIND_LABELS.items():
+            words = f"{label}: {', '.join(kind.verbs)}" if len(kind.verbs) > 1 else label
             self.add_actions[kind] = menu.addAction(words[:1].upper() + words[1:])
             self.add_actions[kind].triggered.connect(partial(self._add, kind))
         self.add_table = menu.addAction("Displacement table…", self.new_table)
@@ -240,7 +241,7 @@ class MotionPanel(Panel):
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         mesh = session.mesh
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
-        for kind in (FfdTwist, SpanMotion):  # as in the editor
+        for kind in (kind for kind in KINDS if kind.only_3d):  # as in the editor
             self.add_actions[kind].setEnabled(mesh is None or mesh.dim == 3)
         self.editor.set_extent(self._extent)
 
@@ -293,15 +294,15 @@ class MotionPanel(Panel):
         self._sync_editor(session)
         self._sync_buttons(session, session.case.markers_with("moving"))
 
-    def _add(self, kind: type, *_checked: bool) -> None:
+    def _add(self, kind: type[Motion], *_checked: bool) -> None:
         self._add_for(new_target(self.store.session), kind)
 
-    def _add_for(self, target: Target, kind: type) -> None:
+    def _add_for(self, target: Target, kind: type[Motion]) -> None:
         """Add a motion with zero displacement, and put the cursor into its first field."""
         session = self.store.session
         boxes, machine = box_names(session), machine_axis(session)
         chord = self._chord(target)
-        motion = new_motion(kind, target, session.mesh.dim, machine, boxes, chord)
+        motion = kind.new(target, NewMotion(session.mesh.dim, machine, boxes, chord))
         self.store.change(changes.add_motion, motion)
         self.editor.focus()
 

@@ -9,8 +9,7 @@ from qtpy.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from qtpy.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from qtpy.QtWidgets import QSizePolicy, QWidget
 
-from slideviz.case.model import SpanMotion
-from slideviz.case.motion_text import curve_text, read_curve
+from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets.fields import short_text
 from slideviz.gui.widgets.labels import wrapped

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Lock
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, Onto, applies_to
+from slideviz.case.motions.file import FromFile, read_path
+from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
+from slideviz.case.words import Word, number
 from slideviz.errors import CaseError, MeshError, Note, printable
 from slideviz.formats.files import read as read_mesh
 from slideviz.formats.files import read_surface
-from slideviz.machine.onto import AGREE, Laid, Nearest, Target, Wall, find_edges, lay_onto
+from slideviz.machine.onto import AGREE, Laid, Nearest, Wall, find_edges, lay_onto
+from slideviz.machine.onto import Target as TargetSurface
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
@@ -25,6 +31,10 @@ from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
 from slideviz.rbf.projection import as_simplices, simplex_vectors, surface_rim
+from slideviz.terms import MOTION_KINDS
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 FARTHEST = 0.01
 """Largest distance from the target that may remain, over the boundary's size, by default."""
@@ -39,6 +49,82 @@ class Remaining(Note):
     """The note on how far boundaries remain from the target that they are laid onto."""
 
     report: Mapping[str, object]  # what the report of a run has: boundaries, file, distances
+
+
+@dataclass(frozen=True)
+class Onto(FromFile):
+    """Lay a marker onto the surface in a file: an STL or VTU surface, or a boundary of a mesh.
+
+    Nodes move to closest points, smoothly, from their undeformed places, so that no other motion of
+    the marker may come before. Those at the rim stay on the boundaries that they have in common
+    with. Of a mesh, the boundary with the marker's name counts, or its only one. ``limit`` is how
+    far a node may stay from the surface, in the mesh's length unit; 0 is 1 % of the marker's size.
+    """
+
+    limit: float = 0.0
+
+    kind_term = MOTION_KINDS["onto"]
+    verbs = ("onto",)
+    rows = ("path", "limit")
+    file_words = "surface to lie on"
+    has_table = False
+    takes_time = True
+    checked_as_text = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.limit < math.inf:
+            raise CaseError(
+                f"the limit {self.limit:g} is not above 0; leave it out for 1 % of the size"
+            )
+
+    @classmethod
+    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+        if len(words) not in (1, 2) or not words[0].text:
+            raise CaseError(
+                "expected (MARKER, onto, path) or (MARKER, onto, path, limit), where the limit is "
+                "the largest distance that may remain; a path with spaces, commas or brackets "
+                "needs quotes"
+            )
+        limit = number(words[1].text) if words[1:] else 0.0
+        if words[1:] and not limit:
+            raise CaseError(f"the limit {limit:g} is not above 0; leave it out for 1 % of the size")
+        return cls(read_path(words), marker, limit)
+
+    @property
+    def is_case_file(self) -> bool:
+        return False
+
+    def arguments(self) -> list[str]:
+        return [*super().arguments(), *(number_texts(self.limit) if self.limit else [])]
+
+    def described(self, dim: int, extent: float) -> str:
+        return f"lay onto {self.path.name or '(no file yet)'}"
+
+    def label(self, form: str, *, exact: bool) -> str:
+        return f"lay onto {super().label(form, exact=exact)}"
+
+    def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
+        for marker in case.markers_with("moving"):
+            before = [motion for motion in case.motions[:place] if applies_to(motion, marker)]
+            if before and applies_to(self, marker):
+                yield (
+                    f"it begins at the undeformed places of {marker!r}, which another motion "
+                    "leaves before; put this one first"
+                )
+
+    @classmethod
+    def placed(
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+    ) -> dict[int, Displacements]:
+        found: dict[int, Displacements] = {}
+        for place, motion in enumerate(case.motions):
+            if isinstance(motion, Onto) and any(applies_to(motion, name) for name in on):
+                try:
+                    found[place] = laid_displacements(motion, case, mesh, on)
+                except CaseError as problem:
+                    problems.append(str(problem))
+        return found
 
 
 def laid_displacements(
@@ -169,7 +255,7 @@ def _checked(
     return note
 
 
-def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> Target:
+def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> TargetSurface:
     """Return the surface in a file: all facets, or markers of a mesh; CaseError if it has none."""
     try:
         read = read_surface(path)
@@ -191,7 +277,7 @@ def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> Target:
     points, place = np.unique(read.points[:, : mesh.dim], axis=0, return_inverse=True)
     table = place.ravel()[facets]
     edges, _ = find_edges(points, table)
-    return Target(_nearest(as_simplices(points[table])), _along(points[edges]))
+    return TargetSurface(_nearest(as_simplices(points[table])), _along(points[edges]))
 
 
 def _dims(mesh: Mesh) -> set[int]:

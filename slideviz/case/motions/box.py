@@ -1,0 +1,455 @@
+"""Motions of control points of boxes for free-form deformation, and of the nodes inside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.case.boxes import boxes_for, embedding, missing_box, off_points, system_of
+from slideviz.case.displacement import Displacements
+from slideviz.case.motions.motion import (
+    Motion,
+    NewMotion,
+    Target,
+    applies_to,
+    axis_length,
+    direction_words,
+    marker_words,
+    number_texts,
+    place_words,
+    vector_words,
+    without_brackets,
+)
+from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
+from slideviz.case.words import Word, name_text, number
+from slideviz.errors import CaseError, Note, SlidevizError
+from slideviz.ffd.box import Box, Index
+from slideviz.ffd.kinds import Turn
+from slideviz.ffd.section import boxes_of, with_boxes
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
+from slideviz.terms import MOTION_KINDS
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+
+_STAYS = (
+    "the FFD box {} in the deformed mesh stays where it was, because boxes are nested or other "
+    "motions move boundaries, too; define it again to use it with that mesh"
+)
+
+
+class BoxMotion(Motion):
+    """A motion of control points of a box; those of one box act one after the other."""
+
+    box: str
+
+    chosen = ("index", "plane")
+
+    def lattice_index(self, dim: int) -> Index:
+        """Return the index (i, j, k) of the control points that move; -1 means all."""
+        raise NotImplementedError
+
+    def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
+        """Return the change (I, J, K, 3) of control points, now at ``q``."""
+        raise NotImplementedError
+
+    def unfit(self, case: Case, box: Box, dim: int) -> Iterator[str]:
+        """Yield why the motion is impossible with its box, a sentence for each reason."""
+        yield from ()
+
+    @property
+    def place_in_box(self) -> tuple[int, ...]:
+        """Return the indices of the control points that move, as the user gives them."""
+        raise NotImplementedError
+
+    @property
+    def box_words(self) -> str:
+        """Return the name of the box, in words."""
+        return self.box or "(no box yet)"
+
+    @property
+    def control_words(self) -> str:
+        """Return the control points that move, and their box, in words."""
+        index = ", ".join("all" if index < 0 else str(index) for index in self.place_in_box)
+        return f"({index}) of {self.box_words}"
+
+    def described(self, dim: int, extent: float) -> str:
+        return self.label(".4g", exact=False)
+
+    def incomplete(self) -> str:
+        if self.box:
+            return ""
+        return "it names no FFD box; choose one of the mesh, or define one with FFD_DEFINITION"
+
+    def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
+        try:
+            boxes = boxes_for(case, mesh)
+        except SlidevizError as problem:
+            yield str(problem)
+            return
+        if self.box not in boxes:
+            none = "none is in it, or in FFD_DEFINITION"
+            yield missing_box(mesh, self.box, boxes, none)
+            return
+        box = boxes[self.box]
+        if unknown := box.problem(self.lattice_index(mesh.dim)):
+            yield unknown
+        yield from self.unfit(case, box, mesh.dim)
+
+    @classmethod
+    def placed(
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+    ) -> dict[int, Displacements]:
+        motions = box_motions(case)
+        boxes = boxes_for(case, mesh) if motions else {}
+        found: dict[int, Displacements] = {}
+        outside: dict[int, str] = {}
+        alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
+        for name, changes in box_changes(case, mesh, boxes).items():
+            for place, q, change in changes:
+                motion = case.motions[place]
+                mine = {name: nodes for name, nodes in on.items() if applies_to(motion, name)}
+                moved = _moved(boxes[name], mesh, q, change, mine)
+                if moved is not None:
+                    if not alone and any(b.name == name for b in boxes_of(mesh, system_of(case))):
+                        stays = Note(_STAYS.format(repr(name)))
+                        moved = replace(moved, warnings=(*moved.warnings, stays))
+                    found[place] = moved
+                elif mine:
+                    outside[place] = (
+                        f"motion {place + 1}: no node of {marker_words(motion.marker)} is in the "
+                        f"FFD box {name!r}; move the box, or take another boundary"
+                    )
+        problems += [outside[place] for place in sorted(outside)]
+        return found
+
+    def of_zone(self, part: ZonePart, zone: Case) -> Motion | None:
+        elsewhere = not self.marker and self.box not in boxes_for(zone, part.mesh)
+        return None if elsewhere else self
+
+    def design_name(self) -> str:
+        return ".".join([super().design_name(), self.box, *map(str, self.place_in_box)])
+
+
+@dataclass(frozen=True)
+class Ffd(BoxMotion):
+    """Move control points of a box for free-form deformation, and with them the nodes inside.
+
+    ``box`` is the name of a box of the mesh or of ``Case.ffd_boxes``, ``index`` the control point
+    (i, j, k), where -1 takes all of a direction, ``vector`` its shift (dx, dy, dz), dz 0 in 2D. The
+    displacement of a node depends on its undeformed place in the undeformed box, whatever motions
+    come before.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int, int]
+    vector: tuple[float, float, float]
+
+    kind_term = MOTION_KINDS["ffd"]
+    verbs = ("ffd",)
+    rows = ("index", "box", "vector")
+    proportional = ("vector",)
+
+    @classmethod
+    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+        items = without_brackets(words)
+        name = items[0].text if items else ""
+        if len(items) not in (5, 7) or not name:
+            raise CaseError(
+                "expected the box, the control point i, j, k (-1 is all of a direction) and its "
+                "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
+            )
+        count = (len(items) - 1) // 2
+        i, j, k = (*_integers(items[1 : 1 + count]), -1)[:3]
+        dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
+        return cls(marker, name, (i, j, k), (dx, dy, dz))
+
+    @classmethod
+    def new(cls, marker: Target, start: NewMotion) -> Motion:
+        return cls(marker, _first_box(start), (0, 0, _last_index(start)), (0.0, 0.0, 0.0))
+
+    def arguments(self) -> list[str]:
+        return [name_text(self.box), *map(str, self.index), *number_texts(*self.vector)]
+
+    def described(self, dim: int, extent: float) -> str:
+        return f"move {self.control_words} by {vector_words(self.vector[:dim])}"
+
+    def label(self, form: str, *, exact: bool) -> str:
+        return f"{self.control_words} {vector_words(self.vector, form)}"
+
+    @property
+    def place_in_box(self) -> tuple[int, ...]:
+        return self.index
+
+    def lattice_index(self, dim: int) -> Index:
+        return self.index
+
+    def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
+        return box.change(self.index, self.vector)
+
+    def unfit(self, case: Case, box: Box, dim: int) -> Iterator[str]:
+        name, across = ("dz", 2) if box.system.kind == "CARTESIAN" else ("dθ", 1)
+        if dim == 2 and (shift := self.vector[across]):
+            yield f"{name} is {shift:g}, which leaves the plane; in 2D write 0"
+
+
+class _Column(BoxMotion):
+    """A motion of a column of control points of a box; ``index`` (i, j), -1 takes all."""
+
+    index: tuple[int, int]
+    amount: float
+    what: str
+
+    rows = ("index", "box", "amount")
+    proportional = ("amount",)
+
+    @classmethod
+    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+        items = without_brackets(words)
+        name = items[0].text if items else ""
+        if len(items) not in (3, 4) or not name:
+            raise CaseError(
+                "expected the box, the column of control points i, j (-1 is all of a direction) "
+                f"and the amount: {verb}, BOX, 2, 1, 0.01; in 2D {verb}, BOX, 2, 0.01"
+            )
+        i, j = (*_integers(items[1:-1]), -1)[:2]
+        return cls(marker, name, (i, j), number(items[-1].text))  # type: ignore[call-arg]
+
+    @classmethod
+    def new(cls, marker: Target, start: NewMotion) -> Motion:
+        index = (0, _last_index(start))
+        return cls(marker, _first_box(start), index, 0.0)  # type: ignore[call-arg]
+
+    def arguments(self) -> list[str]:
+        return [name_text(self.box), *map(str, self.index), *number_texts(self.amount)]
+
+    def label(self, form: str, *, exact: bool) -> str:
+        return f"{self.what} {self.control_words} {self.amount:+{form}}"
+
+    @property
+    def place_in_box(self) -> tuple[int, ...]:
+        return self.index
+
+    def lattice_index(self, dim: int) -> Index:
+        i, j = self.index
+        return i, (j if dim == 3 else -1), -1
+
+    def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
+        shift = [0.0, 0.0, 0.0]
+        shift[_across(dim)] = self.amount
+        return box.change(self.lattice_index(dim), (shift[0], shift[1], shift[2]))
+
+    def unfit(self, case: Case, box: Box, dim: int) -> Iterator[str]:
+        if dim == 2 and case.ffd_system != "CARTESIAN":
+            yield f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}"
+
+
+@dataclass(frozen=True)
+class FfdCamber(_Column):
+    """Shift a column of control points of a box as one, and with it the nodes inside.
+
+    ``index`` (i, j) is the column, which goes along z; in 2D that of i, along y. -1 takes all.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int]
+    amount: float
+
+    kind_term = MOTION_KINDS["ffd-camber"]
+    verbs = ("ffd-camber",)
+    what = "camber"
+
+
+@dataclass(frozen=True)
+class FfdThickness(_Column):
+    """Stretch a column of control points of a box, and with it the nodes inside.
+
+    Its first control point goes by -``amount``, its last one by ``amount``. ``index`` as in
+    `FfdCamber`.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int]
+    amount: float
+
+    kind_term = MOTION_KINDS["ffd-thickness"]
+    verbs = ("ffd-thickness",)
+    what = "thickness"
+
+    def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
+        across = _across(dim)
+        sides = np.linspace(-1.0, 1.0, box.points.shape[across])  # from lowest to highest layer
+        others = [axis for axis in range(4) if axis != across]
+        return super().control_change(box, q, dim) * np.expand_dims(sides, others)
+
+
+@dataclass(frozen=True)
+class FfdTwist(BoxMotion):
+    """Rotate a plane j of control points of a box in 3D, and with it the nodes inside.
+
+    It turns by ``angle_deg`` about the axis through ``point`` (right-handed; any length). A
+    ``plane`` of -1 takes all.
+    """
+
+    marker: Target
+    box: str
+    plane: int
+    angle_deg: float
+    point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
+
+    kind_term = MOTION_KINDS["ffd-twist"]
+    verbs = ("ffd-twist",)
+    rows = ("plane", "box", "angle", "point", "axis")
+    proportional = ("angle_deg",)
+    only_3d = True
+
+    @classmethod
+    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+        items = without_brackets(words)
+        n_axis = axis_length(items, 3, 0)
+        if len(items) != 6 + n_axis or not items[0].text:
+            raise CaseError(
+                "expected the box, the plane j of control points (-1 is all), the angle in "
+                "degrees, the axis (x, y, z or three numbers) and a point on it: ffd-twist, BOX, "
+                "2, 5.0, y, 0.25, 0, 0"
+            )
+        (plane,) = _integers(items[1:2])
+        axis = read_axis(items[3 : 3 + n_axis])
+        point = read_vector(items[3 + n_axis :], "the point")
+        return cls(marker, items[0].text, plane, number(items[2].text), point, axis)
+
+    @classmethod
+    def new(cls, marker: Target, start: NewMotion) -> Motion:
+        return cls(marker, _first_box(start), 0, 0.0)
+
+    def arguments(self) -> list[str]:
+        turn = [*number_texts(self.angle_deg), axis_text(self.axis), vector_text(self.point)]
+        return [name_text(self.box), str(self.plane), *turn]
+
+    def described(self, dim: int, extent: float) -> str:
+        through = place_words(self.point, extent)
+        words = self.label(".4g", exact=False)
+        return f"{words} about {direction_words(self.axis)} through {through}"
+
+    def label(self, form: str, *, exact: bool) -> str:
+        planes = "all planes" if self.plane < 0 else f"plane {self.plane}"
+        return f"twist {planes} of {self.box_words} {self.angle_deg:+{form}}°"
+
+    @property
+    def place_in_box(self) -> tuple[int, ...]:
+        return (self.plane,)
+
+    def lattice_index(self, dim: int) -> Index:
+        return -1, self.plane, -1
+
+    def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
+        chosen = box.change(self.lattice_index(dim), (1.0, 1.0, 1.0))[..., 0] > 0.0
+        point = (*self.point, 0.0)[:3]
+        turn = Turn(chosen, np.array(point), np.array(self.axis), math.pi / 180.0)
+        return turn.change(q, self.angle_deg)
+
+    def unfit(self, case: Case, box: Box, dim: int) -> Iterator[str]:
+        if dim == 2:
+            yield "a box in 2D has no span to twist along; write rotate"
+        if case.ffd_system != "CARTESIAN":
+            yield (
+                f"ffd-twist turns control points in x, y and z, and FFD_COORD_SYSTEM is "
+                f"{case.ffd_system}; move them along θ with ffd"
+            )
+
+
+def _across(dim: int) -> int:
+    """Return the direction of a column of control points."""
+    return 2 if dim == 3 else 1
+
+
+def _first_box(start: NewMotion) -> str:
+    return start.boxes[0] if start.boxes else ""
+
+
+def _last_index(start: NewMotion) -> int:
+    return 0 if start.dim == 3 else -1
+
+
+def _integers(words: list[Word]) -> list[int]:
+    values = [number(word.text) for word in words]
+    if any(value != int(value) or value < -1 for value in values):
+        text = ", ".join(word.text for word in words)
+        raise CaseError(f"the control point ({text}) is none; expected whole numbers from -1")
+    return [int(value) for value in values]
+
+
+def box_motions(case: Case) -> tuple[BoxMotion, ...]:
+    """Return the motions of a case that move control points of boxes."""
+    return tuple(motion for motion in case.motions if isinstance(motion, BoxMotion))
+
+
+def box_changes(
+    case: Case, mesh: Mesh, boxes: Mapping[str, Box]
+) -> dict[str, list[tuple[int, FloatArray, FloatArray]]]:
+    """Return how motions change control points, for each box that some move, in their order.
+
+    Place of the motion, the control points (I, J, K, 3) before it, in the box's coordinates, and
+    their change by it. Motions that do not fit their box change nothing.
+    """
+    changes: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
+    for place, motion in enumerate(case.motions):
+        if not isinstance(motion, BoxMotion) or motion.box not in boxes:
+            continue
+        box = boxes[motion.box]
+        if box.problem(motion.lattice_index(mesh.dim)):
+            continue
+        mine = changes.setdefault(motion.box, [])
+        q = mine[-1][1] + mine[-1][2] if mine else box.q
+        mine.append((place, q, motion.control_change(box, q, mesh.dim)))
+    return changes
+
+
+def _moved(
+    box: Box, mesh: Mesh, q: FloatArray, change: FloatArray, on: Mapping[str, IntArray]
+) -> Displacements | None:
+    """Return the displacements that a change of control points gives all nodes of some markers.
+
+    None where no node is in the box. ``q`` (I, J, K, 3) are the control points before, ``on`` has
+    the nodes (k,) of each marker.
+    """
+    nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
+    vectors = np.zeros((len(nodes), mesh.dim))
+    warnings, any_inside = [], False
+    for name in on:
+        inside, _ = embedding(box, mesh, name)
+        any_inside |= bool(len(inside.nodes))
+        shift = inside.sums(change)
+        if box.system.kind != "CARTESIAN":
+            before = inside.sums(q)
+            shift = box.system.points_of(before + shift) - box.system.points_of(before)
+        vectors[np.searchsorted(nodes, inside.nodes)] = shift[:, : mesh.dim]
+        warnings += off_points(box, mesh, name)
+    return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None
+
+
+def moved_boxes(case: Case, mesh: Mesh, part: float = 1.0) -> Mesh:
+    """Return the mesh with its boxes deformed by the motions of the case times ``part``, 0 to 1.
+
+    Where the case has motions of other kinds too, or boxes are nested, they are left as they are:
+    no control points could follow these.
+    """
+    motions = box_motions(case)
+    if not motions or len(motions) < len(case.motions):
+        return mesh
+    boxes = {box.name: box for box in boxes_of(mesh, system_of(case))}
+    if any(box.level for box in boxes.values()):
+        return mesh
+    moved = []
+    for name, changes in box_changes(case, mesh, boxes).items():
+        total = np.sum([change for _, _, change in changes], axis=0)
+        moved.append(boxes[name].moved(part * total))
+    return with_boxes(mesh, moved) if moved else mesh
