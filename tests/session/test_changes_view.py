@@ -179,9 +179,9 @@ def test_motions_that_move_nothing_are_not_ready(session, still, moves):
 
 def test_what_the_case_finds_wrong_is_passed_on(session):
     session = changes.set_role(session, ("left",), "moving")
-    session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
-    (missing,) = run_requirements(changes.set_case(session, steps=-1))
-    assert "-1" in missing.text
+    session = changes.add_motion(session, Translate("left", (1.0, 0.0, 0.0)))
+    (missing,) = run_requirements(session)
+    assert "has 3 components" in missing.text
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from slideviz.case import spans
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements
+from slideviz.case.motions import span as span_motions
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Translate
 from slideviz.case.motions.span import SpanMotion
@@ -109,7 +109,7 @@ def test_what_the_first_motion_and_section_over_the_span_need_is_computed_before
     find_intersection(case, mesh, lambda _: None, lambda: False)
     monkeypatch.setattr(span, "_span_between", None)
     monkeypatch.setattr(span, "SpanCurves", None)
-    monkeypatch.setattr(spans, "BladeSections", None)
+    monkeypatch.setattr(span_motions, "BladeSections", None)
     assert np.abs(displacements(twist, mesh).vectors).max() > 1e-3
     walls = sections.find_walls(mesh, twist, find_periods(mesh, twist))
     assert len(walls.channels[0].curves.m_prime)
