@@ -115,7 +115,9 @@ class Equilibrium:
         """Return the unknowns (k, d) for a right-hand side (k, d); DeformError above `ENOUGH`."""
         if not right.any():
             return np.zeros_like(right)
-        solved = conjugate_gradients(self._levels, right.ravel(), tolerance=EXACT)
+        solved = conjugate_gradients(
+            self._levels[0].matrix, self._levels, right.ravel(), tolerance=EXACT
+        )
         if not solved.error <= ENOUGH:
             raise DeformError(
                 f"the equations of linear elasticity were solved to {solved.error:.1g} only, so "
@@ -316,6 +318,7 @@ def _equilibrium(
 
         solved = solve(
             matrix,
+            lambda: matrix if mesh.lame[1] >= 0.0 else mesh.definite().matrix(prescribed),
             residual,
             rigid_motions(at, prescribed),
             guess.ravel(),

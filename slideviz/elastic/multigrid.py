@@ -89,6 +89,7 @@ Residual = Callable[[FloatArray], FloatArray]
 
 def solve(
     matrix: bsr_array,
+    like: Callable[[], bsr_array],
     residual: Residual,
     modes: FloatArray,
     start: FloatArray,
@@ -100,6 +101,7 @@ def solve(
     Small ones by a sparse factorisation, others by conjugate gradients, and where these do not
     come to `LIMIT`, by a factorisation again, if they are not too large.
     ``matrix`` (n, n): in blocks; ``residual`` may be more accurate than its products are.
+    ``like``: makes a positive definite matrix like it, for the cycles.
     ``modes`` (n, m): vectors of nearly no energy: the rigid motions.
     ``start`` (n,): a guess of the solution.
     ``scale``: the largest displacement that is known.
@@ -110,10 +112,10 @@ def solve(
 
     def iterated() -> LinearSolution:
         try:
-            levels = while_ticking(lambda: hierarchy(matrix, modes), tick)
+            levels = while_ticking(lambda: hierarchy(like(), modes), tick)
         except LinAlgError:  # the coarsest matrix is not positive definite
             return LinearSolution(start, np.inf)
-        found = conjugate_gradients(levels, right, tick, scale=scale)
+        found = conjugate_gradients(matrix, levels, right, tick, scale=scale)
         x = start + found.x
         left = _part(_cycle(levels, residual(x)), x, scale) / found.smallest
         return replace(found, x=x, error=max(found.error, left))
@@ -256,6 +258,7 @@ def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
 
 
 def conjugate_gradients(
+    matrix: bsr_array,
     levels: list[Level],
     right: FloatArray,
     tick: Tick = no_tick,
@@ -268,24 +271,27 @@ def conjugate_gradients(
     Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1. The error is judged by what a
     V-cycle makes of the residual, divided by the smallest eigenvalue of the preconditioned matrix,
     which the iteration finds (section 6.7.3: Lanczos' tridiagonal matrix): a cycle that does not
-    see an error has a small one.
-    ``levels``: of the matrix, as ``hierarchy`` returns them.
+    see an error has a small one. The matrix may be indefinite: then the iteration may break down,
+    and says so by its error.
+    ``matrix`` (n, n): in blocks.
+    ``levels``: of the matrix, or of a positive definite one like it, as ``hierarchy`` returns them.
     ``right`` (n,): right-hand side.
     ``tolerance``: error at which the iteration ends, as a part of the largest displacement.
     ``scale``: the largest displacement that is known.
     """
     with enough_threads(0.0):  # the same bits for any number of threads
-        return _conjugate_gradients(levels, right, tick, tolerance, scale)
+        return _conjugate_gradients(matrix, levels, right, tick, tolerance, scale)
 
 
 def _conjugate_gradients(
+    matrix: bsr_array,
     levels: list[Level],
     right: FloatArray,
     tick: Tick,
     tolerance: float,
     scale: float,
 ) -> LinearSolution:
-    matrix, x, left = levels[0].matrix, np.zeros_like(right), right.copy()
+    x, left = np.zeros_like(right), right.copy()
     z = _cycle(levels, left)
     energy, along = float(left @ z), z
     sizes, turns = [1.0], [0.0]
@@ -297,8 +303,8 @@ def _conjugate_gradients(
         tick(MAKING + (1.0 - MAKING) * min(1.0, done))
         image = _product(matrix, along)
         curvature = float(along @ image)
-        if not curvature > 0.0:
-            return LinearSolution(x, np.inf)  # the matrix is not positive definite
+        if curvature == 0.0:
+            return LinearSolution(x, np.inf)
         size = energy / curvature
         x += size * along
         left -= size * image
@@ -312,7 +318,7 @@ def _conjugate_gradients(
 
 
 def _smallest(sizes: list[float], turns: list[float]) -> float:
-    """Return the smallest eigenvalue, at most 1, that conjugate gradients found.
+    """Return the size of the smallest eigenvalue, at most 1, that conjugate gradients found.
 
     ``sizes``, ``turns``: of each iteration alpha and beta, after a first one of 1 and 0.
     """
@@ -320,9 +326,8 @@ def _smallest(sizes: list[float], turns: list[float]) -> float:
     if not len(alpha):
         return 1.0
     diagonal = 1.0 / alpha + beta / np.array(sizes[:-1])
-    off = np.sqrt(beta[1:]) / alpha[:-1]
-    least = eigvalsh_tridiagonal(diagonal, off, select="i", select_range=(0, 0))[0]
-    return float(min(1.0, least))
+    off = np.sqrt(beta[1:]) / np.abs(alpha[:-1])
+    return float(min(1.0, np.abs(eigvalsh_tridiagonal(diagonal, off)).min()))
 
 
 @njit(**_OPTIONS)

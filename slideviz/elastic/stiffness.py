@@ -20,7 +20,7 @@ unknowns, only g_i. The matrix is symmetric with blocks d by d, as the multigrid
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -239,6 +239,11 @@ class ElasticMesh:
                 tick(done / total)
         _fill_held_diagonal(indptr, indices, data, conditions.free)
         return bsr_array((data, indices, indptr), shape=(count * d, count * d))
+
+    def definite(self) -> ElasticMesh:
+        """Return a body like this one whose matrix is positive definite: lam is at least 0."""
+        mu, lam = self.lame
+        return replace(self, lame=(mu, max(lam, 0.0)))
 
     def forces(self, moved: FloatArray) -> FloatArray:
         """Return the forces (n, d) of a displacement (n, d), by its differences in each element.

@@ -10,15 +10,17 @@ or one with the same files whose names have ``_`` for ``/``.
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import slideviz as sv
 from slideviz.case.motions.motion import Motion
 from slideviz.errors import SlidevizError
-from slideviz.terms import Method, Role
+from slideviz.terms import Role
+from tools.study.contest import METHODS as CONTEST
 
 
 class Row(NamedTuple):
@@ -46,32 +48,33 @@ ROWS = (
     Row(_STAGE, ("wall1", "wall2"), 1, 0.125, True),
     Row(_STAGE, ("wall3", "wall4"), 2, 0.125, True),
 )
-METHODS: tuple[Method, ...] = ("rbf", "elastic")
+METHODS = {"rbf": {}, "elastic": CONTEST["elastic"], "SU2's default": CONTEST["su2"]}
 FOLDED = 300
 """Most cells that a motion may fold whose cells are repaired."""
 
 
 def main(folder: Path) -> None:
     """Print the table, and how many times each method is the better one."""
-    wins = {True: np.zeros((2, 2), int), False: np.zeros((2, 2), int)}
+    wins = {True: np.zeros((2, 2, 2), int), False: np.zeros((2, 2, 2), int)}
     for row in ROWS:
         path = folder / row.file
         path = path if path.exists() else folder / row.file.replace("/", "_")
         mesh = sv.read(path, zone=row.zone)
         cells = []
         for motion in motions(mesh, row):
-            found = [rated(mesh, row, motion, method) for method in METHODS]
-            ours, theirs = np.array(found)
-            wins[row.has_layers] += [ours > theirs, theirs > ours]
+            found = [rated(mesh, row, motion, settings) for settings in METHODS.values()]
+            ours, *theirs = np.array(found)
+            wins[row.has_layers] += [[ours > other, other > ours] for other in theirs]
             cells += [shown(mean, low) for mean, low in found]
         name = row.file.removesuffix(".su2") + (f", zone {row.zone}" if mesh.zones > 1 else "")
         part = "" if row.part == 1 else f"1/{1 / row.part:.0f}"
         say(f"| {name} | {part} | {' | '.join(cells)} |")
-    for has_layers, ((mean, low), (elastic_mean, elastic_low)) in wins.items():
-        say(
-            f"{'with' if has_layers else 'without'} layers: mean higher {mean} : {elastic_mean}, "
-            f"lowest higher {low} : {elastic_low} (radial basis functions : elasticity)"
-        )
+    for has_layers, each in wins.items():
+        for name, ((mean, low), (other_mean, other_low)) in zip([*METHODS][1:], each, strict=True):
+            say(
+                f"{'with' if has_layers else 'without'} layers: mean higher {mean} : {other_mean}, "
+                f"lowest higher {low} : {other_low} (radial basis functions : {name})"
+            )
 
 
 def repaired(folder: Path) -> None:
@@ -125,14 +128,16 @@ def motions(mesh: sv.Mesh, row: Row) -> tuple[Motion, ...]:
     )
 
 
-def rated(mesh: sv.Mesh, row: Row, motion: Motion, method: Method) -> tuple[float, float]:
+def rated(
+    mesh: sv.Mesh, row: Row, motion: Motion, settings: Mapping[str, Any]
+) -> tuple[float, float]:
     """Return mean and lowest quality; inverted cells count as minus one, a refusal as minus all."""
     roles: dict[str, Role] = dict.fromkeys(row.body, "moving")
-    case = sv.Case(roles=roles, motions=(motion,), method=method)
+    case = sv.Case(roles=roles, motions=(motion,)).change(**settings)
     try:
         *_, last = sv.deform(case, mesh)
     except SlidevizError as problem:
-        sys.stderr.write(f"{row.file}, {method}, {motion}: {problem}\n")
+        sys.stderr.write(f"{row.file}, {settings}, {motion}: {problem}\n")
         return -np.inf, -np.inf
     found = sv.quality(last.mesh, mesh)
     return found.mean, -found.inverted if found.inverted else found.min
