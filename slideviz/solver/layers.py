@@ -22,6 +22,7 @@ SHARP = -0.25
 """Cosine between the normals of the sides of a sharp edge, at most: it has an angle below 75°. The
 sides of blunter edges turn as one: nodes that see both would come nearer to the edge else."""
 CHANGED = 1.5  # ratio of first heights, after over before or reverse, from which on a run warns
+TOUCHING = 1e-9  # distance over the thickness of a zone up to which walls touch each other
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
@@ -119,6 +120,39 @@ def _first_heights(
     column = column[column < len(rise)]
     np.maximum.at(first, np.searchsorted(nodes, columns.nodes[column, 0]), rise[column])
     return np.where(first > 0.0, np.minimum(first, STEEP * usual), usual)
+
+
+def thickness_warnings(case: Case, domain: Domain, zone: LayerZone | None) -> list[str]:
+    """Return warnings of walls that other ones are nearer to than LAYER_THICKNESS.
+
+    Other walls are moving and fixed boundaries that do not touch this one, and periodic images.
+    """
+    if zone is None or not case.layer_thickness:
+        return []
+    from scipy.spatial import cKDTree  # takes long to load
+
+    frame, coords, boundary = domain.frame, domain.coords, domain.boundary
+    held = [domain.roles.get(name, "fixed") in ("moving", "fixed") for name in boundary.names]
+    facets = boundary.facets[np.array(held)[boundary.marker]]
+    links = np.concatenate([facets[:, [0, k]] for k in range(1, facets.shape[1])])
+    part, nodes = components(len(coords), *links.T), np.unique(facets)
+    periods = [-1, 1] if np.any(frame.shift()) else []
+    warnings = []
+    for wall, *_ in zone.walls.walls:
+        mine = np.unique(wall.facets)
+        own = part[nodes] == part[mine[0]]
+        near = [(nodes[~own], k) for k in (0, *periods)] + [(nodes[own], k) for k in periods]
+        tree = cKDTree(frame.points(coords[mine]))
+        points = (frame.points(coords[some] + k * frame.shift()) for some, k in near)
+        gaps = [tree.query(each)[0].min(initial=np.inf) for each in points]
+        room = min((gap for gap in gaps if gap > TOUCHING * wall.thickness), default=np.inf)
+        if wall.thickness > room:
+            warnings.append(
+                f"LAYER_THICKNESS= {case.layer_thickness:g} is more than the distance from "
+                f"{' and '.join(wall.names)} to the next wall, {room:.3g}: cells between them may "
+                f"be folded; write less than {0.5 * room:.2g}, or AUTO"
+            )
+    return warnings
 
 
 def height_warnings(case: Case, walls: Walls, mesh: Mesh) -> list[str]:

@@ -45,6 +45,8 @@ def remedies(
     found, roles = [], set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
+    if case.layers != "no" and case.layer_thickness:
+        found.append(Remedy("LAYER_THICKNESS= AUTO", "an automatic thickness of the layers"))
     if layers:
         given = case.reduction or Reduction()
         yes = "DATA_REDUCTION= YES with " if given.auto else ""

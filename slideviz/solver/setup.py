@@ -33,7 +33,7 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.rims import Keep, Rims
 from slideviz.rbf.tape import Array, multiply, put, take
 from slideviz.solver.domain import Domain, find_domain
-from slideviz.solver.layers import layer_zone
+from slideviz.solver.layers import layer_zone, thickness_warnings
 from slideviz.solver.prescribed import (
     BoundaryConditions,
     fitted_radius,
@@ -293,7 +293,8 @@ def setup_of(
         *idle_settings(case),
         *file_before_motions(case),
     )
-    warnings += _not_relaxed(case, mesh)
+    zone = layer_zone(case, mesh, domain, conditions.known)
+    warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, domain, zone))
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
@@ -312,7 +313,7 @@ def setup_of(
         tracks=tracks,
         span=span,
         solve=_method(case, mesh, frame, axis),
-        zone=layer_zone(case, mesh, domain, conditions.known),
+        zone=zone,
         rims=rims,
         fitted_radius=fitted_radius(case, mesh, conditions.moved),
         relaxation=relaxation_of(case, mesh, frame, axis),

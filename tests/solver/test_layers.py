@@ -20,6 +20,7 @@ from slideviz.samples.table import sample
 from slideviz.session import jobs
 from slideviz.session.run_messages import warnings_of
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver.remedies import remedies
 from slideviz.solver.setup import make_setup
 from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
@@ -165,6 +166,34 @@ def test_walls_nearer_than_their_zones_share_the_gap(thickness, rows):
     )
     *_, last = sv.deform(case, mesh)
     assert sv.quality(last.mesh, mesh).inverted == 0
+
+
+@pytest.mark.parametrize(("thickness", "told"), [("auto", False), (0.019, False), (0.021, True)])
+def test_a_zone_thicker_than_a_channel_is_told(thickness, told):
+    mesh = builders.grid((39, 5), place=lambda p: p * [1 / 39, 0.02 / 5])
+    roles = {"y_m": "moving", "y_p": "fixed", "x_m": "sliding", "x_p": "sliding"}
+    motions = (Translate("y_m", (0.0, 0.001)),)
+    case = Case(
+        roles=roles, motions=motions, sliding="ps", layers="keep", layer_thickness=thickness
+    )
+    said = [text for text in make_setup(case, mesh).warnings if "LAYER_THICKNESS" in text]
+    assert len(said) == 2 * told  # of both walls
+    if told:
+        assert "0.021 is more than the distance from y_m to the next wall, 0.02:" in said[0]
+        assert "write less than 0.01, or AUTO" in said[0]
+    first = remedies(case)[0].keys
+    assert (first == "LAYER_THICKNESS= AUTO") == (thickness != "auto")
+
+
+def test_the_next_wall_may_be_the_periodic_image():
+    row = sample("turbine-row", 5000)
+    for thickness in (0.2, 2.0):
+        pitch = row.mesh.extent * thickness
+        case = row.case.change(layers="keep", layer_thickness=pitch)
+        said = [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICKNESS" in text]
+        assert [text.partition("from ")[2].partition(" to")[0] for text in said] == ["BLADE"]
+    case = row.case.change(layers="keep", layer_thickness=1e-3 * row.mesh.extent)
+    assert not [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICK" in text]
 
 
 def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
