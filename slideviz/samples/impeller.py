@@ -108,7 +108,6 @@ def impeller_case() -> Case:
         sliding="ps",
         periodic="moving",
         periodic_type="rotational",
-        steps=3,
         kernel="wendland-c0",  # smoother ones overshoot between the thin cells at the blade
         relax="auto",
         layers="auto",

@@ -16,11 +16,14 @@ from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
 from slideviz.session.saving import bound_sections, view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
+from slideviz.solver.setup import relaxes
 from slideviz.terms import ColorBy, Role
 
 RELATIVE_TOLERANCE = 1e-5  # suggested tolerance of data reduction, over the mesh's extent
 SQUARE = 1e-6  # directions are perpendicular or parallel where their cosine is this near to 0 or 1
-STEPS = 5  # number of steps of a guessed case with sliding boundaries
+STEPS = 5
+"""Number of steps of a guessed case with sliding boundaries where nothing is relaxed: relaxation is
+better and faster from one step."""
 
 
 def open_mesh(
@@ -145,7 +148,7 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
     case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None, **NEW)
     if "sliding" in roles.values():
         # Without a sliding method the role would have no effect.
-        case = case.change(sliding="ps", steps=STEPS)
+        case = case.change(sliding="ps", steps=1 if relaxes(case, mesh) else STEPS)
     for pair in pairs:
         if roles[pair.first] == roles[pair.second] == "periodic":
             return with_periodicity(case, pair)

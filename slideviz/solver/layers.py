@@ -168,19 +168,24 @@ def height_warnings(case: Case, walls: Walls, mesh: Mesh) -> list[str]:
         ratio = walls.values["height_ratio"][at]
         k = int(np.argmax(np.nan_to_num(BADNESS["height_ratio"](ratio), nan=0.0)))
         if not 1.0 / CHANGED <= ratio[k] <= CHANGED and np.isfinite(ratio[k]):
-            where = ", ".join(f"{x:.6g}" for x in walls.columns.at(mesh.points, at[k]))
+            point = walls.columns.at(mesh.points, at[k])
+            where = ", ".join(f"{x:.6g}" for x in point)
             warnings.append(
                 f"the first height of the layers at {name} is {ratio[k]:.3g} times that before at "
-                f"({where}), beyond {1.0 / CHANGED:.2g} to {CHANGED}: {_remedy(case, name)}"
+                f"({where}), beyond {1.0 / CHANGED:.2g} to {CHANGED}: "
+                f"{_remedy(case, mesh, name, point)}"
             )
     return warnings
 
 
-def _remedy(case: Case, name: str) -> str:
-    """Return what keeps first heights that a run changed."""
+def _remedy(case: Case, mesh: Mesh, name: str, point: FloatArray) -> str:
+    """Return what keeps the first height that a run changed at a point of a wall."""
     if case.method != "rbf":
         return "METHOD= rbf with LAYERS= AUTO keeps it"
     if case.layers == "no":
         return "LAYERS= AUTO keeps it"
+    for other in case.markers_with("sliding"):
+        if other != name and (mesh.points[mesh.marker(other).nodes] == point).all(axis=1).any():
+            return f"{name} leans more against {other} there; move it less"
     away = f"move {name} less" if case.roles.get(name) == "moving" else f"stay farther from {name}"
     return f"{away}, or set a smaller LAYER_THICKNESS"

@@ -364,10 +364,15 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return ()
 
 
+def relaxes(case: Case, mesh: Mesh) -> bool:
+    """Return whether RELAX acts on a mesh."""
+    auto = case.relax == "auto" and mesh.part is None and len(mesh.cells) <= RELAXED_CELLS
+    return case.method == "rbf" and (auto or case.relax == "yes")
+
+
 def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Relaxation | None:
     """Return the relaxation of a case's steps; None where they are not relaxed."""
-    auto = case.relax == "auto" and mesh.part is None and len(mesh.cells) <= RELAXED_CELLS
-    if case.method != "rbf" or not (auto or case.relax == "yes"):
+    if not relaxes(case, mesh):
         return None
     from slideviz.elastic.relaxation import Relaxation
 

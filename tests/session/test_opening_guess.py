@@ -77,16 +77,23 @@ def test_a_new_case_has_other_values_than_a_file_without_keys_and_saves_them(pas
     pairs = find_pairs(mesh)
     case = guess_case(mesh, guess_roles(mesh, pairs), pairs)
     differ = {f.name for f in fields(Case) if getattr(case, f.name) != getattr(usual, f.name)}
-    new = {"rims", "relax", "layers", "repair", "sliding", "steps", "periodic", "roles"}
+    new = {"rims", "relax", "layers", "repair", "sliding", "periodic", "roles"}
     assert new <= differ <= new | {"axis", "origin"}
     assert (case.relax, case.layers, case.repair, case.sliding) == ("auto", "auto", "auto", "ps")
-    assert (case.steps, case.periodic) == (5, "moving")
+    assert (case.steps, case.periodic) == (1, "moving")
     assert (usual.relax, usual.layers, usual.repair, usual.steps) == ("no", "no", "no", 1)
     (tmp_path / "bare.cfg").write_text("MESH_FILENAME= mesh.su2\n")
     bare = Case.read(tmp_path / "bare.cfg")
     assert bare.change(mesh_file=None, source=None) == usual
     case.write(tmp_path / "new.cfg")
     assert Case.read(tmp_path / "new.cfg").change(source=None) == case
+
+
+def test_a_new_case_has_several_steps_only_where_nothing_is_relaxed(passage, monkeypatch):
+    guesses = guess_roles(passage.mesh)
+    assert guess_case(passage.mesh, guesses, ()).steps == 1
+    monkeypatch.setattr("slideviz.solver.setup.RELAXED_CELLS", len(passage.mesh.cells) - 1)
+    assert guess_case(passage.mesh, guesses, ()).steps == 5
 
 
 def test_the_passage_is_guessed_as_it_is_meant(passage):
