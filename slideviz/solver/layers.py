@@ -144,7 +144,7 @@ def thickness_warnings(case: Case, domain: Domain, zone: LayerZone | None) -> li
         near = [(nodes[~own], k) for k in (0, *periods)] + [(nodes[own], k) for k in periods]
         tree = cKDTree(frame.points(coords[mine]))
         points = (frame.points(coords[some] + k * frame.shift()) for some, k in near)
-        gaps = [tree.query(each)[0].min(initial=np.inf) for each in points]
+        gaps = [np.min(tree.query(each)[0], initial=np.inf) for each in points]
         room = min((gap for gap in gaps if gap > TOUCHING * wall.thickness), default=np.inf)
         if wall.thickness > room:
             warnings.append(
