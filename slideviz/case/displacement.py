@@ -77,6 +77,14 @@ def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Disp
     ``of``: what the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
     """
     text, warnings = read_text(path, "displacement file")
+    read = parsed_displacements(text, path, mesh, nodes, of)
+    return replace(read, warnings=tuple(dict.fromkeys((*warnings, *read.warnings))))
+
+
+def parsed_displacements(
+    text: str, path: Path, mesh: Mesh, nodes: IntArray, of: str
+) -> Displacements:
+    """Return the displacements that the text of a file lists; as `read_displacements`."""
     each = []
     for first, here, part, lines in in_zones(text, path, mesh, nodes):
         whole = part.part
@@ -88,7 +96,7 @@ def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Disp
     return Displacements(
         np.concatenate([read.nodes for read in each]),
         np.concatenate([read.vectors for read in each]),
-        tuple(dict.fromkeys((*warnings, *(text for read in each for text in read.warnings)))),
+        tuple(dict.fromkeys(text for read in each for text in read.warnings)),
     )
 
 
@@ -98,36 +106,40 @@ def in_zones(
     """Yield what the text of a file has for each zone of a mesh that has some of ``nodes``.
 
     First node, ``nodes`` (k,) of the zone in its own numbers, its mesh, and the lines, as many as
-    there are. A file for nodes of one zone numbers them as in the zone, one for several names the
-    zone, too: ``2:15 dx dy``. Raises CaseError with a line for each that does not.
+    there are. Lines name the zone of a node, too: ``2:15 dx dy``; they need not where all nodes are
+    of one zone. Raises CaseError with a line for each that has no zone, or that of no node.
     """
-    zones = enumerate(mesh.zone_parts, 1)
-    each = [(k, p, nodes[(p.points.start <= nodes) & (nodes < p.points.stop)]) for k, p in zones]
-    each = [zone for zone in each if len(zone[2])]
-    if len(each) < 2:
-        first, alone = (each[0][1].points.start, each[0][1].mesh) if each else (0, mesh)
-        yield first, nodes - first, alone, text
+    each = [
+        (k, part.points.start, part.mesh, here)
+        for k, part in enumerate(mesh.zone_parts, 1)
+        if len(here := nodes[(part.points.start <= nodes) & (nodes < part.points.stop)])
+    ] or [(mesh.zone or 1, 0, mesh, nodes)]
+    named = mesh.zones > 1 and ":" in text and ":" in _COMMENT.sub("", text)
+    if len(each) == 1 and not named:
+        _, first, alone, here = each[0]
+        yield first, here - first, alone, text
         return
     lines = _COMMENT.sub("", text).splitlines()
     heads = [_ZONE.match(line) for line in lines]
     several = {str(k): None for k, *_ in each}
+    rule = "begins with none of the zones" if len(several) > 1 else "does not begin with zone"
     wrong = [
-        (at, f"{shown(line.strip())} begins with none of the zones {' and '.join(several)}")
+        (at, f"{shown(line.strip())} {rule} {' and '.join(several)}")
         for at, (line, head) in enumerate(zip(lines, heads, strict=True), 1)
         if line.strip() and (head is None or head[1] not in several)
     ]
     if wrong:
-        (at, said), (k, part, here) = wrong[0], each[0]
-        said += f"; write zone and node, as {k}:{here[0] - part.points.start}"
+        (at, said), (k, first, _, here) = wrong[0], each[0]
+        said += f"; write zone and node, as {k}:{here[0] - first}"
         raise CaseError(listed(path, [(at, _with_count(said, len(wrong)))]))
     missing = [k for k in several if not any(head is not None and head[1] == k for head in heads)]
     if missing:
         raise CaseError(
             f"{path}: lists no node of zone {missing[0]}, whose boundaries it is to move"
         )
-    for k, part, here in each:
+    for k, first, zone, here in each:
         mine = [head[2] if head is not None and head[1] == str(k) else "" for head in heads]
-        yield part.points.start, here - part.points.start, part.mesh, "\n".join(mine)
+        yield first, here - first, zone, "\n".join(mine)
 
 
 def parse_displacements(

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.boxes import box_definition, boxes_for
-from slideviz.case.displacement import Displacements, parse_displacements
+from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, moved_together, placed_displacements
@@ -29,7 +29,7 @@ from slideviz.solver.rims import are_ready, on_walls
 from slideviz.system.atomic import atomic_write
 
 PLACEHOLDER = Path("table")
-"""Stands for the file in messages of `parse_displacements`; `TableRows.check` replaces it."""
+"""Stands for the file in messages of `parsed_displacements`; `TableRows.check` replaces it."""
 MOST_BYTES = 5_000_000  # most bytes of a file that can be edited by hand
 
 
@@ -39,7 +39,7 @@ class TableRows:
 
     of: str  # their boundaries, in words
     nodes: IntArray  # (k,): the nodes, sorted
-    shape: tuple[int, ...]  # (n, d): shape of the points of the mesh
+    mesh: Mesh  # in which they have these numbers: that of their zone, if they are of one
 
     @classmethod
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:
@@ -50,12 +50,12 @@ class TableRows:
             if zone.points.start <= nodes[0] and nodes[-1] < zone.points.stop:
                 nodes, mesh = nodes - zone.points.start, zone.mesh  # as a file numbers them
                 break
-        return cls(", ".join(names), nodes, mesh.points.shape)
+        return cls(", ".join(names), nodes, mesh)
 
     @property
     def heading(self) -> str:
         """Return the names of the columns, with blanks between."""
-        return " ".join(["node", "dx", "dy", "dz"][: 1 + self.shape[1]])
+        return " ".join(["node", "dx", "dy", "dz"][: 1 + self.mesh.dim])
 
     def check(self, text: str) -> str:
         """Return a sentence on how many nodes a table moves, and how far.
@@ -65,7 +65,7 @@ class TableRows:
         if not text.strip():
             raise CaseError(f"Type or paste rows: {self.heading}")
         try:
-            read = parse_displacements(text, PLACEHOLDER, self.nodes, self.shape, self.of)
+            read = parsed_displacements(text, PLACEHOLDER, self.mesh, self.nodes, self.of)
         except CaseError as error:
             first, *others = str(error).replace(f"{PLACEHOLDER}:", "Line ").splitlines()
             raise CaseError(f"{first} ({len(others)} more)" if others else first) from error
@@ -82,7 +82,7 @@ class TableRows:
             word = line.replace(",", " ").replace(";", " ").split()[:1]
             if word and word[0].isdecimal():
                 listed.add(int(word[0]))
-        zeros = "\t0" * self.shape[1]
+        zeros = "\t0" * self.mesh.dim
         rows = [f"{node}{zeros}" for node in self.nodes.tolist() if node not in listed]
         head = [f"% {self.heading}"] if not text.strip() else text.rstrip("\n").split("\n")
         return "\n".join([*head, *rows]) + "\n"

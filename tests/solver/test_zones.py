@@ -10,13 +10,13 @@ import pytest
 import slideviz as sv
 from slideviz.case.check import check_case
 from slideviz.case.limits import read_limits
-from slideviz.case.zones import zone_cases
+from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.zones import zones_of
 from slideviz.session.large import is_large
-from slideviz.session.motions import Ghosts
+from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.opening import guess_roles
 from tests.builders import sector
 from tests.mesh.test_interfaces import zones
@@ -180,6 +180,24 @@ def test_a_displacement_file_of_several_zones_names_them(tmp_path):
         path.write_text(text)
         with pytest.raises(CaseError, match=message):
             last(case, mesh)
+
+
+@pytest.mark.parametrize("zone", [None, 2])
+def test_a_displacement_file_of_one_zone_may_name_it(tmp_path, zone):
+    mesh, path = sv.read(stage(tmp_path), zone), tmp_path / "d.txt"
+    nodes = sv.read(tmp_path / "stage.su2", 2).marker("BLOCK").nodes.tolist()
+    case = sv.Case(roles={"2:BLOCK": "moving"}, motions=(sv.FromFile(path, "2:BLOCK"),), relax="no")
+
+    def moved(prefix):
+        path.write_text("% zone:node\n" + "".join(f"{prefix}{n} 0.01 0\n" for n in nodes))
+        return last(case, mesh).mesh.points
+
+    assert np.array_equal(moved("2:"), moved(""))
+    with pytest.raises(CaseError, match=r"txt:2: '1:.* does not begin with zone 2; write zone and"):
+        moved("1:")
+    table = TableRows.on(mesh, with_marker_names(case, mesh), ())
+    rows = "".join(f"2:{n} 0.01 0\n" for n in nodes)
+    assert table.check(rows).startswith(f"{len(nodes)} of {len(nodes)} nodes of ")
 
 
 def test_what_one_motion_cannot_do_in_several_zones(tmp_path):
