@@ -67,8 +67,10 @@ laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/python -m tools.shots
 
-study: setup ## the thesis's cases into study/: tables, plots, pictures (ARGS=--quick: small ones)
+study: setup ## the thesis's cases, and a contest, into study/ (ARGS=--quick: small ones; MESHES=SU2's)
 	$(BIN)/python -m tools.study $(ARGS)
+	-$(BIN)/python -m tools.study.contest $(if $(MESHES),--meshes $(MESHES)) \
+		$(if $(findstring --quick,$(ARGS)),--rows "^block in") -o study/contest
 
 clean: ## remove what was built, the virtual environment and demo/ included
 	rm -rf .venv demo study build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \

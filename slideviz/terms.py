@@ -221,7 +221,7 @@ STIFFNESS_TYPES: dict[StiffnessType, Term] = {
     "CONSTANT_STIFFNESS": Term("all alike", "The same for all cells."),
 }
 """Which cells of an elastic body are stiff: how Young's modulus is found."""
-NOT_WALLS = ("far", "free", "inflow", "inlet", "outflow", "outlet", "exit", "sym")
+NOT_WALLS = ("far", "freestream", "inflow", "inlet", "outflow", "outlet", "exit", "sym")
 """Words in names of fixed boundaries that are no walls, for the distance to these."""
 
 
