@@ -72,11 +72,10 @@ def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
     In a mesh of one zone, those of the other zone stay.
     """
     sentences = dict[frozenset[object], str]()
-    shift = points - mesh.points
     for each in mesh.interfaces:
-        apart = shift[each.nodes]
+        apart = points[each.nodes] - mesh.points[each.nodes]
         if mesh.zone_parts:
-            apart = apart - shift[each.partners]
+            apart -= points[each.partners] - mesh.points[each.partners]
         gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
         if gap > ROUNDING * mesh.extent:
             said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
