@@ -56,7 +56,9 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
     rim, walls = _walls(case, domain, is_moving, node, facet)
     representative = np.searchsorted(moving, domain.classes.representative[moving])
     of_moving = boundary.facets[roles[boundary.marker] == "moving"]
-    place, bodies = _bodies(mesh, of_moving, moving, representative, rim)
+    hold = case.rims == "slide"
+    find = _bodies if hold else _no_bodies  # those of a check alone take long for nothing
+    place, bodies = find(mesh, of_moving, moving, representative, rim)
     return Rims(
         frame=domain.frame,
         nodes=moving,
@@ -66,7 +68,7 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
         walls=walls,
         bodies=bodies,
         place=place,
-        hold=case.rims == "slide",
+        hold=hold,
     )
 
 
@@ -175,6 +177,14 @@ def _bodies(
     near = 1.0 - distance / np.where(near > 0.0, near, 1.0)
     share = near**2 * (3.0 - 2.0 * near)
     return place, Bodies(place[edges[kept]], weights[kept], place[rim], share)
+
+
+def _no_bodies(
+    _mesh: Mesh, _facets: IntArray, moving: IntArray, *_: IntArray
+) -> tuple[IntArray, Bodies]:
+    """Return what `_bodies` does, with no body in it: for rims that are not put back."""
+    none = np.empty(0, np.int64)
+    return np.full(len(moving), -1), Bodies(none.reshape(0, 2), np.empty(0), none, np.empty(0))
 
 
 def rims_key(case: Case) -> object:
