@@ -236,6 +236,26 @@ def test_derivatives(frame, method, dim, steps, reduction):
     assert len(deformer._setup.zone.nodes)
 
 
+def test_derivatives_at_a_cusp():
+    mesh = c_mesh(joukowski, 40, 8, first=1e-4)
+    motion = Rotate("airfoil", 5.0, (0.3, 0.0)), sv.HicksHenne("airfoil", 0.02, 0.8)
+    settings = {"layers": "keep", "layer_thickness": 0.05, "kernel": "wendland-c0", "steps": 2}
+    case = Case(roles={"airfoil": "moving"}, motions=motion, reduction=None, **settings)
+    walls = check(case, mesh)._setup.zone.walls
+    assert len(walls.start) == len(np.unique(walls.known)) + 1  # the edge has two sides
+
+
+def test_a_streamed_mesh_with_a_cusp_has_the_same_bits(tmp_path):
+    sv.write(tmp_path / "mesh.su2", c_mesh(joukowski, 60, 12, first=2e-6))
+    case = Case(roles={"airfoil": "moving"}, motions=(Rotate("airfoil", 10.0),), layers="auto")
+    case.change(mesh_file=tmp_path / "mesh.su2", steps=2).write(tmp_path / "case.cfg")
+    for name, more in (("memory", []), ("streamed", ["--stream"])):
+        files = [str(tmp_path / "case.cfg"), "-o", str(tmp_path / f"{name}.su2")]
+        assert run(["run", *files, *more]) == 0
+    one, two = (sv.read(tmp_path / f"{name}.su2").points for name in ("memory", "streamed"))
+    assert np.array_equal(one, two)
+
+
 def test_the_numbering_does_not_matter():
     """Of a symmetric mesh, too, where several wall nodes are equally far from a node."""
     mesh = around(ellipse, 30, 40, first=5e-3)
