@@ -116,6 +116,7 @@ class Running(QObject):
             self.store.change(changes.set_case, **settings)
         self._show_started(case)
         log.info("repair")
+        case = session.with_chosen_roles(case)
         self.start_job("Repairing", self._run_done, jobs.repair, case, session.mesh, frames)
 
     def show_design(self, case: Case, name: str) -> bool:
@@ -153,6 +154,7 @@ class Running(QObject):
         steps = case.steps or "automatic"
         words = "1 step" if steps == 1 else f"{steps} steps"
         log.info("run: %s, %s, %s", method_words(case), periodic, words)
+        case = session.with_chosen_roles(case)
         if session.in_file:
             assert output is not None
             call = self._run_done, compute_in_file, case, session.first, output

@@ -14,7 +14,7 @@ from slideviz.case.model import Case, with_paths
 from slideviz.case.motions.motion import Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
-from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
+from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
@@ -219,7 +219,7 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
     for name in _unhinted_partners(session, changed, role):
         if name in guesses:
-            del guesses[name]
+            guesses[name] = UNCHOSEN
             roles[name] = "fixed"
     still = (_restricted_to_moving(motion, roles) for motion in session.case.motions)
     motions = tuple(motion for motion in still if motion is not None)

@@ -26,16 +26,23 @@ STEPS = 5
 better and faster from one step."""
 
 
+UNCHOSEN = Guess("fixed", "boundaries without a role are fixed")
+
+
 def open_mesh(
     first: StepFrame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
 ) -> Session:
     """Return the session of a mesh just read; without a case its roles are guessed.
+
+    A boundary for which nothing is known is guessed to be fixed.
 
     ``pairs``: boundaries that match each other.
     """
     mesh = first.mesh
     guesses = {} if case is not None else guess_roles(mesh, pairs)
     chosen = guess_case(mesh, guesses, pairs) if case is None else case
+    known = guesses if case is None else case.roles
+    guesses |= {name: UNCHOSEN for name in mesh.marker_names if name not in known}
     listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)

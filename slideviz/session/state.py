@@ -289,6 +289,11 @@ class Session:
         """Return the role of a boundary; boundaries without one are fixed."""
         return self.case.roles.get(marker, "fixed")
 
+    def with_chosen_roles(self, case: Case) -> Case:
+        """Return a case without the guesses that boundaries are fixed, as they are by default."""
+        guessed = {name for name in self.guesses if case.roles.get(name) == "fixed"}
+        return case.change(roles={n: role for n, role in case.roles.items() if n not in guessed})
+
 
 def round_up(value: float) -> float:
     """Return a round number that is at least ``value``, for a color bar; 0 for no positive value.

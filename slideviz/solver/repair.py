@@ -24,7 +24,7 @@ from slideviz.elastic.conditions import conditions
 from slideviz.errors import CaseError, MeshError, not_one_of
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
@@ -34,12 +34,13 @@ from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
+from slideviz.solver.remedies import MOST_NAMES
 from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.solver.zones import joined_repairs
 from slideviz.system.threads import Tick, equal_shares
-from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, RepairTarget, Role, SkewMetric
+from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, SLIDES, RepairTarget, Role, SkewMetric
 
 _NO_IMAGES = "they are no images of each other; name two that are"
 
@@ -229,6 +230,7 @@ def mend(
     number = np.arange(len(now.cells)) if cells is None else cells
     mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
     unmendable, warnings = unmendable_words(done.impossible, mesh, number)
+    poor = domain.cells.take(np.setdiff1d(done.bad_after, done.folded_after))
     return MeshRepair(
         mended,
         number[done.bad_before],
@@ -239,7 +241,7 @@ def mend(
         before,
         done.largest_move,
         unmendable,
-        warnings,
+        (*warnings, *slide_advice(case, mesh, poor, limit)),
     )
 
 
@@ -285,6 +287,32 @@ def unmendable_words(
         "move it less, or mend its mesh"
     )
     return tuple(zip(cells, reasons, strict=True)), (sentence,)
+
+
+def slide_advice(case: Case, mesh: Mesh, poor: Cells, limit: float) -> tuple[str, ...]:
+    """Return the warning that cells stay poor beside boundaries whose role nobody chose, or ().
+
+    ``mesh``: it has the markers.
+    ``poor``: the cells that are proved valid, but below a limit after the repair.
+    """
+    numbers = np.arange(len(mesh.points)) if mesh.part is None else mesh.part.points
+    beside = [
+        marker.name
+        for marker in mesh.markers
+        if marker.name not in case.roles and np.isin(numbers[marker.nodes], poor.nodes).any()
+    ]
+    if not beside:
+        return ()
+    few = len(beside) <= MOST_NAMES
+    who = " and ".join(beside) if few else f"{len(beside)} boundaries ({', '.join(beside)})"
+    one = len(beside) == 1
+    off = f", with SLIDING_MODE= {SLIDES}" if case.sliding == "none" else ""
+    sentence = (
+        f"{counted(len(poor), 'cell')} {'stays' if len(poor) == 1 else 'stay'} poor after repair, "
+        f"below {limit:.3g}, beside {who}, which {'is' if one else 'are'} fixed only because no "
+        f"role was chosen; let {'it' if one else 'them'} slide{off}"
+    )
+    return (sentence,)
 
 
 def repair_case(case: Case) -> Case:

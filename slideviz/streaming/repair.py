@@ -16,7 +16,7 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
 from slideviz.mesh.repair.repair import Region, mend_cells
 from slideviz.solver.deform import free_memory
-from slideviz.solver.repair import find_freedom, unmarked_sides, unmendable_words
+from slideviz.solver.repair import find_freedom, slide_advice, unmarked_sides, unmendable_words
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import MeshRepair
 from slideviz.streaming.source import CELLS, ZoneSource
@@ -194,6 +194,9 @@ def mend_file(
     # Later regions may have moved a node back to where it was.
     kept = np.flatnonzero(way > 0.0)
     unmendable, warnings = unmendable_words(impossible, skin)
+    advice = tuple[str, ...]()
+    if len(poor := np.setdiff1d(left, still)):
+        advice = slide_advice(case, skin, regions.cells(poor), below)
     return MeshRepair(
         mesh,
         bad,
@@ -204,5 +207,5 @@ def mend_file(
         regions.before[kept],
         float(way.max(initial=0.0)),
         unmendable,
-        (*warnings, *regions.warnings),
+        (*warnings, *advice, *regions.warnings),
     )

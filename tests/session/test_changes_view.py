@@ -32,12 +32,16 @@ def test_a_mesh_opens_with_guessed_roles_for_every_boundary(session):
     assert session.frame is session.frames[0]
 
 
-def test_a_case_opens_with_its_roles_and_no_guesses(square):
+def test_roles_that_a_case_does_not_have_are_guesses(square):
     case = Case(roles={"left": "sliding"})
     session = open_mesh(StepFrame(square, quality(square)), Path("a.su2"), (), case)
     assert session.role("left") == "sliding"
     assert session.role("top") == "fixed"
-    assert not session.guesses
+    assert set(session.guesses) == {"bottom", "right", "top"}
+    assert session.with_chosen_roles(session.case).roles == {"left": "sliding"}
+    confirmed = changes.confirm_guesses(session, ("top",))
+    chosen = confirmed.with_chosen_roles(confirmed.case)
+    assert chosen.roles == {"left": "sliding", "top": "fixed"}
     assert session.case.mesh_file == Path("a.su2")
     assert not session.unsaved_case
 

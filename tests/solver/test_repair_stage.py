@@ -330,3 +330,28 @@ def test_a_run_reports_its_repair(tmp_path, capsys):
     assert streamed["seconds"]["repair"] > 0.0
     assert run([*words, "--set", "REPAIR_STEPS=YES"]) == 1
     assert "REPAIR_STEPS= YES needs the whole mesh after each step" in capsys.readouterr().err
+
+
+def test_poor_cells_beside_a_boundary_that_nobody_chose_to_fix_advise_to_let_it_slide(
+    tmp_path, capsys
+):
+    mesh, case = folded(repair="yes", repair_below=0.9, sliding="none")
+    sides = [name for name in mesh.marker_names if name != "BLOCK"]
+    advised = [text for text in last(case, mesh).warnings if "stay poor after repair" in text]
+    assert len(advised) == 1
+    assert "below 0.9, beside " in advised[0]
+    assert advised[0].endswith("no role was chosen; let them slide, with SLIDING_MODE= ps or ds")
+    chosen = case.change(roles={"BLOCK": "moving"} | dict.fromkeys(sides, "fixed"))
+    assert not any("stay poor" in text for text in last(chosen, mesh).warnings)
+    others = {name: role for name, role in chosen.roles.items() if name != "x_m"}
+    one = case.change(roles=others, sliding="ps")
+    (text,) = [text for text in last(one, mesh).warnings if "poor after repair" in text]
+    assert "beside x_m, which is fixed only because no role was chosen; let it slide" in text
+    sv.write(tmp_path / "mesh.su2", mesh)
+    case.change(mesh_file=tmp_path / "mesh.su2").write(tmp_path / "case.cfg")
+    for more in ((), ("--stream",)):
+        report = tmp_path / f"report{len(more)}.json"
+        words = ["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / f"{len(more)}.su2")]
+        assert run([*words, *more, "--json", str(report)]) == 0
+        assert advised[0] in capsys.readouterr().err
+        assert advised[0] in json.loads(report.read_text())["warnings"]
