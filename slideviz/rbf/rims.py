@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,19 +35,81 @@ BULGE = 0.25
 normals at its ends: twice the 1/8 of an arc, since normals at nodes are estimates."""
 
 
-@dataclass(frozen=True, eq=False)
-class RimWall:
+class RimWall(Protocol):
     """A smooth surface, in 2D a curve, that nodes of a rim are on."""
 
-    names: tuple[str, ...]  # its boundaries that have the nodes
-    rows: IntArray  # (k,): these nodes, as places in the rim
-    surface: ClosestPoints
-    bulge: float  # how far nodes on it may be off its facets
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return its boundaries that have the nodes."""
+
+    @property
+    def rows(self) -> IntArray:
+        """Return these nodes, as places in the rim: (k,)."""
+
+    @property
+    def bulge(self) -> float:
+        """Return how far nodes on it may be off its facets."""
 
     def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
-        closest, which = self.surface.nearest(at)
-        return closest, projection_matrices(self.surface.simplices(which), at, closest)
+
+    def across(self, at: FloatArray) -> FloatArray:
+        """Return the feet (k, d) of nodes at (k, d) on the planes that are tangent there."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlatWall:
+    """A plane, in 2D a line, which goes on beyond its boundary; see `RimWall`."""
+
+    names: tuple[str, ...]
+    rows: IntArray
+    point: FloatArray
+    normal: FloatArray
+    """`point`, `normal` (d,): of the plane."""
+    bulge: float = 0.0
+
+    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the feet of nodes at (k, d), and their derivatives (k, d, d)."""
+        slopes = np.eye(len(self.normal)) - np.outer(self.normal, self.normal)
+        return self.across(at), np.broadcast_to(slopes, (len(at), *slopes.shape))
+
+    def across(self, at: FloatArray) -> FloatArray:
+        """Return the feet (k, d) of nodes at (k, d)."""
+        return at - ((at - self.point) @ self.normal)[:, None] * self.normal
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedWall:
+    """Facets that go on flat beyond the rim; see `RimWall`."""
+
+    names: tuple[str, ...]
+    rows: IntArray
+    coords: FloatArray
+    facets: IntArray
+    """`coords`, `facets` (u, d), (f, k): its nodes, and its facets among them."""
+    simplices: FloatArray  # (s, c, d): of the facets, which may differ in them on an axis
+    shift: FloatArray | None  # (d,): the period by which it goes on
+    ends: FloatArray  # (e, c - 1, d): sides of simplices at the rim
+
+    @cached_property
+    def bulge(self) -> float:
+        """Return how far nodes on it may be off its facets."""
+        return bulge_of(self.coords, self.facets)
+
+    @cached_property
+    def _surface(self) -> ClosestPoints:
+        return ClosestPoints(self.simplices, self.shift, self.ends)
+
+    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
+        closest, which = self._surface.nearest(at)
+        return closest, projection_matrices(self._surface.simplices(which), at, closest)
+
+    def across(self, at: FloatArray) -> FloatArray:
+        """Return the feet (k, d) of nodes at (k, d) on the planes of the facets closest to them."""
+        closest, which = self._surface.nearest(at)
+        normals = unit(simplex_vectors(self._surface.simplices(which)))
+        return at - np.einsum("kd,kd->k", at - closest, normals)[:, None] * normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +212,9 @@ class Rims:
     representative: IntArray  # (m,): for each the place of the one that represents its images
     rim: IntArray  # (r,): those of the rim, as places among them
     walls: tuple[RimWall, ...]
-    bodies: Bodies
+    bodies: Bodies | None
+    """By which rims are put back on their walls (RIMS= SLIDE); None: they are where they are."""
     place: IntArray  # (m,): the place of each in the bodies; -1: its body has no rim
-    hold: bool  # whether rims are put back on their walls (RIMS= SLIDE)
 
     @cached_property
     def walls_of(self) -> IntArray:
@@ -166,12 +228,9 @@ class Rims:
         Of those that are on other walls, too, from the plane of the wall: where they leave
         another, this one ends.
         """
-        at = self.frame.coords(points)
-        closest, which = wall.surface.nearest(at)
-        normals = unit(simplex_vectors(wall.surface.simplices(which)))
-        across = np.abs(np.einsum("kd,kd->k", at - closest, normals))
-        gaps = np.linalg.norm(self.frame.points(closest) - points, axis=1)
-        return np.where(self.walls_of[wall.rows] > 1, across, gaps)
+        at, corner = self.frame.coords(points), self.walls_of[wall.rows] > 1
+        there = np.where(corner[:, None], wall.across(at), wall.closest(at)[0])
+        return np.asarray(np.linalg.norm(self.frame.points(there) - points, axis=1))
 
     @property
     def least(self) -> float:
@@ -183,7 +242,7 @@ class Rims:
 
         ``at`` (..., m, d): where they would be without. ``keep``: of derivatives.
         """
-        if not self.hold:
+        if self.bodies is None:
             return at
         here = take(at, self.rim)
         if keep is None:
@@ -200,24 +259,24 @@ class Rims:
             return at
         else:
             off = exact
-        more = self._spread(off)
+        more = self._spread(self.bodies, off)
         x, by = value(at), value(more)
         # Adding zero would turn -0.0 into 0.0.
         return recorded(np.where(by == 0.0, x, x + by), (at, _same, _same), (more, _same, _same))
 
-    def _spread(self, of_rim: Array) -> Array:
+    def _spread(self, bodies: Bodies, of_rim: Array) -> Array:
         there = np.flatnonzero(self.place >= 0)
-        place, count, size = self.place[there], len(self.place), len(self.bodies.share)
+        place, count, size = self.place[there], len(self.place), len(bodies.share)
 
         def spread(x: FloatArray) -> FloatArray:
             out = np.zeros((*x.shape[:-2], count, x.shape[-1]))
-            out[..., there, :] = self.bodies.spread(x)[..., place, :]
+            out[..., there, :] = bodies.spread(x)[..., place, :]
             return out
 
         def gathered(g: FloatArray) -> FloatArray:
             out = np.zeros((*g.shape[:-2], size, g.shape[-1]))
             np.add.at(out, (..., place, slice(None)), g[..., there, :])  # type: ignore[arg-type]
-            return self.bodies.gathered(out)
+            return bodies.gathered(out)
 
         return recorded(spread(value(of_rim)), (of_rim, spread, gathered))
 

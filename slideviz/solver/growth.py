@@ -205,10 +205,10 @@ def _off_walls(setup: Setup, mesh: Mesh, points: FloatArray) -> Iterator[_OffWal
         nodes = rims.nodes[rims.rim[wall.rows]]
         off = rims.off(wall, points[nodes])
         k = int(np.argmax(off))
-        if off[k] > wall.bulge + least:
+        if off[k] > least and off[k] > least + wall.bulge:
             names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
             remedy = "; RIMS= SLIDE keeps such nodes on it"
-            if rims.hold:
+            if rims.bodies is not None:
                 remedy = ", to which it cannot be brought back; move it less"
             yield _OffWall(
                 int(nodes[k]), " and ".join(names), " and ".join(wall.names), float(off[k]), remedy

@@ -23,14 +23,16 @@ from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.classify import MERGE_FRACTION
-from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import corners
 from slideviz.rbf.projection import across_period, as_simplices, surface_labels, surface_rim
-from slideviz.rbf.rims import Bodies, Rims, RimWall, bulge_of, side_weights
+from slideviz.rbf.rims import Bodies, CurvedWall, FlatWall, Rims, RimWall, side_weights
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.terms import Role
 
 WALLS: tuple[Role, ...] = ("sliding", "internal")  # roles of boundaries that rims are on
+APART: tuple[Role, ...] = ("moving", "periodic")  # roles of those into which no wall goes on
+
+FLAT = 1e-12  # part of the largest coordinate by which the nodes of a flat wall may be off a plane
 
 _RIMS: WeakKeyDictionary[Mesh, dict[object, Rims | None]] = WeakKeyDictionary()
 
@@ -55,10 +57,10 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
         return None
     rim, walls = _walls(case, domain, is_moving, node, facet)
     representative = np.searchsorted(moving, domain.classes.representative[moving])
-    of_moving = boundary.facets[roles[boundary.marker] == "moving"]
-    hold = case.rims == "slide"
-    find = _bodies if hold else _no_bodies  # those of a check alone take long for nothing
-    place, bodies = find(mesh, of_moving, moving, representative, rim)
+    place, bodies = moving[:0], None
+    if case.rims == "slide":
+        of_moving = boundary.facets[roles[boundary.marker] == "moving"]
+        place, bodies = _bodies(mesh, of_moving, moving, representative, rim)
     return Rims(
         frame=domain.frame,
         nodes=moving,
@@ -68,7 +70,6 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
         walls=walls,
         bodies=bodies,
         place=place,
-        hold=hold,
     )
 
 
@@ -95,34 +96,80 @@ def _walls(
 
     ``node`` and ``facet`` (p,): pairs of a node of the rim and a facet of a wall there.
     """
-    boundary, frame, axis = domain.boundary, domain.frame, domain.axis
-    place = partial(corners, domain.coords, axis=axis)
-    apart = ("moving", "periodic")
-    roles = {n: r if r in apart else "sliding" for n, r in domain.roles.items()}
-    roles = {name: roles.get(name, "sliding") for name in boundary.names}
+    boundary, rim, walls = domain.boundary, np.unique(node), list[RimWall]()
+    marker = boundary.marker[facet]
+    for which in np.unique(marker):
+        plane = _plane(case, domain, boundary.marker == which)
+        if plane is not None:
+            rows = np.searchsorted(rim, np.unique(node[marker == which]))
+            walls.append(FlatWall((boundary.names[which],), rows, *plane))
+            node, facet = node[marker != which], facet[marker != which]
+            marker = marker[marker != which]
+    if len(node):
+        walls += _curved_walls(case, domain, is_moving, rim, node, facet)
+    return np.searchsorted(domain.classes.moving, rim), tuple(walls)
+
+
+def _plane(case: Case, domain: Domain, member: np.ndarray) -> tuple[FloatArray, FloatArray] | None:
+    """Return a point (d,) and the normal (d,) of the plane that facets are in; None if in none.
+
+    Nor is there any if they go on smoothly out of it. ``member`` (f,) bool: the facets.
+    """
+    boundary, coords = domain.boundary, domain.coords
+    x = corners(coords, boundary.facets[member], domain.axis)
+    vectors = corner_vectors(x)
+    normal, point = unit(vectors.sum(axis=0)), x[0, 0]
+    flat = FLAT * np.abs(x).max()
+    if not normal.any() or np.abs((x - point) @ normal).max() > flat:
+        return None
+    one, two = boundary.joints[member[boundary.joints].sum(axis=1) == 1].T
+    beside = np.where(member[one], two, one)
+    apart = np.array([domain.roles.get(name, "fixed") in APART for name in boundary.names])
+    beside = boundary.facets[beside[~apart[boundary.marker[beside]]]]
+    beside = corners(coords, beside, domain.axis)
+    along = np.abs(unit(corner_vectors(beside)) @ normal)
+    smooth = along > np.cos(np.radians(case.feature_angle_deg * MERGE_FRACTION))
+    if np.abs((beside[smooth] - point) @ normal).max(initial=0.0) > flat:
+        return None
+    return point, normal
+
+
+def _curved_walls(
+    case: Case,
+    domain: Domain,
+    is_moving: np.ndarray,
+    rim: IntArray,
+    node: IntArray,
+    facet: IntArray,
+) -> Iterator[CurvedWall]:
+    """Yield the smooth surfaces that nodes are on, of a ``rim`` (r,); parameters as of `_walls`."""
+    boundary, frame = domain.boundary, domain.frame
+    place = partial(corners, domain.coords, axis=domain.axis)
+    roles = {name: domain.roles.get(name, "fixed") for name in boundary.names}
+    roles = {name: role if role in APART else "sliding" for name, role in roles.items()}
     shift = frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None
     across = None
     if shift is not None:
         across = across_period(boundary, domain.classes.representative, roles)
     vectors = corner_vectors(place(boundary.facets))
     labels = surface_labels(boundary, vectors, roles, case.feature_angle_deg, across)
-    rim = np.unique(node)
     groups: dict[tuple[int, ...], list[int]] = {}
     merge = np.cos(np.radians(case.feature_angle_deg * MERGE_FRACTION))
     for one, chosen in _surfaces(node, labels[facet], unit(vectors)[facet], float(merge)):
         groups.setdefault(chosen, []).append(one)
-    walls = []
     for chosen, nodes in groups.items():
         member = np.isin(labels, chosen)
-        some = boundary.facets[member]
+        there, some = np.unique(boundary.facets[member], return_inverse=True)
         of_rim = np.isin(node, nodes) & member[facet]
-        names = [boundary.names[k] for k in np.unique(boundary.marker[facet[of_rim]])]
-        tree = ClosestPoints(
-            as_simplices(place(some)), shift, surface_rim(boundary, member, is_moving, place)
+        yield CurvedWall(
+            names=tuple(boundary.names[k] for k in np.unique(boundary.marker[facet[of_rim]])),
+            rows=np.searchsorted(rim, np.sort(nodes)),
+            coords=domain.coords[there],
+            facets=some.reshape(-1, boundary.facets.shape[1]),
+            simplices=as_simplices(place(boundary.facets[member])),
+            shift=shift,
+            ends=surface_rim(boundary, member, is_moving, place),
         )
-        rows = np.searchsorted(rim, sorted(nodes))
-        walls.append(RimWall(tuple(names), rows, tree, bulge_of(domain.coords, some)))
-    return np.searchsorted(domain.classes.moving, rim), tuple(walls)
 
 
 def _surfaces(
@@ -179,14 +226,6 @@ def _bodies(
     return place, Bodies(place[edges[kept]], weights[kept], place[rim], share)
 
 
-def _no_bodies(
-    _mesh: Mesh, _facets: IntArray, moving: IntArray, *_: IntArray
-) -> tuple[IntArray, Bodies]:
-    """Return what `_bodies` does, with no body in it: for rims that are not put back."""
-    none = np.empty(0, np.int64)
-    return np.full(len(moving), -1), Bodies(none.reshape(0, 2), np.empty(0), none, np.empty(0))
-
-
 def rims_key(case: Case) -> object:
     """Return what the rims of a mesh depend on."""
     period = case.periodic, case.periodic_type, case.axis, case.origin
@@ -219,7 +258,7 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
     known, key = _RIMS.setdefault(mesh, {}), rims_key(case)
     if key not in known:
         rims = find_rims(case, mesh, find_domain(case, mesh))
-        if rims is not None:
+        if rims is not None and rims.bodies is not None:
             rims.bodies.prepare()  # takes time: not in the thread that draws ghosts
         known[key] = rims
     return displaced_on(known[key], mesh, moved)
@@ -227,7 +266,7 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
 
 def displaced_on(rims: Rims | None, mesh: Mesh, moved: Displacements) -> Displacements:
     """Return the displacements with rims on their walls, if there are any that are kept there."""
-    if rims is None or not rims.hold:
+    if rims is None or rims.bodies is None:
         return moved
     vectors = rims.displaced(moved.nodes, mesh.points[moved.nodes], moved.vectors)
     return replace(moved, vectors=vectors)
