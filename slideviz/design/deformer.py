@@ -183,7 +183,8 @@ class Deformer:
             points = self.deform(references[0])
             left_out = *left_out, *disjoint_interfaces(mesh, case.interfaces)
             said = [f"zone {z.number}: {text}" for z in self._zones for text in z.deformer.warnings]
-            self.warnings = (*case.warnings, *left_out, *said, *torn_interfaces(mesh, points))
+            torn = torn_interfaces(mesh, points, case.interfaces)
+            self.warnings = (*case.warnings, *left_out, *said, *torn)
             return
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)

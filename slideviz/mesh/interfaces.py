@@ -66,12 +66,13 @@ def disjoint_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
+def torn_interfaces(mesh: Mesh, points: FloatArray, names: Sequence[str] = ()) -> tuple[str, ...]:
     """Return a sentence for each interface whose nodes no longer coincide in ``points`` (n, d).
 
-    In a mesh of one zone, those of the other zone stay.
+    In a mesh of one zone, those of the other zone stay. ``names``: as of `named_interfaces`.
     """
     sentences = dict[frozenset[object], str]()
+    kept = named_interfaces(mesh, names)
     for each in mesh.interfaces:
         apart = points[each.nodes] - mesh.points[each.nodes]
         if mesh.zone_parts:
@@ -79,11 +80,11 @@ def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
         gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
         if gap > ROUNDING * mesh.extent:
             said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
-            remedy = (
-                "move both alike, or let one of them be fixed, so that it follows the other"
-                if mesh.zone_parts
-                else "keep it fixed, or deform all zones (without ZONE=)"
-            )
+            remedy = "move both alike, or let one of them be fixed, so that it follows the other"
+            if not mesh.zone_parts:
+                remedy = "keep it fixed, or deform all zones (without ZONE=)"
+            elif each not in kept:
+                remedy = "name both in MARKER_ZONE_INTERFACE, so that they stay together"
             # A mesh of all zones has each pair twice, once from either side.
             pair = frozenset((each.marker, each.other if mesh.zone_parts else each))
             text = f"zone {each.zone} no longer fits: {said} {gap:.3g}; {remedy}"

@@ -46,6 +46,7 @@ class InterfaceMotion:
 
     def __init__(self, case: Case, mesh: Mesh) -> None:
         self.mesh, self.roles = mesh, case.roles
+        self.names = case.interfaces  # those of MARKER_ZONE_INTERFACE
         self.interfaces = named_interfaces(mesh, case.interfaces)
         alone = by_zone(case, mesh)
         self.cases = list(zone_cases(alone, mesh))
@@ -227,7 +228,9 @@ def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
         steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
         fresh = {k: step for k, step in steps.items() if before.get(k) is not step}
         now = motion.after(steps)
-        torn = torn_interfaces(mesh, now.points)
+        # Before the last step, nodes that follow sliding ones are on a straight way to them.
+        last = leader is longest[-1]
+        torn = torn_interfaces(mesh, now.points, motion.names) if last else ()
         yield replace(
             joined_step(mesh, now, steps, fresh),
             index=leader.index,

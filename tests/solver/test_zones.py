@@ -18,7 +18,7 @@ from slideviz.mesh.zones import zones_of
 from slideviz.session.large import is_large
 from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.opening import guess_roles
-from tests.builders import sector
+from tests.builders import nested_zones, sector, zones_in_a_row
 from tests.mesh.test_interfaces import zones
 
 SHARED = Path(__file__).parents[3] / "shared" / "meshes" / "su2"
@@ -304,6 +304,33 @@ def test_named_pairs_are_the_interfaces(tmp_path):
         CaseError, match=r"MARKER_ZONE_INTERFACE: '\( BLOCK \)' has 1 name; expected"
     ):
         sv.Case.read(path)
+
+
+def test_a_pair_that_is_not_named_is_told_to_be(tmp_path):
+    mesh = nested_zones()
+    case = sv.Case(
+        roles={"1:inner": "moving"},
+        motions=(sv.Translate("1:inner", (0.01, 0.0)),),
+        interfaces=("2:inner", "3:outer"),
+    )
+    for told in (last(case, mesh).warnings, sv.Deformer(mesh, case).warnings):
+        (said,) = [text for text in told if "no longer fits" in text]
+        assert said.endswith("; name both in MARKER_ZONE_INTERFACE, so that they stay together")
+
+
+def test_steps_of_zones_that_follow_are_told_of_at_the_end_only():
+    mesh = zones_in_a_row(2, (4, 5), 0.05)
+    case = sv.Case(
+        roles={"1:y_m": "moving", "1:x_p": "sliding"},
+        motions=(sv.Translate("1:y_m", (0.02, -0.03)),),
+        sliding="ps",
+        steps=3,
+    )
+    steps = list(sv.deform(case, mesh))
+    assert not [text for step in steps for text in step.warnings if "no longer fits" in text]
+    points = steps[-1].mesh.points
+    each = mesh.interfaces[0]
+    assert np.abs(points[each.nodes] - points[each.partners]).max() < 1e-15
 
 
 def test_both_moved_apart_is_warned_of(tmp_path):
