@@ -12,6 +12,11 @@ LONG = 0.3
 """RBF-SliDe's seconds from which its processor time means something."""
 
 
+def pytest_addoption(parser):
+    stores = "store the ratios of this run to a fixed kernel (bench_ratios.py)"
+    parser.addoption("--store-ratios", action="store_true", help=stores)
+
+
 def pytest_terminal_summary(terminalreporter, config):
     session = getattr(config, "_benchmarksession", None)
     found = [bench for bench in session.benchmarks if bench.extra_info] if session else []
