@@ -3,6 +3,7 @@
 import pickle
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.motion import displacements
+from slideviz.cli import run
 from slideviz.mesh.zones import join_zones
 from slideviz.rbf.rims import Bodies, side_weights
 from slideviz.session.motions import Ghosts
 from slideviz.solver.growth import wall_warnings
 from slideviz.solver.setup import make_setup
+from slideviz.streaming.run import stream
 from tests import builders
 from tests.design.test_deformer_derivatives import check
 
@@ -321,3 +324,57 @@ def test_what_a_file_lists_with_few_digits_has_left_no_wall(tmp_path):
     assert not [text for text in last(case, mesh).warnings if "has left" in text]
     points = last(case.change(rims="slide"), mesh).mesh.points
     assert max(off_planes(mesh, points, "x_m").values()) == 0.0
+
+
+def test_a_streamed_run_keeps_rims_as_one_in_memory_does(tmp_path):
+    mesh = builders.passage()
+    some = sv.Translate("blade", (0.02, 0.01, 0.01)), sv.Rotate("blade", 2.0)
+    case = case_of(blade(mesh), some, periodic="moving", mesh_file=tmp_path / "mesh.su2b")
+    sv.write(case.mesh_file, mesh)
+    stream(case, tmp_path / "out.su2b")
+    points = sv.read(tmp_path / "out.su2b").points
+    assert np.array_equal(points, last(case, sv.read(case.mesh_file)).mesh.points)
+    np.testing.assert_allclose(radii(points, mesh, "hub"), 0.5, rtol=0, atol=1e-12)
+    free = stream(case.change(rims="free"), tmp_path / "free.su2b")
+    assert "has left hub" in str(free.steps[-1].warnings)
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_displacements_of_any_kind_are_corrected(steps, tmp_path):
+    """A box, a bump and an array of displacements: their sum is corrected, whatever it is of."""
+    mesh = builders.square(6, block=False)
+    nodes = mesh.marker("y_m").nodes
+    lines = [f"{node} {0.01 * k} {0.02}" for k, node in enumerate(nodes.tolist())]
+    (tmp_path / "d.txt").write_text("\n".join(lines))
+    corners = (-0.1, -0.1, 0, 1.1, -0.1, 0, 1.1, 0.2, 0, -0.1, 0.2, 0) + (0.0,) * 12
+    some = (
+        sv.FromFile(tmp_path / "d.txt", "y_m"),
+        sv.Bump("y_m", 0.05),
+        sv.Ffd("y_m", "BOX", (0, 0, 0), (0.1, 0.0, 0.0)),
+    )
+    boxes = {"ffd_boxes": (("BOX", corners),), "ffd_degrees": ((2, 1, 0),)}
+    case = case_of(box(mesh, "y_m"), some, steps=steps, **boxes)
+    points = last(case, mesh).mesh.points
+    assert off_planes(mesh, points, "y_m") == {"x_m": 0.0, "x_p": 0.0}
+    asked = displacements(case, mesh).at(nodes)
+    middle = np.argmin(np.abs(mesh.points[nodes, 0] - 0.5))
+    assert np.allclose((points - mesh.points)[nodes][middle], asked[middle], rtol=0, atol=1e-15)
+    ends = [np.argmin(mesh.points[nodes, 0]), np.argmax(mesh.points[nodes, 0])]
+    assert np.abs(asked[ends, 0]).min() > 1e-3
+
+
+def test_symmetry_planes_of_su2_stay_planes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mesh = builders.cube(4, block=False)
+    sv.write("mesh.su2", mesh)
+    Path("a.cfg").write_text(
+        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nMARKER_SYM= ( y_m )\n"
+        "DV_KIND= TRANSLATION\nDV_MARKER= ( z_m )\nDV_PARAM= ( 0, 1, 0 )\nDV_VALUE= 0.02\n"
+    )
+    assert run(["def", "a.cfg"]) == 0
+    said = capsys.readouterr().err
+    assert re.findall(LEFT, said) == [("y_m", "0.02")]
+    assert "of z_m at" in said
+    assert run(["def", "a.cfg", "--set", "RIMS=SLIDE"]) == 0
+    assert "has left" not in capsys.readouterr().err
+    assert off_planes(mesh, sv.read("out.su2").points, "z_m")["y_m"] == 0.0
