@@ -64,6 +64,7 @@ class IntersectionCheck(BackgroundJob):
 
     def _changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh or old.case is not new.case:
+            self.store.change(jobs.forget_intersection, self._checked_key)
             self._schedule()
 
     def _schedule(self) -> None:

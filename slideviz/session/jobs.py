@@ -177,6 +177,17 @@ def set_intersection(session: Session, found: tuple[str, str], key: tuple[object
     return replace(session, intersection=found[0], folding=found[1], laid=laid)
 
 
+def forget_intersection(session: Session, key: tuple[object, ...]) -> Session:
+    """Return the session without the result of the check, unless it is of ``key``, the present one.
+
+    A result that is out of date must not keep a run from starting.
+    """
+    known = session.intersection or session.folding
+    if not known or intersection_key(session) == key:
+        return session
+    return replace(session, intersection="", folding="")
+
+
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]
 

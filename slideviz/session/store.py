@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 from slideviz.case.model import Case
@@ -99,6 +99,25 @@ class _OutsideChange:
     after: object
 
 
+Place = tuple[str | int, ...]
+"""A number of a case: names of fields and places in tuples, as ``("motions", 0, "vector", 1)``."""
+
+
+def _changed_places(before: object, now: object, place: Place = ()) -> Iterator[Place]:
+    """Yield the places in which two values differ."""
+    if before == now:
+        return
+    if is_dataclass(before) and type(before) is type(now):
+        for one in fields(before):
+            name = one.name
+            yield from _changed_places(getattr(before, name), getattr(now, name), (*place, name))
+    elif isinstance(before, tuple) and isinstance(now, tuple) and len(before) == len(now):
+        for at, (old, new) in enumerate(zip(before, now, strict=True)):
+            yield from _changed_places(old, new, (*place, at))
+    else:
+        yield place
+
+
 @dataclass(frozen=True)
 class UndoEntry:
     """A change that can be undone."""
@@ -109,6 +128,8 @@ class UndoEntry:
     kind: tuple[object, ...]
     """The function, what it changed, and names of values: changes with the same are undone as
     one."""
+    places: frozenset[Place]
+    """Where the case was changed: those with no place in common are undone apart."""
     at_s: float
     """When it was made, in seconds: infinity while the mouse drags, so that what follows belongs to
     it; minus infinity where nothing more can."""
@@ -248,7 +269,7 @@ class Store:
         """
         self._redo.clear()
         self._undo.append(
-            UndoEntry(_OutsideChange(put, before, after), words, (put,), float("-inf"))
+            UndoEntry(_OutsideChange(put, before, after), words, (put,), frozenset(), float("-inf"))
         )
         del self._undo[:-UNDO_LIMIT]
 
@@ -265,12 +286,15 @@ class Store:
         last = self._undo[-1] if self._undo else None
         # Infinity: a change during a drag is undone with the others of the drag.
         at_s = float("inf") if self._dragging else now
+        places = frozenset(_changed_places(old.case, new.case))
         if last is not None and last.kind == kind and now - last.at_s < MERGE_S:
-            self._undo.pop()
-            if last.before != UndoState.of(new):
-                self._undo.append(replace(last, at_s=at_s))
-            return
-        self._undo.append(UndoEntry(before, words, kind, at_s))
+            apart = places and last.places and not places & last.places
+            if last.at_s == float("inf") or not apart:
+                self._undo.pop()
+                if last.before != UndoState.of(new):
+                    self._undo.append(replace(last, places=places | last.places, at_s=at_s))
+                return
+        self._undo.append(UndoEntry(before, words, kind, places, at_s))
         # The removal of a run that is no longer in `removed` cannot be undone.
         there = {run.number for run in new.removed}
         self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]

@@ -18,7 +18,12 @@ from slideviz.machine import span
 from slideviz.mesh.quality import quality
 from slideviz.sections import span as sections
 from slideviz.session import changes
-from slideviz.session.jobs import find_intersection, intersection_key, set_intersection
+from slideviz.session.jobs import (
+    find_intersection,
+    forget_intersection,
+    intersection_key,
+    set_intersection,
+)
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import run_requirements
@@ -97,6 +102,11 @@ def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(
     assert not run_requirements(set_intersection(told, ("", ""), key))
     later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
     assert set_intersection(later, ("It clashes.", ""), key) is later
+    # What is known of other motions is forgotten at once: it would keep a run from starting.
+    assert forget_intersection(told, key) is told
+    changed = changes.set_case(told, motions=later.case.motions)
+    assert not run_requirements(forget_intersection(changed, key))
+    assert forget_intersection(later, key) is later
     assert intersection_key(changes.set_case(session, steps=7)) == key
     assert intersection_key(changes.set_role(session, ["top"], "internal")) != key
 

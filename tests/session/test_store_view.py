@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.case.motions.rigid import Translate
+from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes import UNDO_WORDS, undo_words
@@ -77,6 +77,48 @@ def test_typing_into_one_field_is_undone_at_once_but_another_field_is_not(store,
     store.undo()
     assert store.session.case.steps == 1
     assert not store.can_undo
+
+
+@pytest.mark.parametrize(
+    ("motion", "first", "second"),
+    [
+        (Translate("left", (0.0, 0.0)), {"vector": (0.5, 0.0)}, {"vector": (0.5, 0.25)}),
+        (Scale("left", (1.0, 1.0)), {"factors": (1.0, 2.0)}, {"factors": (3.0, 2.0)}),
+        (Rotate("left", 1.0, (0.0, 0.0)), {"angle_deg": 2.0}, {"point": (0.0, 1.0)}),
+        (Rotate("left", 1.0, (0.0, 0.0)), {"point": (2.0, 0.0)}, {"point": (2.0, 1.0)}),
+    ],
+)
+@pytest.mark.parametrize("digits", [1, 3])
+def test_two_numbers_typed_quickly_are_undone_apart(store, motion, first, second, digits):
+    store.change(changes.set_role, ("left",), "moving")
+    store.change(changes.add_motion, motion)
+    one = replace(motion, **first)
+    for state in (one, replace(one, **second)):
+        for _ in range(digits):  # the digits of a number belong together
+            store.change(changes.replace_motion, 0, state)
+    assert store.session.case.motions == (replace(one, **second),)
+    store.undo()
+    assert store.session.case.motions == (one,)
+    store.undo()
+    assert store.session.case.motions == (motion,)
+    store.redo()
+    store.redo()
+    # A drag changes both, and is undone as one.
+    store.set_dragging(True)
+    store.change(changes.replace_motion, 0, one)
+    store.change(changes.replace_motion, 0, motion)
+    store.set_dragging(False)
+    store.undo()
+    assert store.session.case.motions == (replace(one, **second),)
+
+
+def test_settings_that_are_directions_are_undone_number_by_number(store):
+    for axis in ((1.0, 0.0, 1.0), (1.5, 0.0, 1.0), (1.5, 2.0, 1.0)):
+        store.change(changes.set_case, axis=axis)
+    store.undo()
+    assert store.session.case.axis == (1.5, 0.0, 1.0)
+    store.undo()
+    assert store.session.case.axis == (0.0, 0.0, 1.0)
 
 
 def test_there_and_back_within_a_moment_leaves_nothing_to_undo(store):
