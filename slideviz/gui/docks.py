@@ -32,7 +32,7 @@ from slideviz.gui.panels.runs import RunsPanel
 from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.timers import single_shot
-from slideviz.gui.widgets.build import PanelScroll
+from slideviz.gui.widgets.build import PanelScroll, set_style
 from slideviz.gui.widgets.services import Services
 
 TAB_TIP = "Double click: a window of its own. Drag it away to put the panel elsewhere."
@@ -40,6 +40,16 @@ TAB_TIP = "Double click: a window of its own. Drag it away to put the panel else
 
 _DOWN = 24
 """Distance in pixels, left and down, at which a dock appears that is made a window of its own."""
+
+
+TAB_MARGINS = 24  # space in pixels that the style leaves beside the text of a tab
+
+
+def _fit_texts(bar: QTabBar) -> None:
+    """Leave less space beside the texts of tabs, instead of cutting them, where it is short."""
+    metrics, tabs = bar.fontMetrics(), range(bar.count())
+    wide = sum(metrics.horizontalAdvance(bar.tabText(k)) + TAB_MARGINS for k in tabs)
+    set_style(bar, "tight", wide > bar.width())
 
 
 class DockTabs(QObject):
@@ -80,6 +90,7 @@ class DockTabs(QObject):
             bar.installEventFilter(self)
             for index in range(bar.count()):
                 bar.setTabToolTip(index, f"{bar.tabText(index)}\n{TAB_TIP}")
+            _fit_texts(bar)
 
     def _set_title(self, dock: QDockWidget, titled: bool) -> None:
         # An empty widget in place of the title bar hides it.
@@ -87,6 +98,9 @@ class DockTabs(QObject):
             dock.setTitleBarWidget(None if titled else QWidget())  # type: ignore[arg-type]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and isinstance(watched, QTabBar):
+            _fit_texts(watched)
+            return False
         twice = event.type() == QEvent.Type.MouseButtonDblClick
         if isinstance(event, QMouseEvent) and twice:
             dock = self._dock_at(watched, event.position().toPoint())

@@ -121,7 +121,7 @@ class StartPage(QScrollArea):
             button.setProperty("card", True)
             dim = text[:2]
             button.setText(name if name.endswith(dim.lower()) else f"{name} · {dim}")
-            button.setToolTip(text)
+            button.setToolTip(wrapped(text))
             button.setAccessibleDescription(text)
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
             button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

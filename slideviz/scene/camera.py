@@ -19,6 +19,9 @@ DETAIL = 0.5
 SLACK = 0.25
 """How far a bounding box may be outside the view, relative to its size, to count as seen."""
 
+SAME = 1e-3
+"""Difference of two views, relative to their height, below which they are the same."""
+
 SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "+x": ((1, 0, 0), (0, 0, 1)),
     "-x": ((-1, 0, 0), (0, 0, 1)),
@@ -119,11 +122,24 @@ class Camera:
         half = max(camera._half(extent) for camera in self._cameras())
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
 
-    def _half(self, extent: Any) -> float:
-        """Return half the view height, in mesh units, that shows an extent (3,) along the axes."""
-        width, height = self.stage.plotter.window_size
-        free = max(width - self.stage.strip(), 1.0)
-        return max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
+    def _half(self, extent: Any, ratio: float = 0.0) -> float:
+        """Return half the view height, in mesh units, that shows an extent (3,) along the axes.
+
+        ``ratio``: the view's free width divided by its height; 0: that of this view.
+        """
+        ratio = ratio or self._ratio(self.stage)
+        return float(max(extent[1], extent[0] / ratio, 1e-300) / 2.0 / FILL)
+
+    def is_fit(self, view: tuple[float, ...]) -> bool:
+        """Return whether a `view`, in which the camera is, was fitted to what is drawn."""
+        shapes = self._shapes()
+        if len(view) < 11 or not shapes:
+            return False
+        along = np.concatenate([np.asarray(shape.points) @ self._axes().T for shape in shapes])
+        low, high = along.min(axis=0), along.max(axis=0)
+        half = self._half(high - low, view[10])
+        off = (self._axes() @ np.array(view[3:6]) - (low + high) / 2.0)[:2]
+        return bool(abs(view[9] - half) < SAME * half and np.abs(off).max() < SAME * half)
 
     def sees_detail(self) -> bool:
         """Return whether the view is zoomed in: its height is below `DETAIL` of the fitted one."""

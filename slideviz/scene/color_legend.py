@@ -127,14 +127,15 @@ def add_point_legend(stage: Stage, top: float) -> float:
 
 
 def _line(stage: Stage, sign: str, color: str, word: str, *, down: float) -> None:
-    """Draw a sign in its color and a text, ``down`` pixels below the view's upper edge."""
+    """Draw a sign in its color and a text, ``down`` pixels below the view's upper edge.
+
+    A line that continues the one above has no color, and no sign.
+    """
     # A role and the nodes of a type may have the same word.
     prefix, right, size = _SIGNS[sign]
     corner = _corner(1.0, 1.0)
-    for what, shade, edge, letters in (
-        (sign, color, STRIP - 8, 1.4 * size),
-        (word, stage.scheme.text, right, size),
-    ):
+    signs = [(sign, color, STRIP - 8, 1.4 * size)] if color else []
+    for what, shade, edge, letters in (*signs, (word, stage.scheme.text, right, size)):
         text = pv.Text(what)
         text.GetPositionCoordinate().SetReferenceCoordinate(corner)
         text.GetPositionCoordinate().SetCoordinateSystemToViewport()

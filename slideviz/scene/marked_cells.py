@@ -151,7 +151,8 @@ class InvertedLayer(Layer):
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
         if count:
-            self.stage.ring_words = ((f"{count:,} {word}", color),)
+            where = "in section" if len(cut) == 1 else "in sections"
+            self.stage.ring_words = ((f"{count:,} {word}", color), *([(where, "")] if cut else []))
         if len(cells) > MOST:
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):

@@ -14,6 +14,7 @@ from slideviz.case.model import Case, with_paths
 from slideviz.case.motions.motion import Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
+from slideviz.session.motions import with_new_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
@@ -305,6 +306,13 @@ def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
     """Return the session with another motion at the place ``index``."""
     return _with_motions(session, _replaced(session.case.motions, index, motion))
+
+
+@undoable("new box")
+def add_box(session: Session, index: int) -> Session:
+    """Return the session with a new FFD box around the boundaries of a motion, which uses it."""
+    changed = replace(session, case=with_new_box(session, index))
+    return replace(changed, view=changed.view.with_drawn({"ffd": True}))
 
 
 @undoable("scaled motion")

@@ -112,6 +112,7 @@ class CellInfo:
     size_skew: float
     size: float
     skew: float  # `size_skew`, `size`, `skew`: its qualities, 0 to 1
+    zone: int | None  # its zone, from 1; None where there is only one
     jacobians: FloatArray
     """(k,): its corner Jacobians, an area or volume; negative at folded corners."""
     position: FloatArray  # (d,): the mean of its nodes, in the mesh's length unit
@@ -131,6 +132,7 @@ class WorstCells:
     measure: ColorBy  # the quality in ``values``
     numbers: IntArray | None = None
     """(k,): the numbers of the cells in the file, where only a part of the mesh is in memory."""
+    zones: tuple[int, ...] = ()  # their zones, from 1; () where there is only one
 
     @property
     def known_as(self) -> IntArray:
@@ -180,6 +182,7 @@ def worst_cells(
         history.argmin(axis=0) if followed else np.full(len(cells), -1),
         tuple(ELEMENTS[int(vtk)].name for vtk in types),
         what,
+        zones=zones_of_cells(frame.mesh, [frame.mesh.cell_number(int(cell)) for cell in cells]),
     )
 
 
@@ -203,7 +206,16 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
         tuple(ELEMENTS[int(vtk)].name for vtk in extra.mesh.cells.types[cells]),
         "size-skew",
         numbers,
+        zones_of_cells(frame.mesh, numbers),
     )
+
+
+def zones_of_cells(mesh: Mesh, numbers: IntArray | Sequence[int]) -> tuple[int, ...]:
+    """Return the zones, from 1, of cells with ``numbers`` (k,) in the file; () for only one."""
+    if not mesh.zone_parts:
+        return ()
+    first = [part.first_cell for part in mesh.zone_parts]
+    return tuple(np.searchsorted(first, numbers, side="right").tolist())
 
 
 def cell_centers(mesh: Mesh, cells: IntArray) -> FloatArray:
@@ -225,11 +237,13 @@ def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
 
 def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     """Return the facts about a cell; raises MeshError if there is no such cell."""
+    zoned = frame.mesh
     frame, cell = frame.place_of(cell)
     mesh, found = frame.mesh, frame.quality
     sign = int(found.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
     jacobians = corner_jacobians(mesh, cell, sign)
     status = found.status[cell]
+    zones = zones_of_cells(zoned, [mesh.cell_number(cell)])
     return CellInfo(
         mesh.cell_number(cell),
         ELEMENTS[int(mesh.cells.types[cell])].name
@@ -238,6 +252,7 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
         float(found.values[cell]),
         float(found.size[cell]),
         float(found.skew[cell]),
+        zones[0] if zones else None,
         jacobians,
         mesh.points[nodes_of(mesh, cell)].mean(axis=0),
     )
@@ -270,11 +285,13 @@ def table_rows(worst: WorstCells) -> list[list[str]]:
     """Return the worst cells as rows of texts, numbers with all digits, below their titles."""
     names = "xyz"[: worst.positions.shape[1]]
     measured = worst.measure.replace("-", "_")
-    rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]]
+    zoned = ["zone"] if worst.zones else []
+    rows = [["cell", *zoned, "type", measured, "inverted", *names, "worst_at_step"]]
     for at, cell in enumerate(worst.known_as):
         numbers = (worst.values[at], *worst.positions[at])
         texts = [repr(float(number)) for number in numbers]
         state = "yes" if worst.inverted[at] else "no"
         since = "" if worst.steps[at] < 0 else str(worst.steps[at])
-        rows.append([str(cell), worst.kinds[at], texts[0], state, *texts[1:], since])
+        zone = [str(number) for number in worst.zones[at : at + 1]]
+        rows.append([str(cell), *zone, worst.kinds[at], texts[0], state, *texts[1:], since])
     return rows

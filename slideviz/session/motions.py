@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, moved_together, placed_displacements
+from slideviz.case.motions.box import BoxMotion
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.kinds import IN_ZONES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
@@ -210,6 +212,41 @@ def box_names(session: Session) -> tuple[str, ...]:
         return tuple(boxes_for(session.case, session.mesh))
     except SlidevizError:  # the checks of a motion that uses one have the message
         return ()
+
+
+BOX_MARGIN = 0.05  # margin of a new box around a boundary, over its longest side
+BOX_DEGREE = 5  # its degree along its longest side; in proportion along the others
+
+
+def with_new_box(session: Session, index: int) -> Case:
+    """Return the case with a new FFD box, around the boundaries of a motion, which uses it then."""
+    case, mesh = session.case, session.mesh
+    assert mesh is not None
+    motion = case.motions[index]
+    assert isinstance(motion, BoxMotion)
+    names = named(motion.marker) or case.markers_with("moving")
+    points = mesh.points[np.unique(np.concatenate([mesh.marker(n).nodes for n in names]))]
+    low, high = points.min(axis=0), points.max(axis=0)
+    sides = high - low
+    margin = BOX_MARGIN * sides.max()
+    rounded = [[float(f"{v:.6g}") for v in corner] for corner in (low - margin, high + margin)]
+    (x0, y0, *z0), (x1, y1, *z1) = rounded
+    ring = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+    # In SU2's order; in 2D the corners above are 0.
+    layers = [(*corner, *(z or (0.0,))) for z in (z0, z1) for corner in ring]
+    corners = layers if mesh.dim == 3 else [*layers[:4], *[(0.0, 0.0, 0.0)] * 4]
+    degrees = [max(1, round(BOX_DEGREE * side / sides.max())) for side in sides]
+    i, j, k = (*degrees, 0)[:3]
+    taken = {*box_names(session), *(name for name, _ in case.ffd_boxes)}
+    offered = chain(["BOX"], (f"BOX_{number}" for number in count(2)))
+    name = next(one for one in offered if one not in taken)
+    motions = list(case.motions)
+    motions[index] = replace(motion, box=name)
+    return case.change(
+        ffd_boxes=(*case.ffd_boxes, (name, tuple(v for corner in corners for v in corner))),
+        ffd_degrees=(*case.ffd_degrees, (i, j, k)),
+        motions=tuple(motions),
+    )
 
 
 def boxes_hint(session: Session) -> str:

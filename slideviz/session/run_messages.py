@@ -10,6 +10,7 @@ import numpy as np
 
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
+from slideviz.case.motions.box import BoxMotion
 from slideviz.case.motions.motion import applies_to
 from slideviz.errors import Note
 from slideviz.mesh.margin import reach_words
@@ -197,6 +198,13 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         Requirement(f"“{name}” has no motion: add one.", "motion", name)
         for name in moving
         if not any(applies_to(motion, name) for motion in case.motions)
+    ]
+    requirements += [
+        Requirement(
+            "A motion lacks its box: choose one, or make a new one.", "motion", motion=place
+        )
+        for place, motion in enumerate(case.motions)
+        if isinstance(motion, BoxMotion) and not motion.box
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
         requirements.append(

@@ -214,6 +214,41 @@ def overlaps(window):
     return cut | {(one, other) for one, other in pairs if places[one].intersects(places[other])}
 
 
+def test_names_are_whole_in_a_window_of_1024_pixels(driver, sample_folder, tmp_path):
+    window = driver.window
+    folder = sample_folder / "passage"
+    text = (folder / "passage.cfg").read_text().replace("mesh.su2", str(tmp_path / "mesh.su2"))
+    names = {"periodic_1": "the_periodic_side_below", "airfoil": "blade_of_the_stator"}
+    mesh = (folder / "mesh.su2").read_text()
+    for old, new in names.items():
+        text, mesh = text.replace(old, new), mesh.replace(old, new)
+    (tmp_path / "mesh.su2").write_text(mesh)
+    (tmp_path / "long.cfg").write_text(text)
+    driver.open(tmp_path / "long.cfg")
+    table, walls = window.boundaries.table, window.dock_manager.panels["limits"].walls
+    window.dock_manager.bring_to_front("limits")
+    for width, height in ((1024, 700), (1280, 800), (1024, 700)):
+        window.resize(width, height)
+        settled(driver.qtbot, window)
+        assert table.columnWidth(0) >= table.sizeHintForColumn(0)
+        longest = max(map(table.fontMetrics().horizontalAdvance, names.values()))
+        assert table.columnWidth(0) > longest
+        driver.qtbot.waitUntil(lambda: walls.topLevelItemCount() > 0)
+        shown = [walls.topLevelItem(row) for row in range(walls.topLevelItemCount())]
+        for item in shown:
+            room = walls.columnWidth(0) - walls.indentation()
+            assert room > walls.fontMetrics().horizontalAdvance(item.text(0)), item.text(0)
+        for bar in window.dock_manager.tabs.bars():
+            texts = [bar.tabText(k) for k in range(bar.count())]
+            if bar.isVisible() and "Limits" in texts:
+                assert sum(map(bar.fontMetrics().horizontalAdvance, texts)) < bar.width()
+                assert bar.sizeHint().width() <= bar.width()
+    # It begins at its top, also where the mesh has the boundaries of the one before.
+    table.verticalScrollBar().setValue(table.verticalScrollBar().maximum())
+    driver.open(tmp_path / "long.cfg")
+    assert table.verticalScrollBar().value() == 0
+
+
 def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qtbot, sample_folder):
     window = start()
     window.setMinimumSize(1, 1)

@@ -256,7 +256,7 @@ def test_a_motion_is_for_all_that_are_selected(opened):
         "airfoil + inflow + outflow",
     ]  # fmt: skip
     assert editor.marker.currentText() == "airfoil + outflow"
-    assert editor.about.currentText() == "their centroid"
+    assert editor.about.currentText() == "their centroid (mean of nodes)"
     opened.choose(editor.marker, words(editor.marker).index("airfoil + inflow + outflow"))
     assert opened.session.case.motions[0].marker == ("airfoil", "inflow", "outflow")
     opened.choose(editor.marker, words(editor.marker).index("inflow"))

@@ -112,7 +112,20 @@ def test_the_list_tells_the_point_of_a_2d_rotation_and_of_a_box_what_is_missing(
     assert blade.session.case.motions[0].box == ""
     blade.type(editor(blade).vector.fields[0], "0.1")
     (missing,) = run_requirements(blade.session)
-    assert "names no FFD box; choose one of the mesh" in missing.text
+    assert missing.text == "A motion lacks its box: choose one, or make a new one."
+    # It is made where one looks for it.
+    button = editor(blade).new_box
+    assert button.isVisible()
+    assert button.text() == "New box around airfoil"
+    blade.click(button)
+    assert blade.session.case.motions[0].box == "BOX"
+    assert not run_requirements(blade.session)
+    assert not button.isVisible()
+    assert editor(blade).box.currentText() == "BOX"
+    assert blade.window.store.can_undo == "new box"
+    blade.window.store.undo()
+    assert blade.session.case.ffd_boxes == ()
+    assert button.isVisible()
 
 
 MOVED = {

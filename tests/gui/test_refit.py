@@ -5,6 +5,7 @@ import pytest
 
 from slideviz.case.motions.rigid import Translate
 from slideviz.session import changes
+from slideviz.session.saving import view_to_case
 
 
 @pytest.mark.parametrize("zoomed", [False, True])
@@ -28,3 +29,37 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
         for step in range(len(window.store.session.frames)):
             window.store.change(changes.show_frame, step)
             assert not window.scene.camera.loses_some()
+
+
+def scale_of(driver):
+    driver.qtbot.wait(60)
+    return driver.window.view.camera.parallel_scale
+
+
+def fitted_scale(driver):
+    driver.window.viewing.fit()
+    return scale_of(driver)
+
+
+def test_the_view_is_fitted_again_when_the_window_grows(driver, sample_folder, tmp_path):
+    window, path = driver.window, sample_folder / "passage" / "passage.cfg"
+    window.resize(900, 640)
+    driver.open(path)
+    small = fitted_scale(driver)
+    case = view_to_case(driver.session, window.scene.camera.view)
+    case.write(tmp_path / "saved.cfg")
+    window.scene.camera.zoom_at(50, 50, 3.0)
+    view_to_case(driver.session, window.scene.camera.view).write(tmp_path / "zoomed.cfg")
+    window.viewing.fit()
+    window.viewing.fly_to(0)
+    window.resize(1500, 900)
+    # Back from a cell, all is seen in the size that the window has now.
+    window.viewing.fly_back()
+    large = scale_of(driver)
+    assert large != pytest.approx(small)
+    assert large == pytest.approx(fitted_scale(driver))
+    # So is a case that was saved in a small window; but not where it was zoomed in.
+    driver.open(tmp_path / "saved.cfg")
+    assert scale_of(driver) == pytest.approx(large)
+    driver.open(tmp_path / "zoomed.cfg")
+    assert scale_of(driver) == pytest.approx(small / 3.0, rel=1e-3)

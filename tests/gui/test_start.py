@@ -65,7 +65,7 @@ def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(driv
             jobs.open_sample(name, Path("nowhere"), lambda _: None, lambda: False)
         size = made[-1][1] or SAMPLES[name].size
         assert words.endswith(f"({size})")
-        assert window.start.sample_buttons[name].toolTip() == words
+        assert words in window.start.sample_buttons[name].toolTip()
         assert window.files.sizes[name] == size
     assert [name for name, _ in made] == list(SAMPLES)
 

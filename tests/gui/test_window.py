@@ -233,8 +233,16 @@ def test_a_click_in_the_view_selects_and_the_right_button_assigns_a_role_and_iso
         opened.click_view(middle, button=Qt.MouseButton.RightButton)
         opened.qtbot.waitUntil(lambda: any(m.isVisible() for m in window.findChildren(QMenu)))
         found = menu()
-        found.setActiveAction(next(act for act in found.actions() if act.text() == text))
-        QTest.keyClick(found, Qt.Key.Key_Return)
+        acts = [act for act in found.actions() if act.text() and not act.isSeparator()]
+        letters = [act.text().partition("&")[2][:1].lower() for act in acts]
+        assert all(letters)
+        assert len({*letters}) == len(letters)
+        (letter,) = (
+            one
+            for one, act in zip(letters, acts, strict=True)
+            if act.text().replace("&", "") == text
+        )
+        QTest.keyClick(found, letter)
 
     trigger("Fixed")
     assert opened.session.role("inflow") == "fixed"
@@ -756,6 +764,18 @@ def test_a_run_that_fails_says_why_and_leaves_the_window_usable(ready, monkeypat
     assert len(ready.session.frames) == 2
 
 
+def test_what_is_typed_into_the_limits_counts_at_f5(ready):
+    window = ready.window
+    window.dock_manager.bring_to_front("limits")
+    field = window.dock_manager.panels["limits"].field
+    field.setFocus()
+    QTest.keyClicks(field, "min > 0.1")
+    QTest.keyClick(field, Qt.Key.Key_F5)
+    ready.settle()
+    assert [str(limit) for limit in ready.session.run_shown.case.limits] == ["min > 0.1"]
+    assert ready.session.run_shown.last.limits[0].passed
+
+
 def test_changed_settings_are_told(ready):
     run(ready, 1)
     assert DONE in ready.window.run_panel.text.text()
@@ -1132,6 +1152,14 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
         assert panel.width() >= panel.minimumSizeHint().width()
     bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
     assert bottom < 800
+    # Its button stays where it is, however many lines stand beside it.
+    places, before = set(), window.run_panel.text.text()
+    for lines in (1, 2, 3, 5, 8):
+        window.run_panel.text.setText("<br>".join(["A line."] * lines))
+        ready.qtbot.wait(30)
+        places.add(window.run_panel.run.mapTo(window, QPoint(0, 0)).y())
+    assert len(places) == 1
+    window.run_panel.text.setText(before)
     assert window.run_panel.run.isVisible()
     from slideviz.session.jobs import intersection_key, set_intersection
 

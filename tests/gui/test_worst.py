@@ -28,10 +28,17 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.session import changes
-from slideviz.session.inspect import WorstCells, cell_info, nearest_boundary, worst_cells
+from slideviz.session.inspect import (
+    WorstCells,
+    cell_info,
+    nearest_boundary,
+    table_rows,
+    worst_cells,
+)
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
+from tests.builders import stage
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -444,6 +451,37 @@ def worst_at(positions, numbers):
         ("quadrilateral",) * count,
         "size-skew",
     )
+
+
+def test_cells_of_several_zones_have_their_zone(tmp_path):
+    mesh = stage()
+    frame = shaken(mesh, 0.02, 1)
+    found = worst_cells([StepFrame(mesh, quality(mesh)), frame], 1, "size-skew")
+    parts = mesh.zone_parts
+    zones = [
+        next(k for k, part in enumerate(parts, 1) if part.cells.start <= cell < part.cells.stop)
+        for cell in found.cells
+    ]
+    assert set(zones) == {1, 2}
+    assert found.zones == tuple(zones)
+    model = WorstModel()
+    model.show(found)
+    column = model.headers.index("Zone")
+    assert model.headers == (*COLUMNS, "Zone", "x", "y", "z")[: len(model.headers)]
+    rows = range(model.rowCount())
+    assert [model.index(row, column).data() for row in rows] == [str(zone) for zone in zones]
+    assert float(model.index(0, column + 1).data()) == pytest.approx(
+        found.positions[0, 0], abs=1e-3
+    )
+    model.sort(column, Qt.SortOrder.DescendingOrder)
+    assert [model.index(row, column).data() for row in rows] == sorted(
+        map(str, zones), reverse=True
+    )
+    assert [row[1] for row in table_rows(found)] == ["zone", *map(str, zones)]
+    session = open_mesh(frame, None)
+    assert f" of zone {zones[0]}, " in info_text(session, int(found.cells[0]))
+    alone = worst_cells([shaken(sample("square", size=12).mesh, 0.01, 1)], 0, "size-skew")
+    assert alone.zones == ()
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-7, 1e4])

@@ -174,9 +174,11 @@ def test_rings_are_at_all_inverted_cells_or_at_those_that_sections_cut(scene, cu
     cut = np.unique(scene.sections.drawn["section:0"].polygons.cells)
     assert 0 < rings() < inverted
     assert rings() == (session.frame.quality.status[cut] == INVERTED).sum()
-    assert scene.stage.ring_words[0][0] == f"{rings()} inv."
+    assert [words for words, _ in scene.stage.ring_words] == [f"{rings()} inv.", "in section"]
+    image(scene)
     scene.update(session)
     assert rings() == inverted
+    assert [words for words, _ in scene.stage.ring_words] == [f"{inverted} inv."]
 
 
 def test_a_range_that_holds_nothing_draws_nothing(scene, bent):

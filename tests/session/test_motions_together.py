@@ -1,22 +1,29 @@
 """Motions of several boundaries: their ghosts, their words, and what is left of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slideviz.case.check import check_case
 from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness
 from slideviz.case.motions.file import FromFile
-from slideviz.case.motions.motion import applies_to, named
+from slideviz.case.motions.motion import NewMotion, applies_to, named
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.case.zones import zone_cases
+from slideviz.mesh.quality import quality
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
-from slideviz.session.motions import Ghosts, TableRows, new_target, targets
+from slideviz.session.motions import Ghosts, TableRows, box_names, new_target, targets
+from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements
+from slideviz.session.state import StepFrame
 from tests.builders import stage
 
 PAIR = ("bottom", "left")
@@ -77,6 +84,31 @@ def test_a_boundary_that_moves_later_does_not_join_a_motion(session, first, data
         assert any(missing.marker == later for missing in run_requirements(after))
     # All that move now are offered together.
     assert any(set(named(target)) == first for target in offered)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("kind", [Ffd, FfdCamber, FfdThickness])
+def test_a_new_box_has_all_nodes_of_its_motion_inside(square, cube, dim, count, kind):
+    mesh = square if dim == 2 else cube
+    names = mesh.marker_names[:count]
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = changes.set_role(session, names, "moving")
+    target = names if count > 1 else names[0]
+    for number in (1, 2):  # the second has a name of its own
+        session = changes.add_motion(session, kind.new(target, NewMotion(dim)))
+        session = changes.add_box(session, number - 1)
+    case = session.case
+    assert [motion.box for motion in case.motions] == ["BOX", "BOX_2"] == list(box_names(session))
+    moved = [replace(motion, index=(-1,) * len(motion.index)) for motion in case.motions]
+    values = {"vector": (0.1, 0.2, 0.0)} if kind is Ffd else {"amount": 0.1}
+    case = case.change(motions=(replace(moved[0], **values),))
+    assert not check_case(case, mesh)
+    found = displacements(case, mesh)
+    wanted = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
+    assert found.nodes.tolist() == wanted.tolist()
+    if kind is not FfdThickness:  # which leaves the middle
+        assert (np.abs(found.vectors).max(axis=1) > 0.09).all()
 
 
 def test_words_of_many_boundaries_are_short():

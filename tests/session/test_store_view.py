@@ -159,6 +159,7 @@ def test_each_change_that_can_be_undone_has_words():
     functions = {**vars(changes), "fit_colors": fit_colors}
     every = {name: undo_words(f, {}) for name, f in functions.items() if isfunction(f)}
     assert {name: words for name, words in every.items() if words} == {
+        "add_box": "new box",
         "add_motion": "new motion",
         "add_section": "new section",
         "choose_section": "choice of a section",

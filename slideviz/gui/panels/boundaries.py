@@ -30,6 +30,7 @@ from slideviz.terms import ROLES, labels
 
 NAME, COUNT, ROLE = 0, 1, 2  # the columns of the table
 NARROW = 290  # width of the table in pixels below which it has no room for the numbers of elements
+ROLE_WIDTH, LEAST_ROLE_WIDTH = 136, 112  # width in pixels of the roles, and in a narrow table
 
 
 class BoundariesTable(QTableWidget):
@@ -51,9 +52,17 @@ class BoundariesTable(QTableWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        narrow = self.width() < NARROW
+        self.distribute_width()
+
+    def distribute_width(self) -> None:
+        """Show names whole: they take the width of the numbers where there is no more room."""
+        room, names = self.viewport().width(), self.sizeHintForColumn(NAME)
+        narrow = self.width() < NARROW or names + self.sizeHintForColumn(COUNT) > room - ROLE_WIDTH
         self.setColumnHidden(COUNT, narrow)
-        self.setColumnWidth(ROLE, 112 if narrow else 136)
+        role = LEAST_ROLE_WIDTH if narrow else ROLE_WIDTH
+        self.setColumnWidth(ROLE, role)
+        count = 0 if narrow else self.columnWidth(COUNT)
+        self.setColumnWidth(NAME, max(names, room - role - count))
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
@@ -97,6 +106,8 @@ class BoundariesPanel(Panel):
         in_column(*parts, wide=[self.table], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.setFocusProxy(self.table)
         self.follow()
+        # Another mesh, even with the same boundaries, is shown from its first one.
+        self.follow(lambda session: session.mesh, lambda _: self.table.scrollToTop())
 
     def _make_table(self) -> BoundariesTable:
         table = BoundariesTable()
@@ -105,7 +116,7 @@ class BoundariesPanel(Panel):
         table.verticalHeader().hide()
         table.verticalHeader().setDefaultSectionSize(28)
         header = table.horizontalHeader()
-        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(COUNT, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(ROLE, QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
@@ -186,6 +197,7 @@ class BoundariesPanel(Panel):
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)
         self._count(session)
+        self.table.distribute_width()
 
     def _count(self, session: Session) -> None:
         for row, (name, _) in enumerate(self._rows):
@@ -295,7 +307,7 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
     menu.addSection(title)
     roles = {store.session.role(name) for name in names}
     for role in ROLES:
-        act = QAction(role_icon(role), role.capitalize(), menu)
+        act = QAction(role_icon(role), f"&{role.capitalize()}", menu)
         act.setToolTip(ROLES[role].tip)
         act.setCheckable(True)
         act.setChecked(roles == {role})
@@ -304,12 +316,12 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         menu.addAction(act)
     menu.addSeparator()
     if any(name in store.session.guesses for name in names):
-        keep = menu.addAction("Keep the guess")
+        keep = menu.addAction("&Keep the guess")
         keep.triggered.connect(_slot(store, changes.confirm_guesses, names))
     for text, function, values in (
-        ("Hide", changes.show_boundaries, (names, False)),
-        ("Show only this" if len(names) == 1 else "Show only these", changes.isolate, (names,)),
-        ("Show all", changes.show_boundaries, (store.session.mesh.marker_names,)),
+        ("&Hide", changes.show_boundaries, (names, False)),
+        ("Show &only this" if len(names) == 1 else "Show &only these", changes.isolate, (names,)),
+        ("Show &all", changes.show_boundaries, (store.session.mesh.marker_names,)),
     ):
         menu.addAction(text).triggered.connect(_slot(store, function, *values))
     return menu

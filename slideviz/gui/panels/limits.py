@@ -6,8 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from qtpy.QtCore import QSignalBlocker, QSize, Qt, QTimer
-from qtpy.QtGui import QBrush, QColor, QPaintEvent
-from qtpy.QtWidgets import QHeaderView, QLabel, QTreeWidget, QTreeWidgetItem
+from qtpy.QtGui import QBrush, QColor, QPaintEvent, QResizeEvent
+from qtpy.QtWidgets import (
+    QHeaderView,
+    QLabel,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QTreeWidgetItemIterator,
+)
 
 from slideviz.case.limits import LimitResult, read_limits, write_limits
 from slideviz.errors import CaseError
@@ -38,14 +44,38 @@ LIMIT_TIPS = (
 """What each column of the list of limits has."""
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 ROW_HEIGHT = 20  # height of a row in pixels
+NAME_MARGINS = 8  # space beside a name in pixels
 WALLS = "Walls: worst number of each boundary, at the step that is shown."
 NO_WALLS = "No boundary is a wall: all are periodic or internal."
 
 
-def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: bool) -> QTreeWidget:
-    tree = QTreeWidget()
+class NamesTree(QTreeWidget):
+    """A table whose first column, of names, has the rest of its width, but never cuts a name."""
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit_names()
+
+    def fit_names(self) -> None:
+        """Set the width of the first column; where a name needs more, the table scrolls."""
+        others = sum(self.columnWidth(column) for column in range(1, self.columnCount()))
+        names = QTreeWidgetItemIterator(self)
+        least = self.header().sectionSizeHint(0)
+        while (item := names.value()) is not None:
+            least = max(least, self._name_width(item))
+            names += 1
+        self.setColumnWidth(0, max(least, self.viewport().width() - others))
+
+    def _name_width(self, item: QTreeWidgetItem) -> int:
+        depth = int(self.rootIsDecorated()) + int(item.parent() is not None)
+        name = self.fontMetrics().horizontalAdvance(item.text(0))
+        return name + depth * self.indentation() + NAME_MARGINS
+
+
+def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: bool) -> NamesTree:
+    tree = NamesTree()
     tree.setObjectName(name)
-    tree.setHeaderLabels(list(titles))
+    tree.setHeaderLabels([title.replace(" ", "\n") for title in titles])
     tree.setRootIsDecorated(decorated)
     tree.setIndentation(12)
     tree.setAlternatingRowColors(True)
@@ -58,7 +88,8 @@ def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: boo
     header.setFont(letters)
     header.setStretchLastSection(False)
     header.setMinimumSectionSize(32)
-    header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+    header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
+    header.sectionResized.connect(lambda column, *_: tree.fit_names() if column else None)
     for column, tip in enumerate(tips):
         tree.headerItem().setToolTip(column, wrapped(tip))
         if column:
@@ -138,6 +169,7 @@ class LimitsPanel(Panel):
             height = self.limits.header().sizeHint().height() + 4
             height += min(rows, 6) * ROW_HEIGHT
             self.limits.setFixedHeight(height)
+        self.limits.fit_names()
         if session.checked is not None and limits and session.checked.problem:
             self.problem.setText(session.checked.problem)
             self.problem.show()
@@ -189,6 +221,7 @@ class LimitsPanel(Panel):
                     item.addChild(_row(("before", *row.before), row.tip, row.name))
                     item.addChild(_row(("change", *row.change), row.tip, row.name))
                     item.setExpanded(row.layered)
+        self.walls.fit_names()
         self.hint.setText(WALLS if self.walls.topLevelItemCount() else NO_WALLS)
 
     def paintEvent(self, event: QPaintEvent) -> None:

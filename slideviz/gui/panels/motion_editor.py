@@ -32,13 +32,17 @@ from slideviz.session.motions import radial
 from slideviz.terms import SIDES, SPAN_KINDS
 
 ABOUT = {
-    "centroid": "its centroid",
+    "centroid": "its centroid (mean of nodes)",
     "line": "a line through its sections",
     "axis": "the machine's axis",
     "radial": "radial through its centroid",
     "point": "a point",
 }
 """What a motion leaves in place, by the choice's value."""
+MEAN = (
+    "The mean of its nodes: it lies towards where these are dense. “A point” takes another place."
+)
+"""Tip of the centroids among these."""
 
 
 Z = (0.0, 0.0, 1.0)  # axis of rotations in 2D
@@ -178,6 +182,8 @@ class MotionEditor(QWidget):
     """The motion as edited, in place of the one that was shown."""
     table_wanted = Signal()
     """The user wants to edit the rows of the motion's displacement file."""
+    box_wanted = Signal()
+    """The user wants a new box around the motion's boundaries."""
 
     def __init__(self, walls: SpanWalls) -> None:
         super().__init__()
@@ -198,6 +204,8 @@ class MotionEditor(QWidget):
         """The axis about which the mesh repeats; None if it does not."""
         self.boxes: tuple[str, ...] = ()
         """The names of the boxes for free-form deformation that can be chosen."""
+        self.straight = True
+        """Whether boxes are straight in Cartesian coordinates."""
         self._as_point = False
         self._connect()
         self.show_motion(None, (), 3)
@@ -216,6 +224,9 @@ class MotionEditor(QWidget):
         self.curve.read = self.drawn.written
         self.browse = push_button("…", "Choose the file.", self._browse)
         self.browse.setMaximumWidth(30)
+        tip = "Make a box of control points around the boundary: they are few, and can be moved."
+        self.new_box = push_button("", tip, self.box_wanted, "new_box")
+        self.new_box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         tip = "Type or paste the rows, or change them, and save them as the file."
         self.table = push_button("Table…", tip, self.table_wanted, "motion_table")
 
@@ -232,6 +243,8 @@ class MotionEditor(QWidget):
             self.form.addRow(QLabel(row.title), self._rows[name])
             if name == "curve":
                 self.form.addRow(self.drawn)
+            if name == "box":
+                self.form.addRow("", self.new_box)
         self.form.addRow("Hub, shroud", self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
         labels = [self.form.labelForField(widget) for widget in self._rows.values()]
@@ -277,6 +290,10 @@ class MotionEditor(QWidget):
             shown |= {"about"} | self._show_place(motion, dim)
         for shared in (self.drawn, self.walls):
             self.form.setRowVisible(shared, "curve" in shown)
+        box = getattr(motion, ROWS["box"].attribute, "")
+        lacks = "box" in shown and self.straight and box not in self.boxes
+        self.form.setRowVisible(self.new_box, lacks)
+        self.new_box.setText(f"New box around {target_words(motion.marker)}")
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         if "index" in shown:
@@ -314,6 +331,8 @@ class MotionEditor(QWidget):
         if self._radial(motion) is not None:
             offered.insert(-1, "radial")
         self.about.offer({what: self._about_words(what) for what in offered})
+        centroids = (what for what in offered if what in ("centroid", "radial"))
+        self.about.set_tips(dict.fromkeys(centroids, MEAN))
         point = getattr(motion, ROWS["point"].attribute)
         what = {"centroid": "centroid", None: "line"}.get(point, "point")
         if "axis" in offered and self._is_machine(motion) and not self._as_point:

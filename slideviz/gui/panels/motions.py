@@ -175,6 +175,9 @@ class MotionPanel(Panel):
         self.editor.changed.connect(self._edited)
         self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
+        self.editor.box_wanted.connect(
+            lambda: self.store.change(changes.add_box, self.list.currentRow())
+        )
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
         parts = (buttons, self.list, self.editor, self.hint, None)
         layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))
@@ -234,6 +237,7 @@ class MotionPanel(Panel):
                 self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
         self.editor.machine, self.editor.boxes = machine_axis(session), box_names(session)
+        self.editor.straight = session.case.ffd_system == "CARTESIAN"
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 

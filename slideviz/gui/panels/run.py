@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 
-from qtpy.QtCore import Signal
+from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QPushButton, QSizePolicy
 
 from slideviz.color_scheme import ColorScheme
@@ -65,6 +65,9 @@ class RunPanel(Panel):
         policy.setRetainSizeWhenHidden(True)
         self.bar.setSizePolicy(policy)
         row = in_row(self.run, self.cancel, self.text, wide=[self.text])
+        # The panel is the lowest one, and grows upwards: so a line more does not move the button.
+        for widget in (self.run, self.cancel, self.text):
+            row.setAlignment(widget, Qt.AlignmentFlag.AlignBottom)
         in_column(row, self.bar, spacing=5, on=self, margins=(6, 6, 6, 6))
         # Some checks go through the mesh: they are not repeated if only the view changed.
         self.follow(_checked, self._check)

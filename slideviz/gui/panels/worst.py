@@ -232,8 +232,9 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
     around = machine_pair(session)
     parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"
+    zone = f" of zone {info.zone}" if info.zone is not None else ""
     lines = [
-        f"<b>Cell {info.cell}</b>, {info.kind}{state}",
+        f"<b>Cell {info.cell}</b>{zone}, {info.kind}{state}",
         f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
         _place_text(info.position, around),
     ]

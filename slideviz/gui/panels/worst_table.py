@@ -21,9 +21,10 @@ SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexa
 
 COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
-"""The first columns; then come the coordinates, and the cell type if there are several."""
+"""The first columns; then come the zone if there are several, the coordinates, and the cell type
+if there are several."""
 
-LAST = "Type"  # title of the last column, if the cells have several types
+ZONE, LAST = "Zone", "Type"  # titles of these columns
 ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
 
@@ -128,7 +129,12 @@ class WorstModel(QAbstractTableModel):
     @property
     def headers(self) -> tuple[str, ...]:
         first, _, since = COLUMNS
-        return (first, self._measure, since, *self.names, *((LAST,) if self._mixed else ()))
+        zone, last = (ZONE,) * self._zoned, (LAST,) * self._mixed
+        return (first, self._measure, since, *zone, *self.names, *last)
+
+    @property
+    def _zoned(self) -> bool:
+        return self.worst is not None and bool(self.worst.zones)
 
     @property
     def _measure(self) -> str:
@@ -139,7 +145,7 @@ class WorstModel(QAbstractTableModel):
         return words.replace(" ", "\n").replace("-", "-\n", len(words) > 12).capitalize()
 
     def _alignment(self, column: int) -> int:
-        if column == SINCE:
+        if column == SINCE or self.headers[column] == ZONE:
             return _MIDDLE
         return _LEFT if self.headers[column] == LAST else _RIGHT
 
@@ -150,7 +156,8 @@ class WorstModel(QAbstractTableModel):
             return None
         if role == Qt.ItemDataRole.ToolTipRole:
             place = f"{self.headers[section]} of the mean of its nodes, in mesh units or degrees"
-            return "Element type" if self.headers[section] == LAST else TIPS.get(section, place)
+            others = {LAST: "Element type", ZONE: "Zone of the mesh, from 1"}
+            return others.get(self.headers[section]) or TIPS.get(section, place)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return self._alignment(section)
         if role != Qt.ItemDataRole.DisplayRole:
@@ -177,7 +184,9 @@ class WorstModel(QAbstractTableModel):
             return "inverted" if worst.inverted[at] else f"{worst.values[at]:.{self._digits}f}"
         if column in (CELL, SINCE):
             return str((worst.known_as if column == CELL else worst.steps)[at])
-        axis = column - len(COLUMNS)
+        if self.headers[column] == ZONE:
+            return str(worst.zones[at])
+        axis = column - len(COLUMNS) - self._zoned
         if axis == len(self.names):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
         value, digits = float(self.places[at, axis]), self._decimals[axis]
@@ -198,15 +207,11 @@ class WorstModel(QAbstractTableModel):
             self.order = np.empty(0, np.int64)
             return
         worst = self.worst
-        keys = {
-            CELL: worst.known_as,
-            QUALITY: np.arange(len(worst)),
-            SINCE: worst.steps,
-            **dict(enumerate(self.places.T, len(COLUMNS))),
-        }
-        key = keys.get(self._by)
-        if key is None:
-            key = np.unique(np.array(worst.kinds), return_inverse=True)[1]
+        zones = [np.array(worst.zones)] if self._zoned else []
+        kinds = np.unique(np.array(worst.kinds), return_inverse=True)[1]
+        # In the order of `headers`.
+        keys = [worst.known_as, np.arange(len(worst)), worst.steps, *zones, *self.places.T, kinds]
+        key = keys[min(self._by, len(keys) - 1)]
         self.order = np.argsort(-key if self._down else key, kind="stable")
 
 

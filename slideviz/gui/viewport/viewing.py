@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from qtpy.QtCore import QPoint, Qt, Signal
+from qtpy.QtCore import QPoint, QSize, Qt, Signal
 from qtpy.QtGui import QResizeEvent, QShowEvent
 from qtpy.QtWidgets import (
     QFrame,
@@ -177,6 +177,7 @@ class Viewing(QWidget):
         # Shared with the second flat view.
         self.second_cuts = Cuts()
         self._before: tuple[float, ...] | None = None
+        self._fitted_at: QSize | None = None
         self._link: CameraLink | None = None
 
     # Parts -----------------------------------------------------------------------------
@@ -314,6 +315,8 @@ class Viewing(QWidget):
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
             self.scene.camera.move_to(opened.camera)
+            if self.scene.camera.is_fit(opened.camera):
+                self.scene.camera.fit()
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
         self.view.unveil()
 
@@ -406,13 +409,15 @@ class Viewing(QWidget):
         """Fly the camera to a cell of the shown mesh; `fly_back` returns."""
         if self._before is None:
             self._before = self.scene.camera.place
+            self._fitted_at = self.size() if self._leader.camera.fitted else None
         self.scene.fly_to(cell)
         self.render()
 
     def fly_back(self) -> None:
         """Fly the camera back to its place before `fly_to`, or show the whole mesh."""
         before, self._before = self._before, None
-        if before is None:
+        # A fitted view is fitted again where the window has another size now.
+        if before is None or self._fitted_at not in (None, self.size()):
             self.fit()
         else:
             self.scene.camera.move_to(before)
