@@ -180,6 +180,8 @@ class Running(QObject):
             self._deforms = False
             self.store.change(changes.end_run, how)
         self.ended.emit()
+
+    def _start_next(self) -> None:
         follow, self._next = self._next, None
         if follow is not None:
             follow()
@@ -187,6 +189,7 @@ class Running(QObject):
     def _finished(self, value: Any) -> None:
         finish = self._finish
         self._end("done")
+        self._start_next()
         if finish is not None:
             finish(value)
 
@@ -194,17 +197,15 @@ class Running(QObject):
         last = self.store.session.runs[-1] if self._deforms else None
         if last is not None:
             self._log_remarks(last)
-        another = self._next is not None
         self._end("cancelled")
         run = None if last is None else self.store.session.run(last.number)
         words = stopped_words(run)
         log.info("cancelled%s", f": {words}" if words else "")
-        if another:
-            return
         self.status_changed.emit(words or "Cancelled")
         if run is not None and words:
             self.banner.show_message(words)
             self._about = run.number
+        self._start_next()
 
     @staticmethod
     def _log_remarks(run: Run) -> list[str]:
@@ -224,6 +225,7 @@ class Running(QObject):
         log.error("%s", error)
         self.status_changed.emit("")
         self._end("failed")
+        self._start_next()
 
     def _run_done(self, _: Any) -> None:
         """Show the result of a finished run, with its warnings, and write both to the log."""

@@ -928,6 +928,8 @@ def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkey
     assert asked[3][:2] == (f"Save {case} and {mesh} before closing?", ["case", "mesh"])
     assert window.isVisible()
     assert ready.session.run_shown.end == "cancelled"
+    assert f"cancelled after step {count} of 2000" in window.banner.text.text()
+    assert f"cancelled after step {count} of 2000" in window.statusBar().currentMessage()
     assert window.close()
 
 
