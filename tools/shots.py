@@ -299,6 +299,10 @@ def dark(window: MainWindow, place: Path) -> None:
     window.dock_manager.bring_to_front("curves")
 
 
+WINDOW_FILM = (960, 600)
+"""Width and height of the film of the window in pixels."""
+WINDOW_STEPS = 21
+
 STATES = (
     ShotState("roles", roles),
     ShotState("quality", quality),
@@ -312,6 +316,29 @@ STATES = (
     ShotState("zones", zones),
     ShotState("dark", dark),
 )
+
+
+def film_of_window(window: MainWindow, path: Path, place: Path) -> Path:
+    """Write a film of ten seconds of the window, in which a blade turns, and return its path."""
+    from PIL import Image
+
+    write_sample("passage", place / "film", 60)
+    case = Case.read(place / "film" / "passage.cfg")
+    case.change(motions=FAR, steps=WINDOW_STEPS).write(place / "film" / "passage.cfg")
+    _open(window, place / "film" / "passage.cfg")
+    _run(window)
+    window.store.change(changes.set_view, passages=1)
+    frames = []
+    for step in range(WINDOW_STEPS + 1):
+        window.store.change(changes.show_frame, step)
+        with Image.open(photograph(window, place / "frame.png")) as image:
+            frames.append(image.convert("RGB").resize(WINDOW_FILM, Image.Resampling.LANCZOS))
+    # One palette for all pictures: what does not move keeps its bits, and the file stays small.
+    palette = frames[-1].quantize(128, Image.Quantize.MEDIANCUT)
+    first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
+    times = [800, *[300] * (WINDOW_STEPS - 1), 3200]
+    first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=True)
+    return path
 
 
 def film_of_passage(path: Path) -> Path:
@@ -364,8 +391,11 @@ def shots(folder: Path) -> list[Path]:
             with open_window(place) as window:
                 state.bring(window, place)
                 made.append(photograph(window, folder / f"{state.name}.png"))
-        films = film_of_passage(folder / "passage.gif"), film_in_time(folder / "in_time.gif", place)
-        return [*made, *films, *machine_pictures(folder, place)]
+        with open_window(place) as window:
+            made.append(film_of_window(window, folder / "window.gif", place))
+        made.append(film_of_passage(folder / "passage.gif"))
+        made.append(film_in_time(folder / "in_time.gif", place))
+        return [*made, *machine_pictures(folder, place)]
 
 
 def machine_pictures(folder: Path, place: Path) -> list[Path]:
