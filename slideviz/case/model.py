@@ -19,7 +19,7 @@ from slideviz.rbf.reduction import AUTO, Reduction
 _NUMBERS = (
     "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
     "support_radius", "reduction", "layer_thickness", "repair_below", "idw_power",
-    "idw_fixed_weight",
+    "idw_fixed_weight", "deform_coeff",
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
 _ROLES = 'a role for each marker, as {"blade": "moving"}'
