@@ -235,4 +235,5 @@ def _type_words(hint: Any) -> str:
     fixed = kind is tuple and Ellipsis not in inner
     number = f"{len(inner)} " if fixed else f"a {kind.__name__.lower()} of "
     each = _type_words(inner[kind is Mapping])
-    return number + "names to " * (kind is Mapping) + _SEVERAL.get(each, f"values, each {each}")
+    to = "names to " if kind is Mapping else ""
+    return number + to + _SEVERAL.get(each, f"values, each {each}")

@@ -138,13 +138,12 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each marker of the case that the mesh lacks, and if no marker moves."""
-    nothing = "no marker moves; name one in MARKER_MOVING"
     there = [limit for limit in case.limits if limit.marker in mesh.marker_names]
-    return (
-        *unknown_markers(mesh, _keys_of_markers(case)),
-        *not_walls(there, case.walls(mesh.marker_names)),
-        *[nothing] * (not case.markers_with("moving")),
-    )
+    unknown = unknown_markers(mesh, _keys_of_markers(case))
+    problems = (*unknown, *not_walls(there, case.walls(mesh.marker_names)))
+    if case.markers_with("moving"):
+        return problems
+    return (*problems, "no marker moves; name one in MARKER_MOVING")
 
 
 def _keys_of_markers(case: Case) -> dict[str, str]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.values import Kind
-from slideviz.case.words import name_text, number
+from slideviz.case.words import first_of, name_text, number
 from slideviz.errors import CaseError, nearest, not_one_of, shown
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -215,12 +215,13 @@ class Limit(CheckedFields):
         if not np.isfinite(self.value):
             raise CaseError(f"{self}: expected a finite number as the limit")
         low, high = row.range
-        ends = (low,) * (self.sign == "<") + (high,) * (self.sign == ">")  # which nothing passes
-        fits = low <= self.value <= high and self.value not in ends
+        end = {"<": low, ">": high}.get(self.sign)  # which nothing passes
+        fits = low <= self.value <= high and self.value != end
         if not fits or (row.counts and not float(self.value).is_integer()):
-            upper = f" to {'below ' * (self.sign == '>')}{high:g}" if high < inf else ""
+            below = "below " if self.sign == ">" else ""
+            upper = f" to {below}{high:g}" if high < inf else ""
             raise CaseError(
-                f"{self}: expected a {'whole ' * row.counts}number "
+                f"{self}: expected a {'whole number' if row.counts else 'number'} "
                 f"{'above' if self.sign == '<' else 'from'} {low:g}{upper} for {self.name} "
                 f"({row.meaning})"
             )
@@ -264,12 +265,7 @@ def value_words(actual: float | None, failing: int, boundaries: Sequence[str]) -
         return f"{actual:.6g}"
     if failing:
         return "infinite"
-    return f"no boundary layers at {names_text(boundaries)}" if boundaries else "no value"
-
-
-def names_text(names: Sequence[str]) -> str:
-    """Return the first three of some names."""
-    return ", ".join(names[:3]) + ", ..." * (len(names) > 3)
+    return f"no boundary layers at {first_of(boundaries)}" if boundaries else "no value"
 
 
 @check_types
@@ -394,7 +390,9 @@ MET = "met"  # what `outcome` returns where all limits are met
 def outcome(results: Sequence[LimitResult]) -> str:
     """Return a cell of a table: `MET`, or as ``min > 0.3: 0.21; inverted = 0: 5``; "" if none."""
     missed = [f"{one.limit}: {one.value_words}" for one in results if not one.passed]
-    return "; ".join(missed) or MET * bool(results)
+    if missed:
+        return "; ".join(missed)
+    return MET if results else ""
 
 
 def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:

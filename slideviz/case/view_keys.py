@@ -91,7 +91,10 @@ def write_sections(sections: tuple[SectionText, ...]) -> str:
     texts = []
     for form, values, whole_cells, flat, drawn in sections:
         words = [form, *(repr(float(v)) for v in values), "whole" if whole_cells else "cut"]
-        words += [SECTION_SHAPES[form].flat] * flat + [HIDDEN] * (not drawn)
+        if flat:
+            words.append(SECTION_SHAPES[form].flat)
+        if not drawn:
+            words.append(HIDDEN)
         texts.append(f"({', '.join(words)})")
     return " ; ".join(texts) or "( )"
 

@@ -139,6 +139,12 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number:,} {what}s"
 
 
+def first_of(items: Sequence[object], most: int = 3) -> str:
+    """Return the first items of a list, separated by commas."""
+    more = ", ..." if len(items) > most else ""
+    return ", ".join(map(str, items[:most])) + more
+
+
 def wrong_by(part: float, *, bounded: bool) -> str:
     """Return an error, a part of the largest value, in words: ``bounded``, or as measured."""
     percent = f"{100.0 * part:.2g} % of the largest"

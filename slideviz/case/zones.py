@@ -8,6 +8,7 @@ from dataclasses import replace
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.motions.onto import Onto
+from slideviz.case.words import first_of
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
@@ -43,9 +44,9 @@ def _of_zone(case: Case, mesh: Mesh) -> Case:
             motions.append(replace(motion, marker=one) if motion.marker else motion)
     roles = {name: role for name, role in case.roles.items() if name not in others}
     idle = "periodic" in case.roles.values() and "periodic" not in roles.values()
-    listed = ", ".join(sorted(others)[:3]) + ", ..." * (len(others) > 3)
     plural = "boundaries" if len(others) > 1 else "boundary"
-    text = f"zone {mesh.zone} alone: {len(others)} {plural} of other zones left out ({listed})"
+    listed = f"{len(others)} {plural} of other zones left out ({first_of(sorted(others))})"
+    text = f"zone {mesh.zone} alone: {listed}"
     return case.change(
         roles=roles,
         motions=tuple(motions),

@@ -41,6 +41,7 @@ def add_config(call: argparse.ArgumentParser) -> None:
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
+    from slideviz.case.words import counted
     from slideviz.cli.output_paths import add_case_inputs
     from slideviz.design.su2.config import own_changes, read_config
     from slideviz.design.su2.on_mesh import on_mesh, read_mesh
@@ -55,9 +56,8 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
         if each.variables[0].kind == "SURFACE_FILE":
             arguments.inputs.setdefault(each.files["DV_FILENAME"], "the surface file")
     if not arguments.quiet and config.ignored:
-        count = len(config.ignored)
-        words = f"{count} other key{'s' * (count > 1)} of SU2 in {arguments.case} not needed here"
-        say("note", words)
+        keys = counted(len(config.ignored), "other key")
+        say("note", f"{keys} of SU2 in {arguments.case} not needed here")
     file = config.case.mesh_file
     assert file is not None
     if not file.exists() and (arguments.case.parent / file).exists():

@@ -146,8 +146,9 @@ def _print(report: dict[str, Any], words: str, found: Quality, before: Quality) 
 def _inverted(found: Quality) -> str:
     """Return a sentence with the number of inverted cells that are left, and remedies."""
     cells = found.inverted_cells(5)
-    named = ", ".join(map(str, cells)) + " ..." * (found.inverted > len(cells))
+    named = ", ".join(map(str, cells))
+    more = " ..." if found.inverted > len(cells) else ""
     return (
-        f"{found.inverted} of {found.cells} cells are still inverted ({named}); what may help: "
-        "--sliding for boundaries beside them, or another mesh of the boundary there"
+        f"{found.inverted} of {found.cells} cells are still inverted ({named}{more}); what may "
+        "help: --sliding for boundaries beside them, or another mesh of the boundary there"
     )

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.limits import LimitResult, check_case_limits, names_text, value_words
+from slideviz.case.limits import LimitResult, check_case_limits, value_words
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.motions.onto import Remaining
-from slideviz.case.words import counted
+from slideviz.case.words import counted, first_of
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.metrics import MetricValues
@@ -186,9 +186,7 @@ def metric_lines(
             rows += [("  undeformed", *_ends(old))] if old else []
     lines = [table(rows)] if len(rows) > 1 else []
     if numbers and not layered:
-        lines.append(
-            f"  {', '.join(numbers)}: no boundary layers at {names_text([*(walls or ())])}"
-        )
+        lines.append(f"  {', '.join(numbers)}: no boundary layers at {first_of([*(walls or ())])}")
     return "\n".join(["metrics:", *lines])
 
 
@@ -209,7 +207,7 @@ def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
     if before and not entry["passed"] and not entry["undeformed_passed"]:
         before = f"the undeformed mesh misses it, too: {entry['undeformed']:.6g}"
-    place = f" at {names_text(names)}" if names and entry["failing"] else ""
+    place = f" at {first_of(names)}" if names and entry["failing"] else ""
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
     return value, before, "met" if entry["passed"] else f"not met{place}{cells}"
 
@@ -299,9 +297,9 @@ def info_report(
 
 def zone_words(zone: int | None, zones: int) -> str:
     """Return which zone of a file a mesh is, after a comma; "" where it has only one."""
-    return f", {f'zone {zone} of' if zone else 'all'} {zones}{'' if zone else ' zones'}" * (
-        zones > 1
-    )
+    if zones == 1:
+        return ""
+    return f", zone {zone} of {zones}" if zone else f", all {zones} zones"
 
 
 def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:

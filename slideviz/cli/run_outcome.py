@@ -140,10 +140,12 @@ def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
 
     missed = [entry for entry in limits if not entry["passed"]]
     for entry in missed:
-        named = ", ".join(map(str, entry["cells"][:5])) + " ..." * (entry["failing"] > 5)
+        named = ", ".join(map(str, entry["cells"][:5]))
+        more = " ..." if entry["failing"] > 5 else ""
         value, before, outcome = limit_words(entry)
-        sentence = f"the limit {entry['limit']} is {outcome}{f' ({named})' * bool(named)}: {value}"
-        print(f"slideviz: {sentence}{f', {before}' * bool(before)}", file=sys.stderr)
+        cells = f" ({named}{more})" if named + more else ""
+        sentence = f"the limit {entry['limit']} is {outcome}{cells}: {value}"
+        print(f"slideviz: {sentence}{f', {before}' if before else ''}", file=sys.stderr)
     if missed and advice:
         print(f"slideviz: {advice}", file=sys.stderr)
     return LIMIT_MISSED if missed else DONE
@@ -199,7 +201,8 @@ def _print_run(
         rows.append((f"tolerance{chosen}", float(reduction["tolerance"])))
     radius = report["support_radius"]
     if radius["used"] is not None:
-        rows.append((f"support radius{' (AUTO)' * radius['automatic']}", radius["used"]))
+        chosen = " (AUTO)" if radius["automatic"] else ""
+        rows.append((f"support radius{chosen}", radius["used"]))
     if (relax := report["relax"]) is not None:
         words = f"{relax['rounds']} rounds, residual {relax['residual']:.2g}"
         if relax["limited"]:
@@ -280,8 +283,10 @@ def advice_for(
     every = [remedy.keys for remedy in remedies(case, beside, pitch, layers, folded)]
     if found is not None and not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
-        keep = ["LAYERS= AUTO"] * (walls and case.layers == "no")
-        every = [*keep, *["RELAX= YES"] * (case.relax == "no"), *every]
+        if case.relax == "no":
+            every.insert(0, "RELAX= YES")
+        if walls and case.layers == "no":
+            every.insert(0, "LAYERS= AUTO")
     ideas = "; ".join(every)
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")
 

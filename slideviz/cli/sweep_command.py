@@ -262,15 +262,14 @@ def _print_sweep(report: dict[str, Any]) -> None:
 
 def _counted(designs: Sequence[int]) -> str:
     """Return how many designs there are, with the first of them."""
-    return f"{len(designs)}  (design {_first(designs)})"
+    from slideviz.case.words import first_of
 
-
-def _first(designs: Sequence[int]) -> str:
-    return ", ".join(map(str, designs[:_LISTED])) + ", ..." * (len(designs) > _LISTED)
+    return f"{len(designs)}  (design {first_of(designs, _LISTED)})"
 
 
 def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason with its designs."""
+    from slideviz.case.words import first_of
     from slideviz.cli.report import print_remarks
 
     print_remarks(warnings, quiet=quiet)
@@ -280,6 +279,6 @@ def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> No
             reasons.setdefault(row.problem, []).append(row.design)
     for reason, failed in list(reasons.items())[:_LISTED]:
         word = "design" if len(failed) == 1 else "designs"
-        print(f"slideviz: warning: {word} {_first(failed)}: {reason}", file=sys.stderr)
+        print(f"slideviz: warning: {word} {first_of(failed, _LISTED)}: {reason}", file=sys.stderr)
     if len(reasons) > _LISTED:
         print(f"slideviz: warning: and {len(reasons) - _LISTED} more reasons", file=sys.stderr)

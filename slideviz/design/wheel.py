@@ -134,7 +134,9 @@ def wheel(
     if len(rows) > max(counts):
         raise CaseError(f"the table has {len(rows)} rows for {max(counts)} passages; one for each")
     _require_passages(case, mesh, [row.case for row in rows], counts)
-    cases = [*(row.case for row in rows), *[case] * (len(rows) < max(counts))]
+    cases = [row.case for row in rows]
+    if len(rows) < max(counts):
+        cases.append(case)
     points, warnings = [], list[str]()
     for each in cases:
         points.append(mesh.points)

@@ -230,7 +230,9 @@ class Box:
         words += " x ".join(str(self.orders[axis]) for axis in axes if self.orders)
         words += f", in {self.parent}" if self.parent else ""
         count = sum(len(nodes) for nodes, _ in self.embedded.values())
-        return words + f", {count:,} surface points of {', '.join(self.embedded)}" * bool(count)
+        if count:
+            words += f", {count:,} surface points of {', '.join(self.embedded)}"
+        return words
 
     def factors(self, uvw: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return for each direction the blending functions and their slopes at uvw, (m, count)."""

@@ -227,7 +227,8 @@ class Autosave(QObject):
         if table.rows:
             write_results(_designs_file(self.path), table)
             private_file(_designs_file(self.path))
-            remarks += [CURRENT] * up_to_date
+            if up_to_date:
+                remarks.append(CURRENT)
         else:
             _designs_file(self.path).unlink(missing_ok=True)
         write_case(self.path, case, remarks)

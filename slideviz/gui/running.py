@@ -243,8 +243,8 @@ class Running(QObject):
         )
         if heights := heights_words(run.last, run.case):
             text += f", first heights {heights} of those before"
-        missed = limits_words(run)
-        text += f", {missed}" * bool(missed)
+        if missed := limits_words(run):
+            text += f", {missed}"
         if words := repair_words(run):
             text += f", {words}"
         log.info("done: %s", text)

@@ -305,7 +305,7 @@ def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> Non
         if one.drawn:
             lines = joined(list(one.drawn.values()))
             curve = curve_of(lines, section, one.paint.values, one.paint.inverted)
-            rows.append(CurveRow(one.name * (len(shown) > 1), curve))
+            rows.append(CurveRow(one.name if len(shown) > 1 else "", curve))
     paint = shown[0].paint
     labels = position_label(section).full, QUANTITIES[paint.label].axis
     colors = Colors(paint.color_map, paint.limits)

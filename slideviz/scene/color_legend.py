@@ -174,7 +174,7 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     """
     scheme, font_scale, title = stage.scheme, stage.font_scale, what.label
     name, _, program = title.partition(" (")  # beside the name there is no place for the program
-    words = (f"({program}" * bool(program), what.unit)
+    words = (f"({program}" if program else "", what.unit)
     below = " ".join(filter(None, words)) if len(program) < _LONG else "\n".join(words).strip()
     scale = stage.pixel_scale
     bar = stage.plotter.add_scalar_bar(

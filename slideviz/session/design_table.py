@@ -166,10 +166,9 @@ class DesignTable:
                 reasons.setdefault(self.reason(number, mesh), []).append(number)
         failed = len(self.results) - done
         parts = [f"{counted(done, 'design')} done"]
-        parts += [f"{failed:,} failed"] * bool(failed)
-        parts += [f"{bad:,} with inverted cells"] * bool(bad)
         missing = sum(bool(row.limits.removesuffix(MET)) for row in self.results.values())
-        parts += [f"{missing:,} that miss limits"] * bool(missing)
+        words = ((failed, "failed"), (bad, "with inverted cells"), (missing, "that miss limits"))
+        parts += [f"{count:,} {what}" for count, what in words if count]
         lines = [f"{_named(numbers)}: {reason}" for reason, numbers in reasons.items()]
         return "\n".join(["; ".join(parts), *lines])
 
@@ -178,7 +177,7 @@ def _named(numbers: list[int]) -> str:
     """Return words for designs by their numbers, the first ones of many: "Designs 1, 2"."""
     first = ", ".join(map(str, numbers[:_NAMED]))
     more = f" and {len(numbers) - _NAMED:,} more" if len(numbers) > _NAMED else ""
-    return f"Design{'s' * (len(numbers) > 1)} {first}{more}"
+    return f"{'Design' if len(numbers) == 1 else 'Designs'} {first}{more}"
 
 
 def _settings(case: Case) -> Case:

@@ -86,6 +86,6 @@ def typed_words(session: Session) -> str:
     factor = factor_of(session.case.motions, run.case.motions)
     if factor is None or result_settings(case) != result_settings(run.case):
         return ""
-    more = " or more" * (safe.cell is None)
+    more = " or more" if safe.cell is None else ""
     part = "" if factor == 1 else f" ({100 * factor:.3g} % of its motion)"
     return f"By {run.label}{part}, it {reach_words(safe.fraction / factor)}{more}."

@@ -64,7 +64,7 @@ def wall_rows(session: Session) -> list[WallRow]:
 
 
 def _text(value: float | None, form: str) -> str:
-    unit = "°" * form.endswith("°")
+    unit = "°" if form.endswith("°") else ""
     return "–" if value is None else format(value, form.removesuffix(unit)) + unit
 
 

@@ -269,7 +269,10 @@ def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
     along = np.concatenate([np.eye(dim), normals])
     block = blocks(ConstraintRows(np.arange(len(along)), along, np.zeros((len(along), 1))))
     each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
-    return [int(n) for n in each if n] + [nodes] * setup.tracks.curved
+    systems = [int(n) for n in each if n]
+    if setup.tracks.curved:
+        systems.append(nodes)
+    return systems
 
 
 def _require_free(needed: float, what: str, remedy: str) -> None:

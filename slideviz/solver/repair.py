@@ -145,10 +145,10 @@ def _case_alone(
     except CaseError as problem:
         wrong.append(str(problem).replace("REPAIR_BELOW", "below"))
     periodic = case.markers_with("periodic")
-    odd = f"periodic: {', '.join(periodic)}; boundaries repeat in pairs, so name both of each"
-    raise_all(
-        (*problems, *twice, *unknown_markers(mesh, roles), *wrong, *[odd] * (len(periodic) % 2))
-    )
+    if len(periodic) % 2:
+        rule = "boundaries repeat in pairs, so name both of each"
+        wrong.append(f"periodic: {', '.join(periodic)}; {rule}")
+    raise_all((*problems, *twice, *unknown_markers(mesh, roles), *wrong))
     if lists["sliding"] or periodic:
         case = case.change(sliding="ps")
     if periodic:
@@ -280,7 +280,8 @@ def unmendable_words(
 
     cells = [one.cell if number is None else int(number[one.cell]) for one in impossible]
     reasons = [f"its nodes are {on([one])}" for one in impossible]
-    first = ", ".join(map(str, cells[:5])) + " ..." * (len(cells) > 5)
+    first = ", ".join(map(str, cells[:5]))
+    first += " ..." if len(cells) > 5 else ""
     sentence = (
         f"{counted(len(cells), 'cell')} cannot be mended ({first}): the nodes that make them bad "
         f"are {on(impossible)}, so that no motion of the others helps; let that boundary slide, "

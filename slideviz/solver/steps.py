@@ -96,7 +96,8 @@ class MeshRepair:
         before, after = len(self.folded), len(self.folded_left)
         poor = len(self.left) - after
         if before:
-            left = f", {poor:,} {'is' if poor == 1 else 'are'} poor" * bool(poor)
+            verb = "is" if poor == 1 else "are"
+            left = f", {poor:,} {verb} poor" if poor else ""
             return f"{before - after:,} of {before:,} folded cells mended{left}"
         if not len(self.cells):
             return "no cell needs repair"

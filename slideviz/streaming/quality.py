@@ -99,9 +99,11 @@ def quality_blocks(
         if isinstance(source, FileSource) and not may_fold:
             before, signs = len(signs), orientations_of(np.concatenate([signs, measured.signs]))
             for zone in source.zones if before < 2 == len(signs) else ():
-                remedy = "compare a deformed mesh with --reference UNDEFORMED, "
+                remedy = ""
+                if zone.base is None:
+                    remedy = "compare a deformed mesh with --reference UNDEFORMED, "
                 parts = [(k, min(k + CELLS, zone.n_cells)) for k in range(0, zone.n_cells, CELLS)]
-                require_consistent_orientation(zone, parts, remedy=remedy * (zone.base is None))
+                require_consistent_orientation(zone, parts, remedy=remedy)
         yield replace(block, quality=measured)
 
 

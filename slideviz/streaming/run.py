@@ -157,7 +157,10 @@ def stream(
     total = max(1, case.steps)
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
-    remaining = RemainingTime(report, first, "solve", "evaluate", "quality", *("write",) * is_text)
+    phases = [first, "solve", "evaluate", "quality"]
+    if is_text:
+        phases.append("write")
+    remaining = RemainingTime(report, *phases)
     timer = PhaseTimer(lambda phase, part: remaining(Progress(total, total, phase, part)))
     with ExitStack() as stack:
         with timer.phase("read") as tick:

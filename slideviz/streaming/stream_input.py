@@ -151,7 +151,7 @@ def open_for_run(
             name = printable(path.name)
             for place in places:
                 require_text_names(name, (marker.name for marker in place.markers))
-            lost = [OTHER_ZONES] * (source.zones > len(places))
+            lost = [OTHER_ZONES] if source.zones > len(places) else []
             warn(sentence_of_lost(output, name, lost, ".su2b"))
         size = bytes_of_run(places, source.width, size, 0, is_text=is_text, later=later)
         require_disk_space(output, output, size - reusable_bytes(output))

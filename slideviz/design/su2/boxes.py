@@ -21,7 +21,7 @@ from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
 from slideviz.design.su2.on_mesh import problems_of_markers
 from slideviz.design.su2.shapes import Displacer
-from slideviz.design.su2.variables import DesignVariable, angle_notes
+from slideviz.design.su2.variables import DesignVariable, angle_notes, places_words
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
@@ -143,8 +143,10 @@ def held_by_continuity(
                 continue
             request = request_of(config, variable)
             free, left = (sum(map(reach, moves_of(box, request, to))) for to in (NONE, held))
-            stuck += [place] * (left == 0 < free)
-            partly += [place] * (0 < left < free)
+            if left == 0 < free:
+                stuck.append(place)
+            elif left < free:
+                partly.append(place)
         effects = [(stuck, "do nothing"), (partly, "leave the control points there")]
         if asking:
             asked = asking[0].words["FFD_CONTINUITY"].upper()
@@ -183,13 +185,6 @@ def _words(held: Planes) -> str:
         for letter, planes in zip("ijk", held, strict=True)
         if planes
     )
-
-
-def places_words(places: list[int]) -> str:
-    """Return numbers of variables, from 1, in words, six at most."""
-    more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-    listed = f"variable{'s' * (len(places) > 1)} {', '.join(map(str, places[:6]))}{more}"
-    return f"{listed} of DV_KIND"
 
 
 @dataclass(frozen=True, eq=False)

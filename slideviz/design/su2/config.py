@@ -26,7 +26,7 @@ from slideviz.case.lines import (
 )
 from slideviz.case.model import NEW, Case
 from slideviz.case.values import YES_NO, integer, real
-from slideviz.case.words import list_of, number
+from slideviz.case.words import first_of, list_of, number
 from slideviz.design.su2.variables import (
     NOTHING,
     DesignVariable,
@@ -325,7 +325,7 @@ def _list_warnings(
 ) -> Iterator[str]:
     """Yield what is strange about a configuration in the CONFIG_LIST of ``path``."""
     if len(numbers) > 1:
-        zones = ", ".join(map(str, numbers[:3])) + ", ..." * (len(numbers) > 3)
+        zones = first_of(numbers)
         yield (
             f"{path}: CONFIG_LIST has {file} {len(numbers)} times, for the zones {zones}; list a "
             "file for each zone, unless they shall have the same keys"

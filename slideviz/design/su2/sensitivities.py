@@ -229,7 +229,9 @@ def _restart(config: Su2Config, zone: str = "") -> Path:
     if config.words["READ_BINARY_RESTART"].upper() == "YES":
         endings.reverse()
     tried = [one.with_name(one.name + end) for one in (*stems, stem) for end in endings]
-    for path in (*tried, *[adjoint_file] * (not zone)):
+    if not zone:
+        tried.append(adjoint_file)
+    for path in tried:
         if path.is_file():
             return path
     raise CaseError(

@@ -309,10 +309,16 @@ def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[D
         if reason:
             reasons.setdefault(reason, []).append(f"{place} ({each.kind})")
     for reason, places in reasons.items():
-        more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-        sentence = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
-        warnings.append(f"{sentence} will have no effect, as in SU2: {reason}; make two runs")
+        sentence = f"{places_words(places)} will have no effect, as in SU2: {reason}"
+        warnings.append(f"{sentence}; make two runs")
     return tuple(marked)
+
+
+def places_words(places: Sequence[object]) -> str:
+    """Return places of variables, from 1, in words, six at most."""
+    noun = "variable" if len(places) == 1 else "variables"
+    more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+    return f"{noun} {', '.join(map(str, places[:6]))}{more} of DV_KIND"
 
 
 def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:

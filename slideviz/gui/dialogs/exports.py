@@ -465,8 +465,10 @@ class PictureDialog(PixelFields, QDialog):
     def _changed(self, _: object = None) -> None:
         options = self.picture_options
         too_large = max(options.size) > LARGEST or min(options.size) < SMALLEST
-        rule = f": width and height can be {SMALLEST} to {LARGEST} pixels" * too_large
-        self.words.setText(size_words(options) + rule)
+        words = size_words(options)
+        if too_large:
+            words += f": width and height can be {SMALLEST} to {LARGEST} pixels"
+        self.words.setText(words)
         set_style(self.words, "bad", too_large)
         for button in (self.save, self.copy):
             button.setEnabled(not too_large)

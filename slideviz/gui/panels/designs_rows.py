@@ -93,7 +93,7 @@ class DesignsModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         if role == Qt.ItemDataRole.ToolTipRole and row is not None:
-            missed = f"Not met: {row.limits}" * bool(row.limits.removesuffix(MET))
+            missed = f"Not met: {row.limits}" if row.limits.removesuffix(MET) else ""
             return wrapped("\n".join(filter(None, [row.problem, missed, *row.warnings]))) or None
         if column < 0:
             shown = role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.EditRole)

@@ -129,7 +129,8 @@ class WorstModel(QAbstractTableModel):
     @property
     def headers(self) -> tuple[str, ...]:
         first, _, since = COLUMNS
-        zone, last = (ZONE,) * self._zoned, (LAST,) * self._mixed
+        zone = (ZONE,) if self._zoned else ()
+        last = (LAST,) if self._mixed else ()
         return (first, self._measure, since, *zone, *self.names, *last)
 
     @property
