@@ -322,9 +322,10 @@ def _require_output_paths(
     assert case.mesh_file is not None
     ours = "|".join(map(re.escape, endings(lambda row: row.solver)))
     may_force = not arguments.force and same_file(output, case.mesh_file)
+    asked = "MESH_OUT_FILENAME" if case.mesh_out else "without -o"
     mesh = OutputPath(
         output,
-        "-o" if arguments.output else "MESH_OUT_FILENAME" if case.mesh_out else "without -o",
+        "-o" if arguments.output else asked,
         named=bool(arguments.output),
         is_mesh=_format_of(output, case) is None,
         replaces=case.mesh_file if arguments.force else None,

@@ -341,7 +341,9 @@ def _section_and_passages(
 def _between(walls: SpanWalls | None) -> dict[str, Any]:
     """Return hub and shroud, of several zones those of each."""
     pairs = [[one.hub, one.shroud] for one in walls.channels] if walls is not None else []
-    return {} if not pairs else {"between": pairs[0] if len(pairs) == 1 else pairs}
+    if not pairs:
+        return {}
+    return {"between": pairs[0] if len(pairs) == 1 else pairs}
 
 
 def _as_json(chosen: Section) -> dict[str, Any]:

@@ -133,8 +133,11 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
         frame = one.frame
         assert frame is not None
         at = min(one.view.frame, len(one.frames) - 1)
-        place = (f"step {at} of {one.planned}" if several else "") if at else "undeformed"
-        place = "" if name == "Undeformed" else place
+        place = ""
+        if at and several:
+            place = f"step {at} of {one.planned}"
+        elif not at and name != "Undeformed":
+            place = "undeformed"
         numbers = caption(place, frame.quality, one.view.color_by).removeprefix(": ")
         titles.append(f"{name}\n{numbers}")
     return titles

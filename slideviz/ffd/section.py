@@ -463,9 +463,8 @@ def _written(box: Box, dim: int) -> Iterator[str]:
     orders = (box.orders[axis] for axis in axes) if box.orders else ()
     for letter, order in zip(letters, orders, strict=False):
         yield f"BSPLINE_ORDER_{letter}= {order}\n"
-    corners = (
-        given_of_polar(box.corners) if axes == (0, 2) else box.corners[: 4 if dim == 2 else 8, :dim]
-    )
+    given = 4 if dim == 2 else 8
+    corners = given_of_polar(box.corners) if axes == (0, 2) else box.corners[:given, :dim]
     yield f"FFD_PARENTS= 0\nFFD_CHILDREN= 0\nFFD_CORNER_POINTS= {len(corners)}\n"
     yield from (_tabbed(corner) + "\n" for corner in corners.tolist())
     yield from _control_lines(box.points)

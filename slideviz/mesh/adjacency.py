@@ -130,7 +130,9 @@ def _write_least(types, offsets, connectivity, locals_, first, owner, begin, end
     """Write the least node of each side from ``begin`` to ``end`` into ``least`` (s,)."""
     for side in range(begin, end):
         a, b, c, _ = _nodes_of(types, offsets, connectivity, locals_, first, owner, side)
-        least[side] = a if a >= 0 else b if b >= 0 else c
+        if a < 0:
+            a = b if b >= 0 else c
+        least[side] = a
 
 
 @njit(nogil=True, cache=True)

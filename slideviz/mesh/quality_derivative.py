@@ -333,7 +333,9 @@ def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
     halo = np.zeros(len(margins), bool) if mesh.halo is None else mesh.halo.cells
     least = float(margins[~halo].min())
     total, gradient = 0.0, np.zeros(mesh.points.shape)
-    power = p + 1 if least > 0 else p - 1 if least < 0 else 1
+    power = p - 1 if least < 0 else 1
+    if least > 0:
+        power = p + 1
     _, signs = reference_of(reference)
 
     def pull(block: Block) -> tuple[float, IntArray, FloatArray]:

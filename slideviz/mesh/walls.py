@@ -195,7 +195,11 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
             if edges[e, 0] < 0:
                 break
             one, two = nodes[edges[e, 0]], nodes[edges[e, 1]]
-            other = two if one == chain[i, layer] else one if two == chain[i, layer] else -1
+            other = -1
+            if one == chain[i, layer]:
+                other = two
+            elif two == chain[i, layer]:
+                other = one
             if other >= 0 and not _has(chain[:width, layer], other):
                 end = other
         chain[i, layer + 1] = end

@@ -56,7 +56,9 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
 @njit(inline="always", **OPTIONS)
 def _image(item, count):  # type: ignore[no-untyped-def]
     """Return ``item // count``: 0 for a triangle, 1 or 2 for an image; faster than dividing."""
-    return 0 if item < count else 1 if item < 2 * count else 2
+    if item < count:
+        return 0
+    return 1 if item < 2 * count else 2
 
 
 @njit(**OPTIONS)

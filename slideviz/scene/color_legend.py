@@ -188,7 +188,9 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     bar.SetUnconstrainedFontSize(True)
     bar.SetTitle(f"{name}\n{below}" if below else name)
     # Longer words would be cut off at the edge of the view.
-    size = (14 if len(name) < _LONG else 13) if not below else 12 if len(name) < 15 else 10
+    size = 14 if len(name) < _LONG else 13
+    if below:
+        size = 12 if len(name) < 15 else 10
     set_letters(bar.GetTitleTextProperty(), scheme, size * font_scale)
     set_letters(bar.GetLabelTextProperty(), scheme, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), scheme, 12 * font_scale)

@@ -225,7 +225,11 @@ class BoundaryLayer(Layer):
         else:
             self.stage.edges(one.actor.prop, "edges" in view.drawn)
             inside, glass = looks_inside(session), name in self.glass
-            opacity = 0.12 if inside else GLASS if glass else SEE_THROUGH if self._buried else 1.0
+            opacity = SEE_THROUGH if self._buried else 1.0
+            if inside:
+                opacity = 0.12
+            elif glass:
+                opacity = GLASS
             see_through(one.actor, opacity)
             if inside or self._buried:
                 one.actor.prop.show_edges = False

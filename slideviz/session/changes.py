@@ -253,7 +253,9 @@ def _restricted_to_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion |
     moving = tuple(name for name in names if roles.get(name) == "moving")
     if moving == names:
         return motion
-    return replace(motion, marker=moving if len(moving) > 1 else moving[0]) if moving else None
+    if not moving:
+        return None
+    return replace(motion, marker=moving if len(moving) > 1 else moving[0])
 
 
 @undoable("confirming guesses")

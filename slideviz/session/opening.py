@@ -53,7 +53,9 @@ def open_mesh(
     flat = view.flat_index
     if mesh.part is not None:
         view = replace(view, threshold=None)  # needs the values of all cells
-    view = replace(view, section_index=flat if flat is not None else 0 if view.sections else None)
+    if flat is None and view.sections:
+        flat = 0
+    view = replace(view, section_index=flat)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
     session = Session(mesh, path, chosen, guesses, tuple(pairs), first, view=view)

@@ -12,6 +12,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.box import BoxMotion
 from slideviz.case.motions.motion import applies_to
+from slideviz.case.words import counted
 from slideviz.errors import Note
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
@@ -38,8 +39,8 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
 
     if case.method != "rbf" or case.reduction is not None:
         return ""
-    counted = [m.nodes for m in mesh.markers if case.roles.get(m.name, "fixed") != "internal"]
-    count = len(np.unique(np.concatenate([*counted, np.empty(0, np.int64)])))
+    nodes = [m.nodes for m in mesh.markers if case.roles.get(m.name, "fixed") != "internal"]
+    count = len(np.unique(np.concatenate([*nodes, np.empty(0, np.int64)])))
     size = 8.0 * 2.6 * count**2
     if size < LARGE:
         return ""
@@ -117,13 +118,14 @@ def to_mend(session: Session) -> StepFrame | None:
 def inverted_words(run: Run) -> str:
     """Return the number of inverted cells after the last step in words; "" for none."""
     count = run.last.quality.inverted if run.last is not None else 0
-    return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
+    return counted(count, "inverted cell") if count else ""
 
 
 def limits_words(run: Run) -> str:
     """Return how many limits a run misses in words; "" where it misses none."""
     count = sum(not one.passed for one in run.last.limits) if run.last is not None else 0
-    return f"{count} limit{' is' if count == 1 else 's are'} not met" if count else ""
+    verb = "is" if count == 1 else "are"
+    return f"{counted(count, 'limit')} {verb} not met" if count else ""
 
 
 def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
@@ -295,6 +297,8 @@ def _words(found: re.Match[str]) -> str:
     label = key.label.removesuffix(" ×")  # which a message would have beside the × that closes it
     if first is None:
         return label
-    other = "" if second is None else key.kind.value_label(second)
-    more = "" if not link else f"{link}{second}" if other == second else f"{link}“{other}”"
-    return f"{label} “{key.kind.value_label(first)}”{more}"
+    words = f"{label} “{key.kind.value_label(first)}”"
+    if second is None:
+        return words
+    other = key.kind.value_label(second)
+    return f"{words}{link}{second if other == second else f'“{other}”'}"

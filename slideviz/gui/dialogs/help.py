@@ -25,6 +25,7 @@ from qtpy.QtWidgets import (
 )
 
 import slideviz
+from slideviz.case.words import counted
 from slideviz.gui.commands import MENUS
 from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.command import CommandState
@@ -456,8 +457,8 @@ class ManualDialog(QDialog):
                 one.setHidden(not there)
             section.setHidden(not any(matches))
             self._found += [path for path, there in zip(paths, matches, strict=True) if there]
-        pages_found = "1 page" if len(self._found) == 1 else f"{len(self._found)} pages"
-        self.count.setText((pages_found if self._found else "Nothing found") if words else "")
+        found = counted(len(self._found), "page") if self._found else "Nothing found"
+        self.count.setText(found if words else "")
 
     def _next(self) -> None:
         """Select the next place of the words; where the page has none, that of the first found."""

@@ -155,10 +155,9 @@ class BoundariesPanel(Panel):
         count = len(session.guesses)
         self.keep.setVisible(count > 0)
         self.guess_text.setVisible(count > 0 or (session.mesh is not None and not names))
+        guesses = "role is a guess" if count == 1 else "roles are guesses"
         self.guess_text.setText(
-            f"{count} {'roles are guesses' if count > 1 else 'role is a guess'} (marked ?)."
-            if count
-            else "This mesh has no named boundaries."
+            f"{count} {guesses} (marked ?)." if count else "This mesh has no named boundaries."
         )
 
     def _fill(self, session: Session, rows: tuple[tuple[str, int], ...]) -> None:

@@ -310,7 +310,7 @@ class DesignsPanel(Panel):
             widget.setEnabled(able)
         if in_file:
             self._show_status("This mesh stays in its file: sweep it with `slideviz sweep`.")
-        self.run.setText(f"Run {count:,} design{'' if count == 1 else 's'}" if count else "Run")
+        self.run.setText(f"Run {counted(count, 'design')}" if count else "Run")
         done = rows and not count
         self.run.setToolTip("All designs are done with these settings." if done else RUN)
         for part, seen in ((self.bar, busy), (self.stop, busy), (self.run, not busy)):

@@ -69,13 +69,14 @@ class DesignsModel(QAbstractTableModel):
             return str(section + 1) if role == Qt.ItemDataRole.DisplayRole else None
         values = len(self.table.columns)
         if section < values:
-            shown = role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole)
             name = self.table.columns[section]
             # In two lines: columns are many, and the room is not wide.
             sign = "." if "." in name else "_"
             head, found, part = name.rpartition(sign)
             short = f"{head}{sign.strip('.')}\n{part}" if found else name
-            return short if role == Qt.ItemDataRole.DisplayRole else name if shown else None
+            if role == Qt.ItemDataRole.DisplayRole:
+                return short
+            return name if role == Qt.ItemDataRole.ToolTipRole else None
         name = list(RESULTS)[section - values]
         if role == Qt.ItemDataRole.DisplayRole:
             return RESULTS[name][0]

@@ -243,7 +243,9 @@ class HistogramPanel(Panel):
         # The bar of the inverted cells is left of the first value: a range that lies there
         # selects them only, and one that begins there begins at 0.
         (low, high), left = band, first_value(self.canvas.figure.axes[0])
-        self._pending_range = ONLY_INVERTED if high < left else (0.0 if low < left else low, high)
+        if low < left:
+            low = 0.0
+        self._pending_range = ONLY_INVERTED if high < left else (low, high)
         if not self._timer.isActive():
             self._timer.start()
 
