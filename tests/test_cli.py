@@ -840,3 +840,21 @@ def test_a_missed_limit_of_walls_says_where_and_whether_the_undeformed_mesh_miss
     mesh = ["quality", str(tmp_path / "mesh.su2"), "--limits"]
     assert run([*mesh, "height_ratio > 0.5"]) == 1
     assert "compares with the undeformed mesh; give it (--ref" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        ImportError("libopenblas.so: failed to map segment from shared object"),
+        ImportError("libmkl.so: cannot allocate memory in static TLS block"),
+        OSError("Could not find/load shared object file 'libllvmlite.so'"),
+    ],
+)
+def test_a_library_that_finds_no_memory_is_told_as_that(problem, monkeypatch, capsys):
+    def fails(_):
+        raise problem
+
+    monkeypatch.setattr("slideviz.cli.parser.parse", fails)
+    assert run(["info", "a.su2"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("slideviz: there is not enough memory to load the libraries that this")

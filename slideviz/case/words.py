@@ -7,13 +7,14 @@ one. So a name may have any character but a line break.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from slideviz.errors import CaseError, shown
+from slideviz.mesh.check import LARGEST
 
+LARGEST_ANGLE = 1e9  # in degrees
 COMMENT_SIGNS = "%#$"
 _WORD = re.compile(r'"(?P<quoted>(?:[^"]|"")*)"|(?P<sign>[(),;])|(?P<plain>[^\s(),;"]+)|(?P<bad>")')
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
@@ -100,13 +101,26 @@ def is_number(text: str) -> bool:
 
 
 def number(text: str) -> float:
-    """Return the finite number that a text is, or raise CaseError."""
+    """Return the number that a text is; CaseError if it is none, or too large to compute with."""
     if not is_number(text):
         hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
         raise CaseError(f"{shown(text)} is not a number{hint}")
     value = float(text)
-    if not math.isfinite(value):
-        raise CaseError(f"{shown(text)} is too large for a number; expected a finite one")
+    if abs(value) > LARGEST:
+        raise CaseError(
+            f"{shown(text)} is too large to compute with; expected a number up to {LARGEST:g}"
+        )
+    return value
+
+
+def angle_deg(text: str) -> float:
+    """Return the angle in degrees that a text is; CaseError if none of its digits counts."""
+    value = number(text)
+    if abs(value) > LARGEST_ANGLE:
+        raise CaseError(
+            f"the angle {text} is too large: expected degrees up to {LARGEST_ANGLE:g}, above which "
+            "rounding is more than a ten millionth of a degree"
+        )
     return value
 
 

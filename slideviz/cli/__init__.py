@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 import time
 import traceback
@@ -74,10 +75,13 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         # The reader of the output has ended (`slideviz info MESH | head`): that is no error.
         return DONE
     except OSError as problem:
-        return _fail(str(problem), WRONG_INPUT)
+        text = NO_MEMORY if _NO_MEMORY.search(str(problem)) else str(problem)
+        return _fail(text, WRONG_INPUT)
     except Exception as problem:
         if os.environ.get("SLIDEVIZ_DEBUG"):
             traceback.print_exc()
+        if isinstance(problem, ImportError) and _NO_MEMORY.search(str(problem)):
+            return _fail(NO_MEMORY, WRONG_INPUT)
         missing = (isinstance(problem, ModuleNotFoundError) and problem.name) or "slideviz"
         if not missing.startswith("slideviz"):
             return _fail(
@@ -90,6 +94,14 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
             "output of the same command under SLIDEVIZ_DEBUG=1",
             WRONG_INPUT,
         )
+
+
+NO_MEMORY = (
+    "there is not enough memory to load the libraries that this needs; close other programs, or "
+    "raise the limit (ulimit -v)"
+)
+_NO_MEMORY = re.compile("cannot allocate|failed to map|load shared object", re.IGNORECASE)
+"""What the system's loader says, and llvmlite, where a library finds no room in memory."""
 
 
 def _fail(message: str, code: int) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.argument_types import check_fields
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
+from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.cone import Cone
@@ -75,6 +76,11 @@ class Section:
         numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms
         if not np.isfinite(numbers).all():
             raise CaseError(f"{self.kind} section: {numbers} has a number that is not finite")
+        if not within(np.array(numbers), LARGEST):
+            raise CaseError(
+                f"{self.kind} section: {numbers} has a number too large to compute with; expected "
+                f"numbers up to {LARGEST:g}"
+            )
         if not np.linalg.norm(self.direction) > 0:
             raise CaseError(
                 f"{self.kind} section: the {terms.direction} 0, 0, 0 has no direction; give 0, 0, "

@@ -20,8 +20,9 @@ from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
-positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
+finite = st.floats(-1e50, 1e50)
+angle = st.floats(-1e9, 1e9)
+positive = st.floats(0, 1e50, exclude_min=True)
 text = st.text(
     st.characters(codec="utf-8", exclude_characters="\n\r\0"), min_size=1, max_size=12
 ) | st.sampled_from(
@@ -50,7 +51,7 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
     vector = st.tuples(finite, finite) | st.tuples(finite, finite, finite)
     return st.one_of(
         st.builds(Translate, marker, vector),
-        st.builds(Rotate, marker, finite, point, axis),
+        st.builds(Rotate, marker, angle, point, axis),
         st.builds(Scale, marker, factors, point),
         st.builds(Radial, marker, positive, finite, axis, st.tuples(finite, finite, finite)),
         st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
@@ -65,7 +66,8 @@ def curves(draw: st.DrawFn, marker) -> SpanMotion:
     kind = draw(st.sampled_from(list(SPAN_KINDS)))
     spans = draw(st.lists(st.floats(0, 1), min_size=1, max_size=4, unique=True))
     spans = tuple(sorted(spans if kind != "stagger" else spans[:1]))
-    values = st.tuples(*[positive if kind == "chord" else finite] * len(spans))
+    value = {"chord": positive, "twist": angle, "stagger": angle}.get(kind, finite)
+    values = st.tuples(*[value] * len(spans))
     three = st.tuples(finite, finite, finite)
     return SpanMotion(draw(marker), kind, spans, draw(values), draw(st.none() | three))
 

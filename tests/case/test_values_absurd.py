@@ -8,15 +8,20 @@ import pytest
 import slideviz as sv
 from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
+from slideviz.case.limits import read_limits
 from slideviz.case.model import Case
+from slideviz.case.motion_text import read_motions
 from slideviz.case.motions.rigid import Translate
+from slideviz.cli import run
 from slideviz.errors import ArgumentError, CaseError, UnsoundError
+from slideviz.mesh.check import LARGEST
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import Reduction
+from slideviz.sections.model import Section
 from tests import builders
 from tests.slow import one_of_each_fast
 
-TEXTS = ("1e300", "1.7e308", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
+TEXTS = ("1e300", "1.7e308", "1e49", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
 FIELDS = [key for key in KEYS.values() if key.group in (METHOD, REDUCTION)]
 REALS = [key.name for key in FIELDS if key.kind.allowed.startswith("a number")]
 REFUSED = {
@@ -63,6 +68,10 @@ def test_the_real_keys_are_found():
 @pytest.mark.parametrize(("text", "sliding"), one_of_each_fast(TEXTS, ["none", "ps", "ds"]))
 @pytest.mark.parametrize("name", REALS)
 def test_an_absurd_number_is_refused_or_works(name, text, sliding):
+    if float(text) > LARGEST:
+        with pytest.raises(CaseError, match=re.escape(f"'{text}' is too large to compute with")):
+            KEYS[name].kind.read(text)
+        return
     if name in REFUSED["small" if float(text) < 1 else "large"]:
         with pytest.raises(CaseError, match=f"{text} is out of range; expected a number "):
             KEYS[name].kind.read(text)
@@ -92,10 +101,78 @@ def test_the_ends_of_what_is_allowed_work(end, sliding):
     np.testing.assert_allclose(last.mesh.points[moved], mesh.points[moved] + (0.02, 0.01))
 
 
-@pytest.mark.parametrize("value", [1e-300, 1e300])
+@pytest.mark.parametrize("value", [1e-300, 1e49])
 def test_a_program_is_told_of_an_absurd_radius(value):
-    with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; expected"):
+    with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]\d+ is out of range; expected"):
         Case(influence_factor=value)
+
+
+MOTIONS = (
+    "(BLOCK, translate, #, 0.02)",
+    "(BLOCK, rotate, #, centroid)",
+    "(BLOCK, rotate, 5, #, 0.5)",
+    "(BLOCK, scale, #, centroid)",
+    "(BLOCK, scale, 1.1, 1.2, (0.5, #))",
+    "(BLOCK, radial, #, 0.01, (0.5, 0.5))",
+    "(BLOCK, radial, 1.03, #, (0.5, 0.5))",
+    "(BLOCK, radial, 1.03, 0.01, (#, 0.5))",
+    "(BLOCK, hicks-henne, upper, #, 0.01, 0.3, 0.7)",
+    "(BLOCK, hicks-henne, upper, 0.5, #, 0.3, 0.7)",
+    "(BLOCK, cst, upper, 1, 4, 0.01, #, 0.7)",
+    "(BLOCK, bump, 0.5, 0.01, 0.3, #)",
+    "(BLOCK, ffd, BOX, 1, 1, #, 0.01)",
+    "(BLOCK, ffd-camber, BOX, 1, #)",
+)
+BOX = "FFD_DEFINITION= (BOX, 0, 0, 0, #, 0, 0, 1, 1, 0, 0, 1, 0)\nFFD_DEGREE= (2, 2, 0)\n"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("text", ["1e300", "-1e300", "1e49", "-1e49", "1e-300", "5e-324"])
+@pytest.mark.parametrize("motion", [*MOTIONS, BOX], ids=lambda text: text[:26])
+def test_an_absurd_number_of_a_motion_is_refused_or_works(motion, text, tmp_path, capsys):
+    sv.write(tmp_path / "mesh.su2", builders.square(6))
+    case = "MESH_FILENAME= mesh.su2\nMARKER_MOVING= ( BLOCK )\n"
+    if motion == BOX:
+        case += BOX.replace("#", text) + f"MOTION= {MOTIONS[-1].replace('#', '0.01')}\n"
+    else:
+        case += BOX.replace("#", "1") + f"MOTION= {motion.replace('#', text)}\n"
+    (tmp_path / "a.cfg").write_text(case)
+    assert run(["run", str(tmp_path / "a.cfg"), "-q", "-o", str(tmp_path / "out.su2")]) in (0, 1, 3)
+    said = capsys.readouterr().err
+    assert "internal error" not in said
+    if abs(float(text)) > LARGEST:
+        assert f"'{text}' is too large to compute with; expected a number up to 1e+50" in said
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        "(BLADE, rotate, #, centroid)",
+        "(BLADE, ffd-twist, BOX, 1, #, y, 0, 0, 0)",
+        "(BLADE, twist, 0:0, 1:#)",
+        "(BLADE, stagger, #)",
+    ],
+)
+def test_an_angle_without_a_digit_that_counts_is_refused(motion):
+    for angle in ("1e10", "-1e20", "1e49"):
+        with pytest.raises(CaseError, match="is too large: expected degrees up to 1e"):
+            read_motions(motion.replace("#", angle))
+    read_motions(motion.replace("#", "1e9"))
+
+
+@pytest.mark.parametrize("text", ["inverted = 1e300", "min > -1e51"])
+def test_a_limit_too_large_to_compute_with_is_refused(text):
+    with pytest.raises(CaseError, match="too large to compute with"):
+        read_limits(text)
+
+
+@pytest.mark.parametrize("place", range(7))
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e51])
+def test_a_section_with_a_number_too_large_is_refused(place, value):
+    numbers = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5]
+    numbers[place] = value
+    with pytest.raises(CaseError, match="has a number too large to compute with; expected numbers"):
+        Section.of("cylinder", numbers[:3], numbers[3:6], numbers[6])
 
 
 NUMBERS = [key for key in FIELDS if key.kind.entry in ("real", "whole")]
@@ -123,8 +200,11 @@ def test_a_program_is_told_at_once_of_an_axis_or_point(field):
 
 @pytest.mark.filterwarnings("error")
 def test_a_program_is_told_of_absurd_steps_and_names():
-    case = Case(roles={"BLOCK": "moving"}, motions=(Translate("BLOCK", (0.02, 1e300)),))
-    with pytest.raises(CaseError, match=r"takes node \d+ to \(.*, 1e\+300\); .* so move it less"):
+    case = Case(
+        roles={"BLOCK": "moving"},
+        motions=(Translate("BLOCK", (0.02, 9e49)), Translate("BLOCK", (0.0, 9e49))),
+    )
+    with pytest.raises(CaseError, match=r"takes node \d+ to \(.*, 1.8e\+50\); .* so move it less"):
         next(sv.deform(case, builders.square(6)))
     assert case.change(steps="auto").steps == Case(steps="AUTO").steps == 0
     with pytest.raises(CaseError, match="a case has no 'stepz'; did you mean steps"):

@@ -25,7 +25,7 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
-from slideviz.case.words import Word, name_text, number
+from slideviz.case.words import Word, angle_deg, name_text, number
 from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.box import Box, Index
 from slideviz.ffd.kinds import Turn
@@ -324,7 +324,7 @@ class FfdTwist(BoxMotion):
         (plane,) = _integers(items[1:2])
         axis = read_axis(items[3 : 3 + n_axis])
         point = read_vector(items[3 + n_axis :], "the point")
-        return cls(marker, items[0].text, plane, number(items[2].text), point, axis)
+        return cls(marker, items[0].text, plane, angle_deg(items[2].text), point, axis)
 
     @classmethod
     def new(cls, marker: Target, start: NewMotion) -> Motion:

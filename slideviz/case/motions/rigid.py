@@ -29,7 +29,7 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
-from slideviz.case.words import Word, number
+from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -108,7 +108,7 @@ class Rotate(Motion):
         items = without_brackets(words)
         if not items:
             raise CaseError("the angle is missing; write rotate, angle in degrees, centroid")
-        angle = number(items[0].text)
+        angle = angle_deg(items[0].text)
         items = items[1:]
         at_centroid = bool(items) and _is_centroid(items[-1])
         # An axis is there if more follows than a point in the plane.

@@ -22,7 +22,7 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.spans import span_field, span_problems
 from slideviz.case.values import read_vector, vector_text
-from slideviz.case.words import Word, number
+from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError, MeshError, SlidevizError, shown
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.gap import bodies
@@ -102,6 +102,9 @@ class SpanMotion(Motion):
             raise CaseError("the point of the stacking line needs three coordinates: (x, y, z)")
         stack = read_vector(point, "the stacking point") if point else None
         spans, values = read_curve(" ".join(word.text for word in words[:start]))
+        if SPAN_KINDS[verb].unit == "°":  # type: ignore[index]
+            for value in values:
+                angle_deg(repr(value))
         return cls(marker, verb, spans, values, stack)  # type: ignore[arg-type]
 
     @classmethod

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import isclose, nan
+from math import isclose, isfinite, nan
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -137,7 +137,7 @@ def iterations(designs: Designs, time_step: float | None = None) -> dict[int, in
     for design in designs.rows:
         time = float(design.values[TIME])
         ratio = time / (time_step or 1.0)
-        whole = round(ratio)
+        whole = round(ratio) if isfinite(ratio) else -1
         if whole < 0 or not isclose(ratio, whole, rel_tol=1e-6, abs_tol=1e-6):
             of = f"time steps of {time_step:g}" if time_step else "time steps"
             raise CaseError(
