@@ -13,7 +13,6 @@ surfaces, each displaced by the nodes known before, and projected.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numba import prange
@@ -24,11 +23,14 @@ from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_co
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
 from slideviz.rbf.methods import largest_norm, within
-from slideviz.rbf.operations import columns, each_of
+from slideviz.rbf.operations import columns
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
-from slideviz.rbf.slopes import TINY, pull_positions, push_positions, sum_powers
-from slideviz.rbf.tape import Array, Variable, join, put, recorded, take, value
+from slideviz.rbf.tape import Array, join, put, take, value
 from slideviz.system.jit_cache import njit
+
+TINY = 1e-24
+"""Smallest square of a distance over the radius: the weight of a coinciding node is then so large
+that no other node counts."""
 
 
 @dataclass(frozen=True)
@@ -82,72 +84,6 @@ def weighted_means(
     return np.ascontiguousarray(out[: values.shape[1]].T)
 
 
-def weighted_mean(
-    basis: Basis,
-    targets: Array,
-    sources: Array,
-    values: Array,
-    source_weights: FloatArray,
-    power: float,
-    tick: Tick = no_tick,
-) -> Array:
-    """Return means (..., N, d) of values (..., n, d), as `weighted_means`.
-
-    ``source_weights`` (n,): the weight g_j of each source.
-    """
-    x, c, v = value(targets), value(sources), value(values)
-
-    def mean(each: FloatArray) -> FloatArray:
-        return each_of(
-            lambda t: weighted_means(basis, x, c, t, source_weights, power=power, tick=tick), each
-        )
-
-    out = mean(v)
-    if not any(isinstance(part, Variable) for part in (targets, sources, values)):
-        return out
-    total = sum_powers(basis, x, c, source_weights[:, None], power)
-    heavy, means = source_weights[:, None] * v, out.copy()  # who owns the outcome may change it
-
-    def pushed(
-        moved: FloatArray | None = None, moved_sources: FloatArray | None = None
-    ) -> FloatArray:
-        above, below = (
-            push_positions(
-                basis, x, c, weights, moved=moved, moved_controls=moved_sources, power=power
-            )
-            for weights in (heavy, source_weights[:, None])
-        )
-        return (above - means * below) / total
-
-    def pulled(g: FloatArray, *, of_sources: bool) -> FloatArray:
-        above, below = g / total, (g * means).sum(axis=1, keepdims=True) / total
-        if of_sources:
-            return pull_positions(basis, c, x, heavy, above, power) - pull_positions(
-                basis, c, x, source_weights[:, None], below, power
-            )
-        return pull_positions(basis, x, c, above, heavy, power) - pull_positions(
-            basis, x, c, below, source_weights[:, None], power
-        )
-
-    def back(g: FloatArray) -> FloatArray:
-        return source_weights[:, None] * sum_powers(basis, c, x, g / total, power)
-
-    return recorded(
-        out,
-        (
-            targets,
-            lambda t: each_of(pushed, t),
-            lambda g: each_of(partial(pulled, of_sources=False), g),
-        ),
-        (
-            sources,
-            lambda t: each_of(lambda each: pushed(moved_sources=each), t),
-            lambda g: each_of(partial(pulled, of_sources=True), g),
-        ),
-        (values, mean, lambda g: each_of(back, g)),
-    )
-
-
 def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
     """Return the solution of one step: displacements are weighted means of those of the boundary.
 
@@ -189,10 +125,10 @@ def _means(
     """
     nodes, data = merge(problem, known, values)
     sources, power = columns(problem.features, nodes), weights.power
-    node_weights = problem.choose(f"weights of {len(known)}", lambda: weights.of(value(data)))
+    node_weights = weights.of(value(data))
+    field = WeightedField(problem.basis, value(sources), value(data), node_weights, power)
     with timer.phase("evaluate") as tick:
-        means = weighted_mean(problem.basis, targets, sources, data, node_weights, power, tick)
-    return means, WeightedField(problem.basis, value(sources), value(data), node_weights, power)
+        return field.at(value(targets), np.empty(0), tick), field
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,6 +160,11 @@ class Deformer:
         ConditionWarning
             The system is so badly conditioned that derivatives, or points too, have few digits.
         """
+        if case.method != "rbf":
+            raise CaseError(
+                f"METHOD= {case.method} has no derivatives, so it has no Deformer; use METHOD= "
+                "rbf, or deform for each design"
+            )
         case, left_out = without_repair(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))

@@ -27,9 +27,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from slideviz.elastic.corotated import Corotated
-from slideviz.elastic.forces import _at
 from slideviz.elastic.multigrid import RIDGE
-from slideviz.elastic.stiffness import ShapeBlock, by_node
+from slideviz.elastic.stiffness import ShapeBlock, by_node, shape_gradients
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
@@ -263,7 +262,7 @@ def gradients(elements, modulus, out):  # type: ignore[no-untyped-def]
     for e in range(len(nodes)):
         total[:] = 0.0
         for q in range(len(weights)):
-            size = modulus[e] * _at(elements, e, q, x, inverse, slopes)
+            size = modulus[e] * shape_gradients(elements, e, q, x, inverse, slopes)
             for a in range(n):
                 for b in range(a):
                     one = 0.0

@@ -359,6 +359,22 @@ def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
+def shape_gradients(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
+    """Write grad N_a (a, d) at integration point q of element e to ``slopes``; return |det J| w."""
+    points, nodes, gradients, weights = elements
+    n, d = x.shape
+    _gather(points, nodes, e, x)
+    size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
+    for a in range(n):
+        for i in range(d):
+            total = 0.0
+            for j in range(d):
+                total += inverse[i, j] * gradients[q, a, j]
+            slopes[a, i] = total
+    return size
+
+
+@njit(**OPTIONS)
 def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-def]
     """Write the volumes (areas) of elements to ``out`` (m,), positive for any orientation."""
     inverse = np.empty((3, 3))

@@ -25,16 +25,9 @@ from slideviz.system.jit_cache import njit
 
 NEAR = 1e-12  # nodes coincide when their distance over R is at most this
 
-INVERSE = len(KERNELS)
-"""The code of xi^-power, the weight of inverse distance weighting, among those of kernels."""
-
-TINY = 1e-24
-"""Smallest square of xi in inverse distance weighting: the weight of a coinciding node is then so
-large that no other node counts."""
-
 
 @njit(**OPTIONS)
-def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
+def _slope(kind, q, count):  # type: ignore[no-untyped-def]
     """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q; ``kind`` is a code."""
     for j in range(count):
         x = q[j]
@@ -55,8 +48,6 @@ def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
             q[j] = -1.0 / ((1.0 + x * x) * (1.0 + x * x))
         elif kind == 13:
             q[j] = -np.exp(-x * x)
-        elif kind == INVERSE:
-            q[j] = 0.0 if x * x <= TINY else -0.5 * power * (x * x) ** (-0.5 * power - 1.0)
         elif x <= NEAR or (kind != 8 and x >= 1.0):
             q[j] = 0.0
         elif kind == 1:
@@ -86,7 +77,7 @@ def _sine(g):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def _reverse(x, c, wx, wc, period_over_pi, scale, kind, power, out):  # type: ignore[no-untyped-def]
+def _reverse(x, c, wx, wc, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N).
 
     Features x (4, N) and c (4, n), vectors wx (3, N) and wc (3, n) at targets and controls.
@@ -103,7 +94,7 @@ def _reverse(x, c, wx, wc, period_over_pi, scale, kind, power, out):  # type: ig
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
-                _slope(kind, power, q, count)
+                _slope(kind, q, count)
                 for j in range(start, start + count):
                     p = (a0 * wc[0, j] + a1 * wc[1, j] + a2 * wc[2, j]) * q[j - start]
                     if period_over_pi > 0.0:
@@ -122,7 +113,7 @@ def _reverse(x, c, wx, wc, period_over_pi, scale, kind, power, out):  # type: ig
 
 
 @njit(parallel=True, **OPTIONS)
-def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, power, out):  # type: ignore[no-untyped-def]
+def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write the derivative of s as x (4, N) and c (4, n) change by dx and dc, to out (3, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     twice = 2.0 * scale * scale
@@ -136,7 +127,7 @@ def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, power, out):  # type:
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
-                _slope(kind, power, q, count)
+                _slope(kind, q, count)
                 for j in range(start, start + count):
                     change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
                     if period_over_pi > 0.0:
@@ -154,46 +145,12 @@ def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, power, out):  # type:
             out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
 
 
-@njit(parallel=True, **OPTIONS)
-def _sum_powers(x, c, w, period_over_pi, scale, power, out):  # type: ignore[no-untyped-def]
-    """Write sum_j w_j xi_ij^-power to out (3, N)."""
-    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
-    for task in prange(tasks):
-        q = np.empty(BLOCK)
-        first = task * TARGETS_PER_TASK
-        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            s0, s1, s2 = 0.0, 0.0, 0.0
-            for start in range(0, c.shape[1], BLOCK):
-                count = min(BLOCK, c.shape[1] - start)
-                distances(x[:, i], c, start, count, period_over_pi, scale, q)
-                for j in range(count):
-                    p = max(q[j] * q[j], TINY) ** (-0.5 * power)
-                    s0 += w[0, start + j] * p
-                    s1 += w[1, start + j] * p
-                    s2 += w[2, start + j] * p
-            out[0, i], out[1, i], out[2, i] = s0, s1, s2
-
-
-def sum_powers(
-    basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray, power: float
-) -> FloatArray:
-    """Return sum_j w_j (|x_i - c_j| / R)^-power, (N, d); targets (k, N), controls (k, n)."""
-    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
-    out = np.empty((3, x.shape[1]))
-    with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _sum_powers(
-            x, c, padded_rows(weights.T, 3), basis.period_over_pi, 1.0 / basis.radius, power, out
-        )
-    return np.ascontiguousarray(out[: weights.shape[1]].T)
-
-
 def pull_positions(
     basis: Basis,
     targets: FloatArray,
     controls: FloatArray,
     adjoint: FloatArray,
     weights: FloatArray,
-    power: float = 0.0,
 ) -> FloatArray:
     """Return the gradient of sum_i adjoint_i . s(x_i) with respect to the targets, (k, N).
 
@@ -201,14 +158,12 @@ def pull_positions(
     weights.
     ``targets`` (k, N), ``controls`` (k, n): features, as ``Frame.features`` gives them.
     ``adjoint`` (N, d), ``weights`` (n, d).
-    ``power``, not 0: the power of inverse distance weighting, xi^-power in place of the radial
-    function.
     """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
         wx, wc = padded_rows(adjoint.T, 3), padded_rows(weights.T, 3)
-        _reverse(x, c, wx, wc, *_settings(basis, power), out)
+        _reverse(x, c, wx, wc, *_settings(basis), out)
     return out[: len(targets)]
 
 
@@ -220,23 +175,20 @@ def push_positions(
     *,
     moved: FloatArray | None = None,
     moved_controls: FloatArray | None = None,
-    power: float = 0.0,
 ) -> FloatArray:
     """Return the derivative (N, d) of s as the features of targets and controls change.
 
     ``moved`` and ``moved_controls`` (k, N), (k, n), optional: the changes; None: zero.
-    ``power``: as of ``pull_positions``.
     """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     dx = np.zeros_like(x) if moved is None else padded_rows(moved, 4)
     dc = np.zeros_like(c) if moved_controls is None else padded_rows(moved_controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _forward(x, c, padded_rows(weights.T, 3), dx, dc, *_settings(basis, power), out)
+        _forward(x, c, padded_rows(weights.T, 3), dx, dc, *_settings(basis), out)
     return np.ascontiguousarray(out[: weights.shape[1]].T)
 
 
-def _settings(basis: Basis, power: float) -> tuple[float, float, int, float]:
-    """Return ``period_over_pi``, 1 / R, code of the function and power, as the loops take them."""
-    kind = INVERSE if power else KERNELS[basis.kernel].code
-    return basis.period_over_pi, 1.0 / basis.radius, kind, power
+def _settings(basis: Basis) -> tuple[float, float, int]:
+    """Return ``period_over_pi``, 1 / R, and the code of the function, as the loops take them."""
+    return basis.period_over_pi, 1.0 / basis.radius, KERNELS[basis.kernel].code

@@ -31,9 +31,6 @@ def turned(mesh, marker="BLOCK", size=0.04):
 
 def made(kind, **settings):
     """A mesh with its case: plane with the boundary flat, curved, or periodic by rotation."""
-    if kind == "elastic":
-        mesh, case = made("curved", **settings)
-        return mesh, case.change(method="elastic")
     if kind == "rotational":
         mesh = sector(2)
         return mesh, sector_case(mesh, ("ps", "moving"), turned(mesh), **settings)
@@ -46,12 +43,11 @@ def made(kind, **settings):
 
 
 KINDS = pytest.mark.parametrize("kind", ["flat", "curved", "rotational"])
-ALL_KINDS = pytest.mark.parametrize("kind", ["flat", "curved", "rotational", "elastic"])
 STEPS = pytest.mark.parametrize("steps", [1, 3])
 QUIET = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
 
 
-@ALL_KINDS
+@KINDS
 @STEPS
 @QUIET
 def test_results_depend_on_the_arguments_alone(kind, steps):
@@ -74,7 +70,7 @@ def test_results_depend_on_the_arguments_alone(kind, steps):
             assert np.asarray(a).tobytes() == np.asarray(b).tobytes()
 
 
-@ALL_KINDS
+@KINDS
 @STEPS
 @QUIET
 def test_designs_together_are_what_they_are_alone(kind, steps):
@@ -180,7 +176,7 @@ def test_control_nodes_suffice_for_all_displacements_together(levels, sliding):
 
 
 def test_a_design_off_its_facets_warns_of_them_alone():
-    mesh, case = made("curved", method="idw", reduction=None)
+    mesh, case = made("curved", reduction=None)
     deformer = sv.Deformer(mesh, case)
     with pytest.warns(ToleranceWarning, match=": the facets that nodes slide on are those of"):
         deformer.deform(-2.0 * deformer.displacement)

@@ -16,7 +16,6 @@ CASES = [
     ("box", 2, ("none", "none"), {}),
     ("box", 2, ("ps", "none"), {"steps": 3, "reduction": REDUCED}),
     ("box", 3, ("ds", "none"), {}),
-    ("box", 2, ("none", "none"), {"method": "elastic"}),
     ("box", 2, ("ps", "none"), {"layers": "keep", "layer_thickness": 0.15, "relax": "yes"}),
     ("sector", 2, ("ps", "moving"), {"steps": 2}),
 ]

@@ -14,8 +14,7 @@ import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.design.frozen import fit
-from slideviz.elastic import multigrid
-from slideviz.errors import DeformError
+from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.reduction import Reduction
@@ -335,64 +334,12 @@ def test_levels(steps, criterion, sliding):
     check(case.change(reduction=levels), mesh)
 
 
-@pytest.mark.parametrize("weight", [1.0, 3.0])
-@pytest.mark.parametrize("steps", [1, 3])
-@pytest.mark.parametrize("method", [("ps", "moving"), ("none", "periodic")])
-@pytest.mark.parametrize("frame", ["translational", "rotational"])
-def test_inverse_distance_weighting(frame, method, steps, weight):
-    settings = {"steps": steps, "idw_fixed_weight": weight}
-    mesh = box(3) if frame == "translational" else sector(2)
-    make = box_case if frame == "translational" else sector_case
-    case = make(mesh, method, motions(mesh, "BLOCK"), **settings)
-    check(case.change(method="idw", idw_power=2.5 if weight > 1 else None), mesh)
-
-
-@pytest.mark.parametrize("method", [("ds", "moving"), ("none", "periodic")])
-@pytest.mark.parametrize("steps", [1, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("frame", ["translational", "rotational"])
-def test_linear_elasticity(monkeypatch, frame, dim, steps, method):
-    """Small systems too are solved by conjugate gradients, in a run to eight digits only."""
-    monkeypatch.setattr(multigrid, "COARSE", 20)
-    mesh = box(dim) if frame == "translational" else sector(dim)
-    make = box_case if frame == "translational" else sector_case
-    marker = "blade" if (frame, dim) == ("rotational", 3) else "BLOCK"
-    case = make(mesh, method, motions(mesh, marker), steps=steps)
-    check(case.change(method="elastic"), mesh, agree=1e-8)
-
-
-@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.slow), 2])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_linear_elasticity_with_curved_boundaries(shape, steps):
-    mesh, roles, motion = SHAPES[shape]()
-    case = Case(roles=roles, motions=motion, sliding="ds", steps=steps, method="elastic")
-    if shape == "on_axis":
-        case = case.change(periodic="moving", periodic_type="rotational")
-    check(case, mesh, agree=1e-8)
-
-
-@pytest.mark.parametrize("name", MESHES)
-def test_linear_elasticity_with_halo_layers(tmp_path, name):
-    mesh, _, roles = both(name, tmp_path)
-    case = case_of(mesh, roles, 0.05, sliding="ds", periodic="moving", steps=2, method="elastic")
-    check(case, mesh, agree=1e-8)
-
-
-def test_what_elasticity_does_not_solve_to_many_digits_is_refused(monkeypatch):
+@pytest.mark.parametrize("method", ["elastic", "idw"])
+def test_methods_without_derivatives_are_refused(method):
     mesh, roles, motion = annulus()
-    monkeypatch.setattr(multigrid, "COARSE", 20)
-    deformer = sv.Deformer(mesh, Case(roles=roles, motions=motion, method="elastic"))
-    monkeypatch.setattr(multigrid, "MAX_ITERATIONS", 2)
-    with pytest.raises(DeformError, match=r"were solved to .* only, so that"):
-        deformer.deform(0.5 * deformer.displacement)
-
-
-def test_derivatives_of_elasticity_with_other_stiffness_are_refused():
-    mesh, roles, motion = annulus()
-    case = Case(roles=roles, motions=motion, method="elastic")
-    for change in ({"deform_coeff": 1e6}, {"deform_stiffness_type": "SOLID_WALL_DISTANCE"}):
-        with pytest.raises(DeformError, match="use DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME and"):
-            sv.Deformer(mesh, case.change(**change))
+    case = Case(roles=roles, motions=motion, method=method)
+    with pytest.raises(CaseError, match=f"METHOD= {method} has no derivatives"):
+        sv.Deformer(mesh, case)
 
 
 def test_dropped_nodes_of_a_boundary_layer():

@@ -17,7 +17,6 @@ from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.elastic import linear, multigrid
-from slideviz.elastic.forces import Forces
 from slideviz.elastic.stiffness import (
     _CORNERS,
     Conditions,
@@ -730,23 +729,11 @@ def test_a_baffle_of_two_faces_moves_as_one():
 
 
 @pytest.mark.parametrize(("dim", "kind"), ALL_KINDS)
-def test_forces_are_those_of_the_matrix_and_have_derivatives(dim, kind):
+def test_forces_are_those_of_the_matrix(dim, kind):
     mesh = distorted(dim, kind, n=3)
-    parts, rng = blocks(mesh.cells), np.random.default_rng(0)
-    moved, by, weights = rng.standard_normal((3, *mesh.points.shape))
+    moved = np.random.default_rng(0).standard_normal(mesh.points.shape)
     for modulus in STIFFNESS_TYPES:
         for poisson in RATIOS:
             by_matrix = stiffness(mesh, modulus, poisson) @ moved.ravel()
             by_cells = body_of(mesh, modulus, poisson).forces(moved).ravel()
             np.testing.assert_allclose(by_cells, by_matrix, atol=1e-12 * np.abs(by_matrix).max())
-    forces = Forces.at(mesh.points, parts)
-    wanted = (stiffness(mesh) @ moved.ravel()).reshape(moved.shape)
-    scale = np.abs(wanted).max()
-    np.testing.assert_allclose(forces.of(moved), wanted, atol=1e-13 * scale)
-    ahead, carried_error = (Forces.at(mesh.points + s * by, parts).of(moved) for s in (1e-6, -1e-6))
-    pushed = forces.pushed(moved, by)
-    np.testing.assert_allclose(
-        pushed, (ahead - carried_error) / 2e-6, atol=1e-7 * np.abs(pushed).max()
-    )
-    there, back = (weights * pushed).sum(), (forces.pulled(moved, weights) * by).sum()
-    assert there == pytest.approx(back, abs=1e-13 * np.abs(weights * pushed).sum())
