@@ -40,6 +40,8 @@ class Columns:
         return " ".join(("node", *self.names[:dim]))
 
 
+MOST_APART = 5.0
+"""Largest difference of displacements in a file, over the mesh's extent."""
 DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 
@@ -78,6 +80,13 @@ def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Disp
     """
     text, warnings = read_text(path, "displacement file")
     read = parsed_displacements(text, path, mesh, nodes, of)
+    apart = float(np.ptp(read.vectors, axis=0).max(initial=0.0))
+    if 0.0 < MOST_APART * mesh.extent < apart:
+        raise CaseError(
+            f"{path}: displacements differ by {apart / mesh.extent:,.3g} times the extent of "
+            f"{mesh.name}, {mesh.extent:.4g}: are they in another unit, such as millimetres for "
+            "metres? Multiply them by 0.001 then"
+        )
     return replace(read, warnings=tuple(dict.fromkeys((*warnings, *read.warnings))))
 
 

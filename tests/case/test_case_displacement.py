@@ -6,6 +6,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.errors import CaseError
+from tests import builders
 
 NODES = np.array([2, 3, 5, 8])
 
@@ -140,3 +141,22 @@ def test_a_file_of_another_mesh_gives_a_short_answer(read):
 def test_missing_file(tmp_path):
     with pytest.raises(CaseError, match=r"no\.txt: there is no such displacement file; check"):
         read_displacements(tmp_path / "no.txt", of_ten(2), NODES, "a moving marker")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3, 1e6])
+def test_displacements_in_another_unit_are_told_as_that(scale, tmp_path):
+    mesh = builders.square(6)
+    mesh = mesh.with_points(scale * mesh.points)
+    nodes = mesh.marker("BLOCK").nodes
+    moved = 0.1 * mesh.points[nodes]
+    for factor in (1.0, 1000.0):
+        rows = np.column_stack([nodes, factor * moved])
+        np.savetxt(tmp_path / "d.txt", rows, fmt=["%d", "%.17g", "%.17g"])
+        case = sv.Case(
+            roles={"BLOCK": "moving"}, motions=(sv.FromFile(tmp_path / "d.txt", "BLOCK"),)
+        )
+        if factor == 1.0:
+            next(sv.deform(case, mesh))
+            continue
+        with pytest.raises(CaseError, match=r"times the extent of .*: are they in another unit"):
+            next(sv.deform(case, mesh))

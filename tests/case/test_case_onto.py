@@ -119,3 +119,30 @@ def test_it_comes_before_other_motions(shifted):
     for limit in (-1.0, np.nan, np.inf):
         with pytest.raises(CaseError, match=f"the limit {limit:g} is not above 0; leave it out fo"):
             sv.Onto(shifted, "airfoil", limit)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1000.0, "millimetres for metres"),
+        (0.001, "metres for millimetres"),
+        (39.37, "inches for metres"),
+        (25.4, "millimetres for inches"),
+        (1 / 25.4, "inches for millimetres"),
+    ],
+)
+def test_a_target_in_another_unit_says_so_first(factor, said, tmp_path):
+    mesh = airfoil(40)
+    sv.write(tmp_path / "other.su2", mesh.with_points(factor * mesh.points))
+    with pytest.raises(CaseError) as found:
+        next(sv.deform(case(tmp_path / "other.su2"), mesh))
+    first = str(found.value).splitlines()[0]
+    assert f"times as large as airfoil: {said}? Multiply its coordinates by" in first
+
+
+def test_a_target_that_is_elsewhere_says_nothing_of_units(tmp_path):
+    mesh = airfoil(40)
+    sv.write(tmp_path / "other.su2", mesh.with_points(3.0 * mesh.points))
+    with pytest.raises(CaseError) as found:
+        next(sv.deform(case(tmp_path / "other.su2"), mesh))
+    assert "times as large" not in str(found.value)

@@ -38,6 +38,14 @@ if TYPE_CHECKING:
 
 FARTHEST = 0.01
 """Largest distance from the target that may remain, over the boundary's size, by default."""
+UNITS = {
+    1000.0: ("metres", "millimetres"),
+    100.0: ("metres", "centimetres"),
+    39.37: ("metres", "inches"),
+    25.4: ("inches", "millimetres"),
+}
+"""The larger and the smaller of two units, by how many of the smaller the larger is."""
+NEAR = 1.24  # largest ratio of sizes over such a factor; 25.4 and 39.37 stay apart
 MOST_AWAY = 0.05  # largest part of the nodes whose normals may not face the target
 
 Key = tuple[object, ...]
@@ -174,12 +182,30 @@ def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displa
     nodes = np.unique(facets)
     points, local = mesh.points[nodes], np.searchsorted(nodes, facets)
     rim = nodes[np.unique(find_edges(points, local)[1])]
-    target = _read_target(motion.path, mesh, names)
+    target, target_size = _read_target(motion.path, mesh, names)
     walls = _walls(case, mesh, nodes, index, rim)
     laid = lay_onto(points, local, target, list(walls.values()))
     size = float(np.ptp(points, axis=0).max())
-    note = _checked(motion, names, laid, walls, size)
+    try:
+        note = _checked(motion, names, laid, walls, size)
+    except CaseError as problem:
+        units = _units(target_size / size)
+        if not units:
+            raise
+        raise CaseError(
+            f"{printable(motion.path)}: the surface is {target_size / size:,.4g} times as large as "
+            f"{' and '.join(names)}: {units}\n{problem}"
+        ) from problem
     return Displacements(nodes, laid.vectors, (note,))
+
+
+def _units(ratio: float) -> str:
+    """Return which units may have been mixed up; "" where a size is no such factor apart."""
+    for factor, (large, small) in UNITS.items():
+        for value, ours, theirs in ((factor, large, small), (1.0 / factor, small, large)):
+            if 1.0 / NEAR < ratio / value < NEAR:
+                return f"{theirs} for {ours}? Multiply its coordinates by {1.0 / value:.6g} then"
+    return ""
 
 
 def _walls(
@@ -255,8 +281,8 @@ def _checked(
     return note
 
 
-def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> TargetSurface:
-    """Return the surface in a file: all facets, or markers of a mesh; CaseError if it has none."""
+def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> tuple[TargetSurface, float]:
+    """Return the surface in a file, all facets or markers of a mesh, and its size; or CaseError."""
     try:
         read = read_surface(path)
         if mesh.dim == 2 and _dims(read) == {2}:
@@ -277,7 +303,8 @@ def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> TargetSurfac
     points, place = np.unique(read.points[:, : mesh.dim], axis=0, return_inverse=True)
     table = place.ravel()[facets]
     edges, _ = find_edges(points, table)
-    return TargetSurface(_nearest(as_simplices(points[table])), _along(points[edges]))
+    size = float(np.ptp(points[table.ravel()], axis=0).max())
+    return TargetSurface(_nearest(as_simplices(points[table])), _along(points[edges])), size
 
 
 def _dims(mesh: Mesh) -> set[int]:
