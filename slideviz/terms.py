@@ -108,24 +108,6 @@ NODE_TYPES: dict[NodeType, Term] = {
 }
 """The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
-MOTION_KINDS = {
-    "translate": Term("translate"),
-    "rotate": Term("rotate"),
-    "scale": Term("scale"),
-    "radial": Term("push radially"),
-    "hicks-henne": Term("Hicks-Henne"),
-    "cst": Term("airfoil by CST"),
-    "bump": Term("bump upwards"),
-    "ffd": Term("free-form box"),
-    "ffd-camber": Term("camber by box"),
-    "ffd-thickness": Term("thickness by box"),
-    "ffd-twist": Term("twist by box"),
-    "span": Term("blade over span"),
-    "file": Term("displacement file", "A line for each node: its number and its displacement."),
-    "onto": Term("onto a surface", "A surface (STL, VTU), or a mesh with a boundary of that name."),
-}
-"""What motions do to boundaries; but for ``span``, verbs of ``MOTION``."""
-
 SpanKind = Literal["twist", "stagger", "lean", "sweep", "chord", "camber"]
 
 

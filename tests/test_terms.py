@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from typing import Literal, get_args
+from typing import get_args
 
 import pytest
 
@@ -11,7 +11,6 @@ from slideviz import terms
 TABLES = {
     terms.Role: terms.ROLES,
     terms.NodeType: terms.NODE_TYPES,
-    Literal[tuple(terms.MOTION_KINDS)]: terms.MOTION_KINDS,  # a table only
     terms.Sliding: terms.SLIDING,
     terms.Method: terms.METHODS,
     terms.Selection: terms.SELECTIONS,

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from slideviz.case.motions.kinds import KIND_OF
+from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.motion import Motion, Target, named
 from slideviz.case.values import Kind
 from slideviz.case.words import Word, is_none, name_text, words_of
@@ -106,28 +106,7 @@ def _target_text(target: Target) -> str:
 
 
 GRAMMAR = (
-    "(BLADE, translate, dx, dy[, dz])",
-    "(BLADE, rotate, degrees, centroid)            counter-clockwise; in 3D about z",
-    "(BLADE, rotate, degrees, px, py)              about a point, in 2D",
-    "(BLADE, rotate, degrees, AXIS, centroid)      AXIS: x, y, z or three numbers",
-    "(BLADE, rotate, degrees, AXIS, px, py, pz)",
-    "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
-    "(BLADE, scale, FACTORS, (px, py[, pz]))",
-    "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  radius r becomes FACTOR r + dr; 2D: no AXIS",
-    "(WING, hicks-henne, SIDE, peak, h[, x0, x1])  SIDE: upper or lower; peak: part of the chord",
-    "(WING, cst, SIDE, k, n, h[, x0, x1])          term k of n; chord from x0 to x1, else 0 to 1",
-    "(WING, bump, peak, h, x0, x1)                 both sides, towards +y",
-    "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
-    "(BLADE, ffd-camber, BOX, i, j, dz)            a column of control points; 2D: no j",
-    "(BLADE, ffd-thickness, BOX, i, j, dz)         its first one by -dz, its last by dz",
-    "(BLADE, ffd-twist, BOX, j, degrees, AXIS, (px, py, pz))  a plane of control points",
-    "(BLADE, twist, 0:0, 0.5:1.5, 1:4)             span:degrees, about the stacking line; in 3D",
-    "(BLADE, stagger, degrees)                     one angle for all spans",
-    "(BLADE, lean, 0:0, 1:0.01)                    span:length, along theta; sweep: along m",
-    "(BLADE, chord, 0:1, 1:1.1)                    span:factor; camber: span:part of the chord",
-    "(BLADE, twist, 0:0, 1:4, (px, py, pz))        with a point of the stacking line",
-    "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
-    "(BLADE, onto, path[, limit])                  the surface in a file; limit: what may remain",
+    *(line for kind in KINDS for line in kind.grammar),
     "(*, VERB, ...)                                all moving boundaries, as one body",
     "((BLADE, TIP), VERB, ...)                     several, as one body; in a sweep: BLADE+TIP",
     "centroid: mean of the nodes of what is moved, where they are at that moment",

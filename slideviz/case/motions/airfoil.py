@@ -26,7 +26,7 @@ from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import vertex_normals
-from slideviz.terms import MOTION_KINDS, SIDES
+from slideviz.terms import SIDES, Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -185,8 +185,11 @@ class HicksHenne(OneSided):
     side: terms.Side = field(default="upper", metadata=SIDES)
     chord: tuple[float, float] = WHOLE_CHORD
 
-    kind_term = MOTION_KINDS["hicks-henne"]
+    kind_term = Term("Hicks-Henne")
     verbs = ("hicks-henne",)
+    grammar = (
+        "(WING, hicks-henne, SIDE, peak, h[, x0, x1])  SIDE: upper or lower; peak: part of chord",
+    )
     rows = ("raised", "side", "peak", "chord")
     height_row = ("Outwards by", "outwards, the lower side down,")
     form = "hicks-henne, {side}, peak, height, or besides x0, x1 of the chord"
@@ -227,8 +230,11 @@ class Cst(OneSided):
     side: terms.Side = field(default="upper", metadata=SIDES)
     chord: tuple[float, float] = WHOLE_CHORD
 
-    kind_term = MOTION_KINDS["cst"]
+    kind_term = Term("airfoil by CST")
     verbs = ("cst",)
+    grammar = (
+        "(WING, cst, SIDE, k, n, h[, x0, x1])          term k of n; chord x0 to x1, else 0 to 1",
+    )
     rows = ("raised", "side", "term", "chord")
     form = "cst, {side}, k, n, height, or besides x0, x1 of the chord"
 
@@ -260,8 +266,9 @@ class Bump(OnAirfoil):
     peak: float = 0.5
     chord: tuple[float, float] = WHOLE_CHORD
 
-    kind_term = MOTION_KINDS["bump"]
+    kind_term = Term("bump upwards")
     verbs = ("bump",)
+    grammar = ("(WING, bump, peak, h, x0, x1)                 both sides, towards +y",)
     rows = ("raised", "peak", "chord")
     form = "bump, peak, height, x0, x1"
 

@@ -31,7 +31,7 @@ from slideviz.ffd.box import Box, Index
 from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -150,8 +150,11 @@ class Ffd(BoxMotion):
     index: tuple[int, int, int]
     vector: tuple[float, float, float]
 
-    kind_term = MOTION_KINDS["ffd"]
+    kind_term = Term("free-form box")
     verbs = ("ffd",)
+    grammar = (
+        "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
+    )
     rows = ("index", "box", "vector")
     proportional = ("vector",)
 
@@ -261,8 +264,11 @@ class FfdCamber(_Column):
     index: tuple[int, int]
     amount: float
 
-    kind_term = MOTION_KINDS["ffd-camber"]
+    kind_term = Term("camber by box")
     verbs = ("ffd-camber",)
+    grammar = (
+        "(BLADE, ffd-camber, BOX, i, j, dz)            a column of control points; 2D: no j",
+    )
     what = "camber"
 
 
@@ -279,8 +285,11 @@ class FfdThickness(_Column):
     index: tuple[int, int]
     amount: float
 
-    kind_term = MOTION_KINDS["ffd-thickness"]
+    kind_term = Term("thickness by box")
     verbs = ("ffd-thickness",)
+    grammar = (
+        "(BLADE, ffd-thickness, BOX, i, j, dz)         its first one by -dz, its last by dz",
+    )
     what = "thickness"
 
     def control_change(self, box: Box, q: FloatArray, dim: int) -> FloatArray:
@@ -305,8 +314,11 @@ class FfdTwist(BoxMotion):
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
-    kind_term = MOTION_KINDS["ffd-twist"]
+    kind_term = Term("twist by box")
     verbs = ("ffd-twist",)
+    grammar = (
+        "(BLADE, ffd-twist, BOX, j, degrees, AXIS, (px, py, pz))  a plane of control points",
+    )
     rows = ("plane", "box", "angle", "point", "axis")
     proportional = ("angle_deg",)
     only_3d = True

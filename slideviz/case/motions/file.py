@@ -17,7 +17,7 @@ from slideviz.case.values import path_text
 from slideviz.case.words import Word
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -35,8 +35,11 @@ class FromFile(Motion):
     path: Path
     marker: Target = ""
 
-    kind_term = MOTION_KINDS["file"]
+    kind_term = Term("displacement file", "A line for each node: its number and its displacement.")
     verbs = ("file",)
+    grammar: ClassVar[tuple[str, ...]] = (
+        "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
+    )
     rows: ClassVar[tuple[str, ...]] = ("path",)
     file_words = "displacement file"
     has_table = True

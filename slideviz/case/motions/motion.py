@@ -83,6 +83,8 @@ class Motion(CheckedFields):
     """The words for the kind."""
     verbs: ClassVar[tuple[str, ...]] = ()
     """What stands for it in ``MOTION``; () where it cannot stand there."""
+    grammar: ClassVar[tuple[str, ...]] = ()
+    """Its forms in ``MOTION``, for the reference."""
     height_row: ClassVar[tuple[str, str]] = ("Raised by", "towards +y")
     """Title and direction of the row ``raised``."""
     stays_at: ClassVar[tuple[str, ...]] = ()

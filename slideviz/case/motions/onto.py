@@ -31,7 +31,7 @@ from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
 from slideviz.rbf.projection import as_simplices, simplex_vectors, surface_rim
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -71,8 +71,13 @@ class Onto(FromFile):
 
     limit: float = 0.0
 
-    kind_term = MOTION_KINDS["onto"]
+    kind_term = Term(
+        "onto a surface", "A surface (STL, VTU), or a mesh with a boundary of that name."
+    )
     verbs = ("onto",)
+    grammar = (
+        "(BLADE, onto, path[, limit])                  the surface in a file; limit: what remains",
+    )
     rows = ("path", "limit")
     file_words = "surface to lie on"
     has_table = False

@@ -33,7 +33,7 @@ from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -48,8 +48,9 @@ class Translate(Motion):
     marker: Target
     vector: tuple[float, ...]
 
-    kind_term = MOTION_KINDS["translate"]
+    kind_term = Term("translate")
     verbs = ("translate",)
+    grammar = ("(BLADE, translate, dx, dy[, dz])",)
     rows = ("vector",)
     proportional = ("vector",)
 
@@ -96,8 +97,14 @@ class Rotate(Motion):
     point: Point = "centroid"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
-    kind_term = MOTION_KINDS["rotate"]
+    kind_term = Term("rotate")
     verbs = ("rotate",)
+    grammar = (
+        "(BLADE, rotate, degrees, centroid)            counter-clockwise; in 3D about z",
+        "(BLADE, rotate, degrees, px, py)              about a point, in 2D",
+        "(BLADE, rotate, degrees, AXIS, centroid)      AXIS: x, y, z or three numbers",
+        "(BLADE, rotate, degrees, AXIS, px, py, pz)",
+    )
     depends_on_place = True
     rows = ("angle",)
     stays_at = ("centroid", "point")
@@ -173,8 +180,12 @@ class Scale(Motion):
     factors: tuple[float, ...]
     point: Point = "centroid"
 
-    kind_term = MOTION_KINDS["scale"]
+    kind_term = Term("scale")
     verbs = ("scale",)
+    grammar = (
+        "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
+        "(BLADE, scale, FACTORS, (px, py[, pz]))",
+    )
     depends_on_place = True
     rows = ("factors",)
     stays_at = ("centroid", "point")
@@ -257,8 +268,11 @@ class Radial(Motion):
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
 
-    kind_term = MOTION_KINDS["radial"]
+    kind_term = Term("push radially")
     verbs = ("radial",)
+    grammar = (
+        "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  r becomes FACTOR r + dr; 2D: no AXIS",
+    )
     depends_on_place = True
     rows = ("percent", "distance")
     stays_at = ("point",)

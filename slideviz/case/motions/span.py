@@ -30,7 +30,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
-from slideviz.terms import MOTION_KINDS, SPAN_KINDS, SpanKind
+from slideviz.terms import SPAN_KINDS, SpanKind, Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -63,8 +63,15 @@ class SpanMotion(Motion):
     values: tuple[float, ...]
     point: tuple[float, float, float] | None = None
 
-    kind_term = MOTION_KINDS["span"]
+    kind_term = Term("blade over span")
     verbs = tuple(SPAN_KINDS)
+    grammar = (
+        "(BLADE, twist, 0:0, 0.5:1.5, 1:4)             span:degrees, about the stacking line",
+        "(BLADE, stagger, degrees)                     one angle for all spans",
+        "(BLADE, lean, 0:0, 1:0.01)                    span:length, along theta; sweep: along m",
+        "(BLADE, chord, 0:1, 1:1.1)                    span:factor; camber: span:part of the chord",
+        "(BLADE, twist, 0:0, 1:4, (px, py, pz))        with a point of the stacking line",
+    )
     rows = ("curve", "change")
     stays_at = ("line", "point")
     only_3d = True
