@@ -209,8 +209,8 @@ class Box:
     @property
     def degrees(self) -> Index:
         """Return the polynomial degree along each direction: number of control points less one."""
-        i, j, k = (count - 1 for count in self.points.shape[:3])
-        return i, j, k
+        i, j, k, _ = self.points.shape
+        return i - 1, j - 1, k - 1
 
     @property
     def q(self) -> FloatArray:
@@ -254,7 +254,9 @@ class Box:
         functions = self.factors(uvw)
         columns = []
         for axis in range(3):
-            u, v, w = (both[axis == k] for k, both in enumerate(functions))
+            u = functions[0][axis == 0]
+            v = functions[1][axis == 1]
+            w = functions[2][axis == 2]
             columns.append(_sums(u, v, w, self.q))
         return np.stack(columns, axis=-1)
 
@@ -267,8 +269,7 @@ class Box:
         if problem:
             raise CaseError(problem)
         out = np.zeros(self.points.shape)
-        i, j, k = (slice(None) if at < 0 else at for at in index)
-        out[i, j, k] = vector
+        out[points_at(index)] = vector
         return out
 
     def problem(self, index: Index) -> str:
@@ -286,6 +287,11 @@ class Box:
         return replace(self, points=self.system.points_of(self.q + change))
 
 
+def points_at(index: tuple[int, ...]) -> tuple[int | slice, ...]:
+    """Return an index (i, j, k) for arrays, with slices for -1."""
+    return tuple(slice(None) if at < 0 else at for at in index)
+
+
 def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
     """Return the sums (m, c) of values (I, J, K, c) times factors (m, I), (m, J), (m, K)."""
     m, (i, j, k, c) = len(u), lattice.shape
@@ -296,7 +302,9 @@ def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> F
 
 def lattice(corners: FloatArray, degrees: Index) -> FloatArray:
     """Return the regular control points (I, J, K, 3) between corners (8, 3), trilinear."""
-    u, v, w = (np.linspace(0.0, 1.0, degree + 1) for degree in degrees)
+    u = np.linspace(0.0, 1.0, degrees[0] + 1)
+    v = np.linspace(0.0, 1.0, degrees[1] + 1)
+    w = np.linspace(0.0, 1.0, degrees[2] + 1)
     out = np.zeros((len(u), len(v), len(w), 3))
     for (a, b, c), corner in zip(CORNERS.tolist(), corners, strict=True):
         part = [t if side else 1.0 - t for side, t in zip((a, b, c), (u, v, w), strict=True)]

@@ -416,7 +416,8 @@ class BoxDeformation:
         uvw = self._embedded[box.name].uvw
         # In q, as angles of points would jump where they pass the end of their range.
         straight = replace(box, points=box.q + self.change[box.name], system=CARTESIAN)
-        before, after = (np.linalg.det(each.slopes(uvw)) for each in (box, straight))
+        before = np.linalg.det(box.slopes(uvw))
+        after = np.linalg.det(straight.slopes(uvw))
         return bool((after * np.sign(before) < 0.0).any())
 
     def _unfold(self, box: Box) -> None:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from slideviz.ffd.box import Box
+from slideviz.ffd.box import Box, points_at
 from slideviz.mesh.model import FloatArray
 
 NEARLY = 1e-6
@@ -226,18 +226,12 @@ def _is_held(index: tuple[int, ...], held: Planes) -> bool:
     return any(at in planes for at, planes in zip(index, held, strict=True))
 
 
-def _shift(box: Box, chosen: list[tuple[object, object, object]], vector: FloatArray) -> Shift:
+def _shift(box: Box, chosen: list[tuple[int | slice, ...]], vector: FloatArray) -> Shift:
     """Return the shift by a vector (3,) of control points ``chosen``, each as often as it is."""
     unit = np.zeros(box.points.shape)
     for each in chosen:
-        unit[each] += vector  # type: ignore[index]
+        unit[each] += vector
     return Shift(unit)
-
-
-def _all(index: tuple[int, ...]) -> tuple[object, object, object]:
-    """Return an index (i, j, k) for arrays, with slices for -1."""
-    i, j, k = (slice(None) if at < 0 else at for at in index)
-    return i, j, k
 
 
 def _control_point(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
@@ -248,7 +242,7 @@ def _control_point(box: Box, request: Request, held: Planes) -> tuple[Move, ...]
     free = np.ones(box.points.shape[:3], bool)
     if len(lines) == 1:  # whole layers move whatever is held
         np.moveaxis(free, lines[0], 0)[sorted(held[lines[0]])] = False
-    return _by(box, request, [_all(index)], free)
+    return _by(box, request, [points_at(index)], free)
 
 
 def _control_point_2d(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
@@ -261,12 +255,12 @@ def _control_point_2d(box: Box, request: Request, held: Planes) -> tuple[Move, .
     both = []
     for layer in (0, 1):
         index[layers] = layer
-        both.append(_all(tuple(index)))
+        both.append(points_at(tuple(index)))
     return _by(box, request, both, np.ones(box.points.shape[:3], bool))
 
 
 def _by(
-    box: Box, request: Request, chosen: list[tuple[object, object, object]], free: np.ndarray
+    box: Box, request: Request, chosen: list[tuple[int | slice, ...]], free: np.ndarray
 ) -> tuple[Move, ...]:
     """Return the shift along the variable's direction, or one along each axis without one."""
     axes = _directions(box, request.kind)
@@ -315,7 +309,7 @@ def _nacelle(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
     for moved, checked in passes:
         if _is_held(checked, held):
             break
-        chosen.append(_all(moved))
+        chosen.append(points_at(moved))
     vector = np.array([request.numbers[0], 0.0, request.numbers[1]])
     return (_shift(box, chosen, vector),) if chosen else ()
 

@@ -447,7 +447,7 @@ def _update(lines: list[str], entries: Entries, box: Box, renewed: bool) -> None
     if not control.rows:
         lines[control.line : control.line + 1] = _control_lines(box.points)
     for number, words in control.rows:
-        i, j, k = (int(word) for word in words[:3])
+        i, j, k = map(int, words[:3])
         if [float(word) for word in words[3:]] != box.points[i, j, k].tolist():
             ending = lines[number][len(lines[number].rstrip("\r\n")) :]
             lines[number] = _control_row(box.points, i, j, k) + ending

@@ -130,7 +130,8 @@ class SpanField:
         """
         x = coords[:, : self.walls[0].corners.shape[2]].copy()
         x[:, 2:] *= self.radius
-        (hub, at_hub), (shroud, at_shroud) = (wall.nearest(x) for wall in self.walls)
+        hub, at_hub = self.walls[0].nearest(x)
+        shroud, at_shroud = self.walls[1].nearest(x)
         across = shroud - hub
         ends = (hub, at_hub, across), (shroud, at_shroud, -across)
         return [
@@ -270,7 +271,8 @@ class SpanCurves:
         spans = np.linspace(0.0, 1.0, SPANS)
         seeds = self._seeds(np.asarray(start, float), spans)
         step = self._size / (STEPS * float(seeds[:, 1].mean()))
-        before, after = (self._trace(seeds, spans, sign * step) for sign in (-1.0, 1.0))
+        before = self._trace(seeds, spans, -step)
+        after = self._trace(seeds, spans, step)
         table = np.concatenate([before[:0:-1], after])  # (steps, spans, 3): z, r and m
         if len(table) <= CUBIC:
             z, r = np.asarray(start, float)
@@ -303,7 +305,9 @@ class SpanCurves:
         column = cKDTree(self._places).query(coords[:, :2])[1] // SPANS
         m_prime = self.m_prime[column]
         for _ in range(8):  # the foot of the point on its curve
-            place, speed, bend = (self._at(span, m_prime, k) for k in range(3))
+            place = self._at(span, m_prime, 0)
+            speed = self._at(span, m_prime, 1)
+            bend = self._at(span, m_prime, 2)
             gap = coords[:, :2] - place
             slope = np.sum(gap * bend - speed**2, axis=1)
             ahead = np.sum(gap * speed, axis=1)
@@ -340,7 +344,9 @@ class SpanCurves:
         Span does not change; the derivatives are exact but where a wall's facets meet.
         """
         m_prime, theta, span = plane.T
-        place, speed, bend = (self._at(span, m_prime, k) for k in range(3))
+        place = self._at(span, m_prime, 0)
+        speed = self._at(span, m_prime, 1)
+        bend = self._at(span, m_prime, 2)
         size = np.linalg.norm(speed, axis=1)
         normal = np.stack([-speed[:, 1], speed[:, 0]], axis=1) / size[:, None]
         out = np.column_stack([place, theta])
@@ -449,8 +455,8 @@ class SpanCurves:
 def _clear_angle(field: SpanField, corners: FloatArray) -> float:
     """Return the theta at which the walls have fewest holes: profiles (n, 2) are nearest there."""
     some: Any = corners[:: max(1, len(corners) // 200)]
-    low, high = (f(field.walls[0].corners[..., 2]) / field.radius for f in (np.min, np.max))
-    angles = np.linspace(low, high, 16)
+    arc = field.walls[0].corners[..., 2]
+    angles = np.linspace(arc.min() / field.radius, arc.max() / field.radius, 16)
     far = [
         np.abs([d for d, _, _ in field.distances(np.column_stack([some, np.full(len(some), a)]))])
         .min(axis=0)

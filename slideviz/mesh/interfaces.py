@@ -37,9 +37,8 @@ def find_interfaces(
             there, shared = np.isfinite(distance), np.zeros(len(mesh.points), bool)
             shared[nodes] = there
             if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
-                here, other = (
-                    frozen_array(some, np.int64) for some in (nodes[there], partner[there])
-                )
+                here = frozen_array(nodes[there], np.int64)
+                other = frozen_array(partner[there], np.int64)
                 found.append(ZoneInterface(marker.name, zone, name, here, other))
     return tuple(found)
 
@@ -57,7 +56,8 @@ def disjoint_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
     joined = {frozenset((one.marker, one.other)) for one in mesh.interfaces}
     for pair in zip(names[::2], names[1::2], strict=True):
         if frozenset(pair) not in joined:
-            one, other = (mesh.points[mesh.marker(name).nodes] for name in pair)
+            one = mesh.points[mesh.marker(pair[0]).nodes]
+            other = mesh.points[mesh.marker(pair[1]).nodes]
             gap = nearest(other, one, np.inf, COINCIDENT * mesh.extent)[0].min(initial=np.inf)
             sentences.append(
                 f"MARKER_ZONE_INTERFACE: {pair[0]} and {pair[1]} coincide nowhere, their nodes are "

@@ -96,7 +96,8 @@ def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray
 
     It needs one if a query has two points within reach, or if there are too many candidates.
     """
-    seen, from_here = (x @ OBLIQUE[: x.shape[1]] for x in (points, at))
+    seen = points @ OBLIQUE[: points.shape[1]]
+    from_here = at @ OBLIQUE[: at.shape[1]]
     margin = max(_margin(seen, reach), _margin(from_here, reach))
     order = np.argsort(seen)
     first = np.searchsorted(seen[order], from_here - margin, "left")
@@ -108,9 +109,11 @@ def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray
     number = order[ranges(first, count)]
     gap = (at[row] - points[number]) ** 2
     square = sum(gap.T[1:], gap.T[0])
-    row, number, square = (x[square < reach * reach] for x in (row, number, square))
+    within = square < reach * reach
+    row = row[within]
     if (row[1:] == row[:-1]).any():
         return None
     distance, which = np.full(len(at), np.inf), np.full(len(at), len(points))
-    distance[row], which[row] = np.sqrt(square), number
+    distance[row] = np.sqrt(square[within])
+    which[row] = number[within]
     return distance, which

@@ -151,7 +151,8 @@ def _match_kind(
     where there is none, the result is (None, inf). That is a hundred times faster for boundaries
     that are far from matching.
     """
-    a, b = (mesh.marker(name).nodes for name in (first, second))
+    a = mesh.marker(first).nodes
+    b = mesh.marker(second).nodes
     xa, xb = mesh.points[a], mesh.points[b]
     axis = Z_AXIS if mesh.dim == 2 else axis
     vector, angle = np.zeros(mesh.dim), 0.0
@@ -159,8 +160,10 @@ def _match_kind(
         vector = ordered_sum(xb) / len(b) - ordered_sum(xa) / len(a)
         image, target = xa + vector, xb
     else:
-        ya, yb = (in_axis_frame(x, axis, origin) for x in (xa, xb))
-        za, zb = (y[:, 0] + 1j * y[:, 1] for y in (ya, yb))
+        ya = in_axis_frame(xa, axis, origin)
+        yb = in_axis_frame(xb, axis, origin)
+        za = ya[:, 0] + 1j * ya[:, 1]
+        zb = yb[:, 0] + 1j * yb[:, 1]
         # A rotation turns the sum of all complex positions by its own angle.
         angle = float(np.angle(ordered_sum(zb) * np.conj(ordered_sum(za))))
         turned = za * np.exp(1j * angle)

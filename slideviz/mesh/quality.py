@@ -224,8 +224,15 @@ class Quality:
     def take(self, ids: IntArray) -> Quality:
         """Return the quality of the cells ``ids`` (k,), in that order."""
         halo = None if self.halo is None else self.halo[ids]
-        values, size, skew, status, signs = (one[ids] for one in self._arrays)
-        return Quality(values, size, skew, status, signs, self.metric, halo)
+        return Quality(
+            self.values[ids],
+            self.size[ids],
+            self.skew[ids],
+            self.status[ids],
+            self.signs[ids],
+            self.metric,
+            halo,
+        )
 
     @classmethod
     def joined(cls, parts: Sequence[Quality]) -> Quality:

@@ -79,7 +79,8 @@ def _by_position(points: FloatArray, joint_nodes: IntArray) -> IntArray:
     """
     if joint_nodes.shape[1] == 1:
         return joint_nodes
-    one, two = (points[nodes] for nodes in joint_nodes.T)
+    one = points[joint_nodes[:, 0]]
+    two = points[joint_nodes[:, 1]]
     after = np.zeros(len(joint_nodes), bool)
     for a, b in zip(one.T, two.T, strict=True):
         after = np.where(a == b, after, a > b)

@@ -94,7 +94,8 @@ class Columns:
         thickness, flat = np.zeros(len(facets)), self.depth > 0
         for layer in range(self.nodes.shape[1] - 1 if most is None else most):
             some = np.flatnonzero(flat & (self.depth > layer))
-            below, above = (self.nodes[self.corner[some], layer + k] for k in (0, 1))
+            below = self.nodes[self.corner[some], layer]
+            above = self.nodes[self.corner[some], layer + 1]
             edges = np.linalg.norm(points[above] - points[below], axis=2)
             if width == 4:  # of a triangle, which repeats its last corner, the first three
                 edges[below[:, 2] == below[:, 3], 3] = np.nan
@@ -366,7 +367,10 @@ BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
 def wall_words(row: dict) -> str:
     """Return the layers at a boundary in words; ``row`` is its entry of `Walls.summary`."""
     if "before" not in row["angle"]:
-        height, growth, equal, angle = (row[name]["after"] for name in _REPORTED)
+        height = row["first_height"]["after"]
+        growth = row["growth"]["after"]
+        equal = row["equal_layers"]["after"]
+        angle = row["angle"]["after"]
         turned = f"edges at {angle['min']:.3g}° or more"
         growing = f", growth up to {growth['max']:.3g}" if growth["max"] is not None else ""
         layers = f", {equal['min']:.0f} equal"
@@ -376,7 +380,8 @@ def wall_words(row: dict) -> str:
     ratio, change = row["first_height"]["ratio"], row["angle"]["change"]
     heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
     turned = f"by up to {turn:.2g}°" if (turn := change["max"]) >= 0.01 else "by less than 0.01°"
-    before, after = (row["growth"][when]["max"] for when in ("before", "after"))
+    before = row["growth"]["before"]["max"]
+    after = row["growth"]["after"]["max"]
     growing = f", growth up to {after:.3g} ({before:.3g} before)" if before and after else ""
     return f"{heights}{growing}, first edges turned {turned}"
 

@@ -7,7 +7,7 @@ name where no other zone has one of that name; else the number of its zone comes
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from dataclasses import replace
 from itertools import accumulate, pairwise
 
@@ -45,14 +45,9 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
             "in a case, or --zone"
         )
     names = unique_names([zone.marker_names for zone in zones])
-    points, cells, markers = (
-        [slice(*ends) for ends in pairwise(accumulate(map(len, parts), initial=0))]
-        for parts in (
-            [zone.points for zone in zones],
-            [zone.cells for zone in zones],
-            [zone.markers for zone in zones],
-        )
-    )
+    points = _slices([zone.points for zone in zones])
+    cells = _slices([zone.cells for zone in zones])
+    markers = _slices([zone.markers for zone in zones])
     part, first_point, first_cell = _part(zones)
     coords = sealed(np.concatenate([zone.points for zone in zones]))
     alone = [
@@ -153,15 +148,19 @@ def spellings(mesh: Mesh) -> Mapping[str, str]:
     return out
 
 
+def _slices(parts: Sequence[Sized]) -> list[slice]:
+    """Return the place of each part where all stand one after the other."""
+    return [slice(*ends) for ends in pairwise(accumulate(map(len, parts), initial=0))]
+
+
 def _part(zones: Sequence[Mesh]) -> tuple[Part | None, list[int], list[int]]:
     """Return the part of all zones of which parts are in memory; the first numbers of each zone."""
     sizes = [
         (one.n_points, one.n_cells) if (one := zone.part) else (len(zone.points), len(zone.cells))
         for zone in zones
     ]
-    (*points, n_points), (*cells, n_cells) = (
-        accumulate(counts, initial=0) for counts in zip(*sizes, strict=True)
-    )
+    *points, n_points = accumulate((size[0] for size in sizes), initial=0)
+    *cells, n_cells = accumulate((size[1] for size in sizes), initial=0)
     parts = [zone.part for zone in zones if zone.part is not None]
     if len(parts) < len(zones):
         return None, points, cells

@@ -343,9 +343,8 @@ def _collect(
     active = np.zeros(len(representative), bool)
     active[at[rows[:, 0]]] = True
     slid = np.flatnonzero(active[representative])
-    start, stop = (
-        np.searchsorted(at[rows[:, 0]], representative[slid], side) for side in ("left", "right")
-    )
+    start = np.searchsorted(at[rows[:, 0]], representative[slid], "left")
+    stop = np.searchsorted(at[rows[:, 0]], representative[slid], "right")
     node = np.repeat(slid, stop - start)
     rows = rows[ranges(start, stop - start)]
     order = np.lexsort((rows[:, 1], node))

@@ -97,7 +97,7 @@ class Correction:
         Ties (t,) are places among the h points where the second source is equally near (`TIE`).
         """
         near = self.tree.query(points, k=2, distance_upper_bound=self.radius)
-        distance, index = (np.asarray(found) for found in near)
+        distance, index = map(np.asarray, near)
         hit = np.flatnonzero(np.isfinite(distance[:, 0]))
         distance = distance[hit]
         tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])

@@ -132,7 +132,8 @@ def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArr
     ``points`` (n, d): Cartesian, as they are now.
     ``images`` (k, 2): nodes and their images.
     """
-    one, two = (frame.coords(points[column]) for column in images.T)
+    one = frame.coords(points[images[:, 0]])
+    two = frame.coords(points[images[:, 1]])
     gap = (two - one) - (coords[images[:, 1]] - coords[images[:, 0]])
     if frame.cylindrical:
         # Angles as lengths of arcs, whichever turn they are counted in.

@@ -204,7 +204,7 @@ class WallNodes:
             row, source, carrier = self._carriers(k, targets[some])
             carrier *= (each * (1.0 - outside[some]) / weight[some])[row]
             found.append((place[some[row]], source, carrier))
-        rows, columns, values = (np.concatenate(each) for each in zip(*found, strict=True))
+        rows, columns, values = map(np.concatenate, zip(*found, strict=True))
         arm = values[:, None] * (targets[hit[rows]] - self.places[columns])
         (total, dim), count = self.places.shape, len(hit)
         wide = (columns[:, None] * dim + np.arange(dim)).reshape(-1)
@@ -225,8 +225,9 @@ class WallNodes:
         reach = float(np.hypot(heights.max() + wall.thickness, CORNER * size))
 
         def find(part: slice) -> None:
-            found = tree.query(targets[part], k=count, distance_upper_bound=reach)
-            gap, index = (np.reshape(x, (-1, count)) for x in found)
+            gap, index = tree.query(targets[part], k=count, distance_upper_bound=reach)
+            gap = np.reshape(gap, (-1, count))
+            index = np.reshape(index, (-1, count))
             alike = gap <= (1.0 + 1e-9) * gap[:, :1]
             highest = np.where(alike, heights[index], 0.0).max(axis=1)
             height[part] = np.where(np.isfinite(gap[:, 0]), highest, -1.0)
@@ -249,8 +250,9 @@ class WallNodes:
         weight = np.empty((len(targets), count))
 
         def find(part: slice) -> None:
-            found = tree.query(targets[part], k=count)
-            gap, index = (np.reshape(x, (-1, count)) for x in found)
+            gap, index = tree.query(targets[part], k=count)
+            gap = np.reshape(gap, (-1, count))
+            index = np.reshape(index, (-1, count))
             seen = self._seen(targets[part], begins[index], (facets[index], facets[index + 1]))
             seen[~(seen > 0.0).any(axis=1)] = 1.0
             gap = np.maximum(gap, TINY)
@@ -308,7 +310,7 @@ def _largest_cosines(targets, places, source, begin, end, normals, out):  # type
 def _shared(parts: list[Reached]) -> list[Reached]:
     """Return the parts of the walls with less share where another wall is as near, or nearer."""
     size = [len(part[0]) for part in parts]
-    point, gap, share, each = (np.concatenate(x) for x in zip(*parts, strict=True))
+    point, gap, share, each = map(np.concatenate, zip(*parts, strict=True))
     order, left = np.argsort(point, kind="stable"), np.ones(len(point))
     apart = 1
     while len(at := np.flatnonzero(point[order[apart:]] == point[order[: len(order) - apart]])):

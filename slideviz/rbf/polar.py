@@ -52,7 +52,9 @@ def rotation_slopes(matrices: FloatArray, turned: FloatArray, directions: FloatA
 
     All (m, d, d). The same map takes adjoints of the rotations to those of the matrices.
     """
-    m, r, t = (sealed(np.ascontiguousarray(x)) for x in (matrices, turned, directions))
+    m = sealed(np.ascontiguousarray(matrices))
+    r = sealed(np.ascontiguousarray(turned))
+    t = sealed(np.ascontiguousarray(directions))
     out = np.empty(m.shape)
     in_parts(lambda part: _change_all(m[part], r[part], t[part], out[part]), len(m))
     return out

@@ -314,7 +314,8 @@ def _edge_chains(
             order[np.searchsorted(key, side * len(is_edge) + node)]
             for side in boundary.joints[near].T
         ]
-        first, second = (cluster[fans.fan[row]] for row in rows)
+        first = cluster[fans.fan[rows[0]]]
+        second = cluster[fans.fan[rows[1]]]
         keep[near] |= (first >= 0) & (second >= 0) & (first != second)
     ends = boundary.joint_nodes[keep]
     # Link segments at edge nodes only: number each end by its node, or by itself elsewhere.

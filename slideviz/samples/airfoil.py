@@ -36,7 +36,8 @@ def airfoil_mesh(size: int, variant: str) -> Mesh:
             f"size {size} is too coarse for the airfoil; expected {LEAST} cells or more"
         )
     circle = np.exp(1j * np.arange(size) / size * 2.0 * np.pi)
-    front, end = (x + 1.0 / x for x in (CENTRE - RADIUS, CENTRE + RADIUS))
+    front = CENTRE - RADIUS + 1.0 / (CENTRE - RADIUS)
+    end = CENTRE + RADIUS + 1.0 / (CENTRE + RADIUS)
     out = np.exp(_rings(size, np.log(FAR * (end - front) / RADIUS), variant == "layers"))
     zeta = CENTRE + RADIUS * out[:, None] * circle
     z = (zeta + 1.0 / zeta - front) / (end - front)

@@ -139,8 +139,11 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     """Return the numbers of cells for ``size`` cells along the inflow; CaseError below 12."""
     if size < 12:
         raise CaseError(f"size {size} is too coarse for the blade; expected 12 cells or more")
-    cells = (shares.ahead, shares.along, shares.behind, shares.beside, shares.layers)
-    ahead, along, behind, beside, layers = (round(size * share / 36) for share in cells)
+    ahead = round(size * shares.ahead / 36)
+    along = round(size * shares.along / 36)
+    behind = round(size * shares.behind / 36)
+    beside = round(size * shares.beside / 36)
+    layers = round(size * shares.layers / 36)
     below = (size - beside) // 2
     nose, tail = round(beside * shares.nose), round(beside * shares.tail)
     above = size - beside - below

@@ -11,6 +11,7 @@ rest. The displacement moves the blade as an optimiser might: twist, lean and bu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import ClassVar
@@ -28,7 +29,6 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.samples.passage import (
     BladeSection,
     Grid,
-    GridCounts,
     Shares,
     blade_nodes,
     camber,
@@ -85,22 +85,9 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
     Nodes of the blade are moved onto it, those of the O-grid with them, less the further out.
     """
     nodes = np.full((int(fine.quads.max()) + 1, 2), np.nan)
-    places = [_channel_knots(grid.n) for grid in (coarse, fine)]
-    for i, j in product(range(3), range(3)):
-        if i == j == 1:
-            continue
-        old, new = (
-            grid.number[a[i] : a[i + 1] + 1, b[j] : b[j + 1] + 1]
-            for grid, (a, b) in zip((coarse, fine), places, strict=True)
-        )
+    for old, new in zip(_channel_blocks(coarse), _channel_blocks(fine), strict=True):
         nodes[new] = _spline(points[old], new.shape)
-    turns = [_ring_knots(grid.n) for grid in (coarse, fine)]
-    for side in range(4):
-        old, new = (
-            np.roll(grid.ring, -start, axis=1)[:, : stop - start + 1]
-            for grid, knots in zip((coarse, fine), turns, strict=True)
-            for start, stop in [list(pairwise(knots))[side]]
-        )
+    for old, new in zip(_ring_sides(coarse), _ring_sides(fine), strict=True):
         nodes[new[:-1]] = _spline(points[old], new.shape)[:-1]
     blade = blade_nodes(fine.n.lower, fine.ring.shape[1] - fine.n.lower, section)
     fade = 1 - layer_parts(fine.n)[:-1, None, None]
@@ -108,20 +95,29 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
     return nodes
 
 
-def _channel_knots(n: GridCounts) -> tuple[list[int], list[int]]:
-    """Return the indices of grid lines between the blocks of the channel, in both directions."""
-    along = np.cumsum([0, n.ahead, n.along, n.behind]).tolist()
-    return along, np.cumsum([0, n.below, n.beside, n.above]).tolist()
+def _channel_blocks(grid: Grid) -> Iterator[IntArray]:
+    """Yield the nodes of each block of the channel around the hole."""
+    n = grid.n
+    along = pairwise(np.cumsum([0, n.ahead, n.along, n.behind]).tolist())
+    beside = pairwise(np.cumsum([0, n.below, n.beside, n.above]).tolist())
+    for k, ((left, right), (low, high)) in enumerate(product(along, beside)):
+        if k != 4:  # the hole
+            yield grid.number[left : right + 1, low : high + 1]
 
 
-def _ring_knots(n: GridCounts) -> list[int]:
-    """Return the columns of the O-grid at the corners of the hole, the first one again."""
-    return (n.nose + np.cumsum([0, n.along, n.beside, n.along, n.beside])).tolist()
+def _ring_sides(grid: Grid) -> Iterator[IntArray]:
+    """Yield the nodes of the O-grid at each side of the hole, both corners among them."""
+    n = grid.n
+    corners = n.nose + np.cumsum([0, n.along, n.beside, n.along, n.beside])
+    for start, stop in pairwise(corners.tolist()):
+        yield np.roll(grid.ring, -start, axis=1)[:, : stop - start + 1]
 
 
 def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    x, y = (np.linspace(0, 1, size) for size in block.shape[:2])
-    new_x, new_y = (np.linspace(0, 1, size) for size in shape)
+    x = np.linspace(0, 1, block.shape[0])
+    y = np.linspace(0, 1, block.shape[1])
+    new_x = np.linspace(0, 1, shape[0])
+    new_y = np.linspace(0, 1, shape[1])
     kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)
     columns = [
         RectBivariateSpline(x, y, block[..., k], kx=kx, ky=ky)(new_x, new_y) for k in range(2)
@@ -201,10 +197,8 @@ class Stack:
         part = part - np.sin(2 * np.pi * part) / (4 * np.pi)
         radius = (RADII[0] + (RADII[-1] - RADII[0]) * part)[layer]
         shares = (2 * (part - 0.5) * (part - 1), 4 * part * (1 - part), 2 * part * (part - 0.5))
-        z, theta = (
-            sum(share[layer] * plane[column] for share, plane in zip(shares, planes, strict=True))
-            for planes in np.moveaxis(self.planes, 2, 0)
-        )
+        each = zip(shares, self.planes, strict=True)
+        z, theta = np.sum([share[layer] * plane[column].T for share, plane in each], axis=0)
         return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
 
     def cells(self, ids: IntArray) -> IntArray:

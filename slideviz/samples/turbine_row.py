@@ -306,9 +306,8 @@ def _channel(sizing: Sizing) -> tuple[dict[str, IntArray], FloatArray]:
     line = np.column_stack([x, np.interp(x, xs, ys)])
     half = np.array([0.0, pitch() / 2])
     below = _spread(line - half, sizing)
-    inflow, outflow = (
-        _spread(np.linspace(end - half, end + half, 501), sizing) for end in line[[0, -1]]
-    )
+    inflow = _spread(np.linspace(line[0] - half, line[0] + half, 501), sizing)
+    outflow = _spread(np.linspace(line[-1] - half, line[-1] + half, 501), sizing)
     sides = [below, outflow, (below + 2 * half)[::-1], inflow[::-1]]
     outline = np.concatenate([side[:-1] for side in sides])
     loop = _loop(np.arange(len(outline)))

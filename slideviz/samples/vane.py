@@ -77,7 +77,9 @@ def _profile() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     a, b, c = THICKNESS
     half = -CHORD * np.sin(phi) / 2 * (a + b * (1 - u) ** c)
     s, xs, ys, angles = camber_line()
-    x, y, angle = (np.interp(CHORD * u, s, values) for values in (xs, ys, angles))
+    x = np.interp(CHORD * u, s, xs)
+    y = np.interp(CHORD * u, s, ys)
+    angle = np.interp(CHORD * u, s, angles)
     curve = np.column_stack([x - half * np.sin(angle), y + half * np.cos(angle)])
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
     curve[-1] = curve[0]
@@ -115,9 +117,8 @@ def vane_layers(around: int, layers: int) -> FloatArray:
     density = 1 + curvature * offsets[-1]
     length = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(arc))])
     at = np.interp(np.arange(around) / around * length[-1], length, arc)
-    foot, normal = (
-        CubicSpline(arc, values, bc_type="periodic")(at) for values in (points, normals)
-    )
+    foot = CubicSpline(arc, points, bc_type="periodic")(at)
+    normal = CubicSpline(arc, normals, bc_type="periodic")(at)
     return foot + offsets[:, None, None] * normal
 
 

@@ -148,7 +148,8 @@ class Cutter:
             ends[edges < 0] = -1
             a, b = ends[..., 0], ends[..., 1]
             first, last = np.minimum(a, b), np.maximum(a, b)
-            on_first, on_last = ((level[one] == 0) & (one >= 0) for one in (first, last))
+            on_first = (level[first] == 0) & (first >= 0)
+            on_last = (level[last] == 0) & (last >= 0)
             low, high = np.where(on_last, last, first), np.where(on_first, first, last)
             parts.append((block.ids[cut[cell]], low, high))
         width = max((part[1].shape[1] for part in parts), default=0)

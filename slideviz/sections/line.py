@@ -146,5 +146,5 @@ def _turned(section: Section, centre: FloatArray, way: FloatArray) -> Section:
     normal = np.array([-way[1], way[0]]) / length
     if normal @ np.asarray(section.direction[:2]) < 0:
         normal = -normal
-    x, y = (float(value) for value in normal.round(DIGITS) + 0.0)
+    x, y = (normal.round(DIGITS) + 0.0).tolist()
     return replace(section, origin=(float(centre[0]), float(centre[1]), 0.0), direction=(x, y, 0.0))

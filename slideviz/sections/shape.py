@@ -240,7 +240,7 @@ def triple_words(values: Sequence[float], digits: int = DIGITS) -> str:
 
 def triple(values: FloatArray) -> Triple:
     """Return three numbers as a tuple."""
-    x, y, z = (float(value) for value in values)
+    x, y, z = map(float, values)
     return x, y, z
 
 

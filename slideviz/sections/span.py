@@ -167,7 +167,8 @@ class SpanWalls:
         def value(k: int, some: FloatArray) -> FloatArray:
             curves = self.channels[k].curves
             plane = curves.plane(some)
-            m_prime, m, _ = (np.interp(plane[:, 2], _SPANS, row) for row in self._begin[k])
+            m_prime = np.interp(plane[:, 2], _SPANS, self._begin[k][0])
+            m = np.interp(plane[:, 2], _SPANS, self._begin[k][1])
             return np.column_stack([plane[:, 0] + m_prime, curves.length(plane) + m, plane[:, 2]])
 
         return self._each(coords, value)
@@ -235,13 +236,15 @@ class ConstantSpan(AboutAxis):
             step = (middle - a) * np.sign(low - high) * there / np.where(size > 0.0, size, 1.0)
             root = np.clip(middle + step, 0.0, 1.0)
             at_root = value(root)
-            ends = np.stack([a, middle, root, b]), np.stack([low, there, at_root, high])
-            order = np.argsort(ends[0], axis=0)
-            places, values = (np.take_along_axis(each, order, axis=0) for each in ends)
+            places = np.stack([a, middle, root, b])
+            order = np.argsort(places, axis=0)
+            places = np.take_along_axis(places, order, axis=0)
+            values = np.take_along_axis(np.stack([low, there, at_root, high]), order, axis=0)
             # The first interval in which the sign changes.
             first = np.argmax(np.sign(values[1:]) != np.sign(values[:1]), axis=0)[None]
-            a, b = (np.take_along_axis(places, first + k, axis=0)[0] for k in (0, 1))
-            low, high = (np.take_along_axis(values, first + k, axis=0)[0] for k in (0, 1))
+            interval = np.concatenate([first, first + 1])
+            a, b = np.take_along_axis(places, interval, axis=0)
+            low, high = np.take_along_axis(values, interval, axis=0)
         return root
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:

@@ -258,11 +258,10 @@ def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
     problem = problem_at(setup, setup.coords, goal)
     label, moves = problem.reach
     moves = moves | lasting
-    known, nodes = (
-        int(moves[label[setup.same_as[each]]].sum())
-        for each in (problem.known, np.concatenate([problem.known, problem.edge, problem.surface]))
-    )
-    normals = value(problem.normals)[moves[label[setup.same_as[problem.normal_nodes]]]]
+    moving = moves[label[setup.same_as]]
+    known = int(moving[problem.known].sum())
+    nodes = known + int(moving[problem.edge].sum() + moving[problem.surface].sum())
+    normals = value(problem.normals)[moving[problem.normal_nodes]]
     if case.sliding != "ds" or not len(normals):
         return [nodes]
     dim = setup.coords.shape[1]

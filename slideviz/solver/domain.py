@@ -100,15 +100,20 @@ def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
     away = ~np.any(moving[boundary.facets[fans.facet]], axis=1)
     others = np.bincount(fans.fan, away, len(fans.fan_node)) > 0.0
     keep = away | ~others[fans.fan]
-    facet, node, fan = (frozen_array(x[keep], np.int64) for x in (fans.facet, fans.node, fans.fan))
-    return replace(fans, facet=facet, node=node, fan=fan)
+    return replace(
+        fans,
+        facet=frozen_array(fans.facet[keep], np.int64),
+        node=frozen_array(fans.node[keep], np.int64),
+        fan=frozen_array(fans.fan[keep], np.int64),
+    )
 
 
 def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
     """Return the case where halo copies of boundaries have the others' roles, and notes."""
     roles, notes = dict(case.roles), []
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
-        role, other = (case.roles.get(name, "fixed") for name in (copy, origin))
+        role = case.roles.get(copy, "fixed")
+        other = case.roles.get(origin, "fixed")
         roles[copy] = other
         if role == other == "periodic" and case.periodic == "none":
             notes.append(

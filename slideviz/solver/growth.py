@@ -233,10 +233,8 @@ def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Itera
         nodes = np.setdiff1d(facets, rims)
         middles = 0.5 * (mesh.points[facets[:, :3]] + mesh.points[facets[:, [1, 2, 0]]])
         coords = field.meridional(points[nodes])
-        off, of_facets = (
-            np.abs(field.span(x)[0] - end)
-            for x in (coords, field.meridional(middles.reshape(-1, 3)))
-        )
+        off = np.abs(field.span(coords)[0] - end)
+        of_facets = np.abs(field.span(field.meridional(middles.reshape(-1, 3)))[0] - end)
         allowed = float(of_facets.max()) + OFF_WALL
         k = int(np.argmax(off))
         if off[k] > allowed:
@@ -278,7 +276,8 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     from scipy.spatial import cKDTree  # takes long to load
 
     near = cKDTree(at).query(at, k=min(2, len(nodes)))
-    gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
+    gaps = np.reshape(near[0], (len(nodes), -1))[:, -1]
+    others = np.reshape(near[1], (len(nodes), -1))[:, -1]
     apart = np.linalg.norm(shift - shift[others], axis=1)
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))

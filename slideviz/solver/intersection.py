@@ -134,7 +134,8 @@ def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[
         places = [frame.points(start + part * shift) for part in parts]
     elif any(motion.turned(0.0) is not motion for motion in case.motions):
         try:
-            still, *turned = (_turned(case, mesh, part) for part in (0.0, *parts))
+            still = _turned(case, mesh, 0.0)
+            turned = [_turned(case, mesh, part) for part in parts]
         except CaseError:
             return []  # markers with common nodes turn differently
         if not np.array_equal(turned[-1], vectors):
@@ -174,7 +175,9 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     if hit is None or self_crossing(mesh.points, body) is not None:
         return None
     ends = np.cumsum([len(part) for part in parts])
-    first, other = (names[k] for k in sorted(np.searchsorted(ends, hit[1:], "right")))
+    one, two = sorted(np.searchsorted(ends, hit[1:], "right"))
+    first = names[one]
+    other = names[two]
     where = "itself" if first == other else other
     place = ", ".join(f"{value:.4g}" for value in hit[0])
     return f"{first} goes through {where} near ({place}); cells will overlap there"
@@ -218,7 +221,8 @@ def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str 
 def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> bool:
     """Return whether a moved body, of facets (k, c), is out of the mesh and its periodic images."""
     some = facets[np.linspace(0, len(facets) - 1, LOOKED_AT).astype(np.int64)]
-    before, there = (_beside(points, some) for points in (mesh.points, after))
+    before = _beside(mesh.points, some)
+    there = _beside(after, some)
     shell = boundary_of(mesh).facets
     # The markers have holes, so that they have no inside: take all sides of one cell alone.
     if abs(winding_number(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:

@@ -53,7 +53,8 @@ class QualityCollector:
     def __init__(self, stack: ExitStack, folder: Path, count: int, metric: SkewMetric) -> None:
         self._metric = metric
         self._files = [Scratch(stack, folder, count, kind) for kind in (float, np.uint8)]
-        self._values, self._status = (file.array for file in self._files)
+        self._values = self._files[0].array
+        self._status = self._files[1].array
         self.signs = np.zeros(0, np.int8)
         """Orientations that occur: 1, -1 (numbered the other way round), or both."""
 

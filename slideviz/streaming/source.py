@@ -307,10 +307,8 @@ class FileSource:
             there, others = stack.enter_context(open_zones(*reference))
             bases = [PointTable(there, place) for place in others]
             undeformed = [(reference[0], place.number) for place in others]
-        cells, points = (
-            accumulate(counts, initial=0)
-            for counts in ([one.cells.count for one in places], [one.n_points for one in places])
-        )
+        cells = accumulate((place.cells.count for place in places), initial=0)
+        points = accumulate((place.n_points for place in places), initial=0)
         each = zip(places, tables, bases, undeformed, cells, points, strict=False)
         return cls(tuple(ZoneSource(source, *of_zone) for of_zone in each), skin)
 
@@ -361,7 +359,8 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
     compared.
     """
     with ExitStack() as stack:
-        one, two = (FileSource.open(stack, each).zones for each in (mesh, other))
+        one = FileSource.open(stack, mesh).zones
+        two = FileSource.open(stack, other).zones
         return len(one) == len(two) and all(map(_has_cells_of, one, two))
 
 

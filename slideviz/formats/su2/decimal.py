@@ -32,7 +32,13 @@ def _powers_of_five() -> NDArray[np.uint64]:
 
 
 _POWERS = _powers_of_five()
-_U0, _U1, _U3, U10, _U32, U48, _U63 = (np.uint64(n) for n in (0, 1, 3, 10, 32, 48, 63))
+_U0 = np.uint64(0)
+_U1 = np.uint64(1)
+_U3 = np.uint64(3)
+U10 = np.uint64(10)
+_U32 = np.uint64(32)
+U48 = np.uint64(48)
+_U63 = np.uint64(63)
 # Bits of uint64 and of a float64: lowest 32; all; numbers with the highest byte or bit set are not
 # below these; the mantissa's limit, and the highest bit of it, which a float64 does not store.
 _LOW = np.uint64(0xFFFFFFFF)

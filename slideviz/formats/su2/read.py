@@ -29,11 +29,12 @@ def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
     """Return the halo that the ``SEND_RECEIVE`` markers of a zone describe, and remarks on it."""
     if not zone.sends:
         return None, ()
-    sends, receives = ([s for s in zone.sends if s.domain == to] for to in (b"1", b"-1"))
+    sends = [one for one in zone.sends if one.domain == b"1"]
+    receives = [one for one in zone.sends if one.domain == b"-1"]
     tables = [_table(lines, part, len(mesh.points)) for part in (sends, receives)]
     if any(t is None for t in tables) or len(zone.sends) != len(sends) + len(receives):
         return None, (_unused("their rows are no `1 node transform`, or of another partition"),)
-    donors, receivers = (np.asarray(t) for t in tables)
+    donors, receivers = map(np.asarray, tables)
     if len(donors) != len(receivers):
         return None, (_unused(f"{len(donors)} nodes send and {len(receivers)} receive"),)
     if len(np.unique(receivers[:, 0])) != len(receivers):

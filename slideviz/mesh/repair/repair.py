@@ -275,7 +275,8 @@ class _Rounds:
         every = np.concatenate([self.cells[beyond], cells[poor]])
         now = np.concatenate([self.ratings[beyond], ratings[poor]])
         more = len(every) > len(self.cells) and (now < 0.0).sum() == (self.ratings < 0.0).sum()
-        lowest, before = (some[some >= 0.0].min(initial=1.0) for some in (now, self.ratings))
+        lowest = now[now >= 0.0].min(initial=1.0)
+        before = self.ratings[self.ratings >= 0.0].min(initial=1.0)
         if more and not lowest > WORTH * before:
             return False
         order = np.argsort(every)
