@@ -228,7 +228,8 @@ def _type_words(hint: Any) -> str:
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if len(members := _members(hint)) > 1:
-        *rest, last = (_type_words(one) for one in members if one is not str or Path not in members)
+        named = [one for one in members if one is not str or Path not in members]
+        *rest, last = map(_type_words, named)
         return f"{', '.join(rest)}, or {last}" if rest else last
     if kind not in (tuple, Sequence, Mapping):
         return _WORDS.get(kind.__name__, kind.__name__)

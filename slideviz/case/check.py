@@ -218,7 +218,8 @@ def key_problems(case: Case) -> Iterator[str]:
 
 
 def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
-    low, high = (mesh.extent * factor for factor in FACTORS)
+    low = mesh.extent * FACTORS[0]
+    high = mesh.extent * FACTORS[1]
     if case.support_radius is not None and not low < case.support_radius < high:
         yield (
             f"SUPPORT_RADIUS: {case.support_radius!r} does not fit {mesh.name}, whose extent is "

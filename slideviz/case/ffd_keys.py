@@ -58,7 +58,7 @@ def _integers(words: list[Word], least: int) -> Degrees:
     if len(values) != 3 or any(value != int(value) or value < least for value in values):
         listed = ", ".join(word.text for word in words)
         raise CaseError(f"({listed}) is not three whole numbers from {least}")
-    i, j, k = (int(value) for value in values)
+    i, j, k = map(int, values)
     return i, j, k
 
 

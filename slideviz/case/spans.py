@@ -37,7 +37,8 @@ def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str
         for words in (HUBS, SHROUDS)
     ]
     if [len(end) for end in ends] != [1, 1]:
-        hubs, shrouds = (", ".join(end) or "none" for end in ends)
+        hubs = ", ".join(ends[0]) or "none"
+        shrouds = ", ".join(ends[1]) or "none"
         raise CaseError(
             f"{mesh.name}: the names of boundaries do not say between which the span goes (hub: "
             f"{hubs}; shroud or casing: {shrouds}); name two, as in {remedy}, of "

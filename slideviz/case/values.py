@@ -241,7 +241,7 @@ def read_axis(items: list[Word]) -> tuple[float, float, float]:
     if len(items) != 3:
         text = " ".join(item.text for item in items)
         raise CaseError(f"{shown(text)} is not an axis; write x, y, z or three numbers")
-    x, y, z = (number(item.text) for item in items)
+    x, y, z = map(number, [item.text for item in items])
     if x == y == z == 0.0:
         raise CaseError("the axis (0, 0, 0) has no direction; write x, y, z or another vector")
     return x, y, z

@@ -68,9 +68,8 @@ def renamed(case: Case, names: Mapping[str, str]) -> Case:
         several = tuple(names.get(name, name) for name in named(motion.marker))
         one = isinstance(motion.marker, str)
         motions.append(replace(motion, marker=several[0] if one and several else several or ""))
-    hub, shroud = (names.get(name, name) for name in case.span or ("", ""))
     return case.change(
-        span=(hub, shroud) if case.span else None,
+        span=_renamed_span(case, names),
         interfaces=tuple(names.get(name, name) for name in case.interfaces),
         roles={names.get(name, name): role for name, role in case.roles.items()},
         motions=tuple(motions),
@@ -141,13 +140,20 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
     return zone.change(motions=tuple(motion for motion in moved if motion is not None))
 
 
+def _renamed_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
+    if case.span is None:
+        return None
+    hub, shroud = case.span
+    return names.get(hub, hub), names.get(shroud, shroud)
+
+
 def _zone_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
     """Return the walls of SPAN with their names in the file of a zone, if it has both.
 
     A name that several zones have is that of each.
     """
-    hub, shroud = (names.get(name, name) for name in case.span or ("", ""))
-    return (hub, shroud) if {hub, shroud} <= set(names.values()) else None
+    span = _renamed_span(case, names)
+    return span if span is not None and set(span) <= set(names.values()) else None
 
 
 def zone_motion(

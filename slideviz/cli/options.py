@@ -249,7 +249,7 @@ def zoom(text: str) -> Zoom:
     from slideviz.scene.overview import Detail
 
     try:
-        *centre, width = (float(word) for word in text.split(","))
+        *centre, width = map(float, text.split(","))
     except ValueError:
         centre, width = [], 0.0
     if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):

@@ -97,7 +97,7 @@ def _comma(text: str, number: str) -> str:
 
 def pair_of_names(text: str) -> tuple[str, str]:
     """Return the two boundaries of a text like ``BLADE,HUB``."""
-    first, _, second = (word.strip() for word in text.partition(","))
+    first, _, second = map(str.strip, text.partition(","))
     if not first or not second or "," in second:
         raise argparse.ArgumentTypeError(f"{text!r} is not two boundaries, as BLADE,HUB")
     return first, second

@@ -163,7 +163,8 @@ class _Measure:
     ) -> None:
         """``labels``: the names of boundaries in results, where the mesh has others."""
         self._labels = labels
-        base, mesh = (without_halo(each)[0] for each in (reference, mesh))
+        base = without_halo(reference)[0]
+        mesh = without_halo(mesh)[0]
         self.mesh, self.places = mesh, places
         self._surfaces = {one.name: one for one in find_surfaces(mesh)}
         names = [n for n in case.markers_with("periodic") if len(mesh.marker(n).cells)]
@@ -264,7 +265,8 @@ class _Measure:
         gap = Gap(name, "", "", *found)
         if self.walls is None:
             return gap
-        one, two = (_at_corners(corners, level) for corners in (first, second))
+        one = _at_corners(first, level)
+        two = _at_corners(second, level)
         whole = ClosestPoints(second) if along == "chord" else None
         distances = []
         for place in self.places.tolist():
@@ -285,8 +287,9 @@ def _by_zone(mesh: Mesh, between: Sequence[tuple[str, str]]) -> list[list[tuple[
     if not mesh.zone_parts:
         return [list(between)]
     written, out = spellings(mesh), [list[tuple[str, str]]() for _ in mesh.zone_parts]
-    for pair in between:
-        one, other = (mesh.marker(written.get(name, name)).name for name in pair)
+    for first, second in between:
+        one = mesh.marker(written.get(first, first)).name
+        other = mesh.marker(written.get(second, second)).name
         for some, part in zip(out, mesh.zone_parts, strict=True):
             names = names_in(mesh, part)
             if one in names and other in names:

@@ -188,13 +188,11 @@ class OffscreenRenderer:
 
         scheme, height = self._scene.scheme, options.size[1]
         down = np.linspace(0.0, 1.0, height)[:, None, None]
-        top, bottom, line = (
-            np.array(Color(name).int_rgb)
-            for name in (scheme.background_top, scheme.background, scheme.edge)
-        )
+        top = np.array(Color(scheme.background_top).int_rgb)
+        bottom = np.array(Color(scheme.background).int_rgb)
         drawn = np.repeat(top + down * (bottom - top), options.gap, axis=1).round()
         columns = line_between(options)
-        drawn[:, columns] = line
+        drawn[:, columns] = Color(scheme.edge).int_rgb
         if options.background == "transparent":
             opacity = np.zeros((height, options.gap, 1))
             opacity[:, columns] = 255.0

@@ -121,13 +121,10 @@ def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOpt
     width, height = options.size
     strip = STRIP * options.scale if options.legend else 0.0
     first = max(round((width - strip - gap) / 2.0), 1)
-    sizes = (first, height), (max(width - first - gap, 1), height)
     # Letters go by the height, which is that of the whole.
-    lines = 2 if options.title else 1
-    left, right = (
-        replace(options, size=size, both=False, named=True, lines=lines) for size in sizes
-    )
-    return replace(left, legend=False), right
+    part = replace(options, both=False, named=True, lines=2 if options.title else 1)
+    left = replace(part, size=(first, height), legend=False)
+    return left, replace(part, size=(max(width - first - gap, 1), height))
 
 
 def line_between(options: PictureOptions) -> slice:
@@ -170,5 +167,6 @@ def size_words(options: PictureOptions) -> str:
     width, height = options.size
     if options.dpi is None:
         return f"{width} × {height} pixels"
-    across, high = (2.54 * length / options.dpi for length in options.size)
+    across = 2.54 * width / options.dpi
+    high = 2.54 * height / options.dpi
     return f"{across:.1f} × {high:.1f} cm on paper, {width} × {height} pixels"

@@ -44,10 +44,9 @@ class MeridionalBins:
         """Return the mean (k, l) of values of all cells; NaN where no cell has a finite one."""
         values = values[self.cells]
         there = np.isfinite(values)
-        total, count = (
-            np.bincount(self.bin_of[there], weights, int(np.prod(self.shape)))
-            for weights in (values[there], None)
-        )
+        bins = int(np.prod(self.shape))
+        total = np.bincount(self.bin_of[there], values[there], bins)
+        count = np.bincount(self.bin_of[there], None, bins)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(self.shape)
 
 
@@ -80,7 +79,8 @@ def _zone_bins(mesh: Mesh, walls: SpanChannel, part: slice) -> MeridionalBins:
         first = order[np.unique(row[order], return_index=True)[1]]  # the extreme of each row
         ends.append(np.polyfit(used[first, 0], used[first, 1], min(2, len(first) - 1)))
 
-    low, high = (np.polyval(end, used[:, 0]) for end in ends)
+    low = np.polyval(ends[0], used[:, 0])
+    high = np.polyval(ends[1], used[:, 0])
     used[:, 1] = np.clip((used[:, 1] - low) / np.maximum(high - low, 1e-300), 0.0, 1.0)
     n = _bins_of(mesh, used[:, 1])
     at = np.full((len(mesh.points), 2), np.nan)
@@ -89,7 +89,8 @@ def _zone_bins(mesh: Mesh, walls: SpanChannel, part: slice) -> MeridionalBins:
     middle /= np.diff(cells.offsets)[:, None]
     at_row, at_column = np.minimum(middle * (k, n), (k - 1, n - 1)).astype(np.int64).T
     span, share = np.meshgrid(np.linspace(0, 1, k + 1), np.linspace(0, 1, n + 1), indexing="ij")
-    low, high = (np.polyval(end, span) for end in ends)
+    low = np.polyval(ends[0], span)
+    high = np.polyval(ends[1], span)
     m_prime = curves.at_length((low + share * (high - low)).ravel(), span.ravel())
     plane = np.stack([m_prime, 0.0 * m_prime, span.ravel()], axis=1)
     places = curves.traced(plane).reshape(k + 1, n + 1, 2)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.motions.motion import Motion
+from slideviz.mesh.model import FloatArray
 
 DIGITS = 10  # significant digits of a scaled value
 
@@ -37,15 +38,18 @@ def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | No
     at_rest = scaled(motions, 0.0)
     if at_rest is None or at_rest != scaled(others, 0.0):
         return None
-    now, before = (
-        np.array([v for m in each for _, value, rest in m.amounts() for v in _list(value, rest)])
-        for each in (motions, others)
-    )
+    now = _amounts(motions)
+    before = _amounts(others)
     if now.shape != before.shape or not before.any():
         return None
     factor = float(now @ before / (before @ before))
     alike = np.abs(now - factor * before).max() <= 1e-6 * np.abs(now).max()
     return factor if alike and factor > 0 else None
+
+
+def _amounts(motions: Sequence[Motion]) -> FloatArray:
+    amounts = [amount for motion in motions for amount in motion.amounts()]
+    return np.array([number for _, value, rest in amounts for number in _list(value, rest)])
 
 
 def _list(value: Any, rest: float) -> list[float]:

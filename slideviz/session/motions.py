@@ -141,14 +141,14 @@ def chord_of(mesh: Mesh, names: Iterable[str]) -> tuple[float, float]:
 
 def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
     """Return the unit direction from an axis to a point, perpendicular to it; None on the axis."""
-    direction, origin = (np.array(values) for values in axis)
+    direction, origin = map(np.array, axis)
     arm = np.array((*point, 0.0)[:3]) - origin
     arm = arm - direction * (arm @ direction) / (direction @ direction)
     length = float(np.linalg.norm(arm))
     if not length > 0.0:
         return None
-    x, y, z = (round(float(v), DIGITS) + 0.0 for v in arm / length)
-    return x, y, z
+    x, y, z = (arm / length).tolist()
+    return round(x, DIGITS) + 0.0, round(y, DIGITS) + 0.0, round(z, DIGITS) + 0.0
 
 
 def new_target(session: Session) -> Target:

@@ -115,11 +115,12 @@ def unsaved_sections(session: Session) -> bool:
     """
     if session.case.source is None or session.view.sections is session.saved_sections:
         return False
-    now, saved = (
-        [replace(section, shown=True, flat=False, name="") for section in sections]
-        for sections in (session.view.sections, session.saved_sections)
-    )
-    return now != saved
+    return _places(session.view.sections) != _places(session.saved_sections)
+
+
+def _places(sections: Sequence[Section]) -> list[Section]:
+    """Return sections without how they are shown."""
+    return [replace(section, shown=True, flat=False, name="") for section in sections]
 
 
 def title_of(session: Session) -> str:

@@ -52,10 +52,8 @@ def wall_rows(session: Session) -> list[WallRow]:
     """Return the rows of the table for the frame shown; none where its walls are not known."""
     rows = []
     for name, entry in _entries(session).items():
-        before, after = (
-            tuple(_text(entry[number][state][end], form) for number, end, form in _NUMBERS)
-            for state in ("before", "after")
-        )
+        before = tuple(_text(entry[name]["before"][end], form) for name, end, form in _NUMBERS)
+        after = tuple(_text(entry[name]["after"][end], form) for name, end, form in _NUMBERS)
         ratio, turned = entry["first_height"]["ratio"], entry["angle"]["change"]["max"]
         ends = " to ".join(dict.fromkeys(_text(ratio[end], ".3f") for end in ("min", "max")))
         change = (ends, "", "", _text(turned, ".1f°"))
@@ -87,7 +85,8 @@ def height_ratios(frame: StepFrame | None, case: Case) -> tuple[float, float] | 
     (None, None) where there are none.
     """
     ends = [entry["first_height"]["ratio"] for entry in _layered(frame, case)]
-    lows, highs = ([end[k] for end in ends if end[k] is not None] for k in ("min", "max"))
+    lows = [end["min"] for end in ends if end["min"] is not None]
+    highs = [end["max"] for end in ends if end["max"] is not None]
     return (min(lows), max(highs)) if lows else (None, None)
 
 

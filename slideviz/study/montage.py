@@ -89,9 +89,8 @@ def _axis(
         if what == "method"
         else MODES
     )
-    asked, shown = (
-        dict.fromkeys(getattr(row.combination, what) for row in group) for group in (rows, done)
-    )
+    asked = dict.fromkeys(getattr(row.combination, what) for row in rows)
+    shown = {getattr(row.combination, what) for row in done}
     left = [name for name in asked if name in shown]
     return {name: (k, words[name] if len(asked) > 1 else "") for k, name in enumerate(left)}
 

@@ -51,7 +51,8 @@ def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
     """Return facets of the rows that have a result; lines of one name look alike in all facets."""
     asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
     done = [(_titles(row), row.result) for row in rows if row.result is not None]
-    methods, modes = (len({titles[axis] for titles, _ in done}) for axis in (0, 1))
+    methods = len({titles[0] for titles, _ in done})
+    modes = len({titles[1] for titles, _ in done})
     # 0: each method is a line, each mode a facet; 1: the other way round.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined

@@ -271,7 +271,8 @@ def _checked(
         )
     rim = np.zeros(count, bool)
     rim[[row for wall in walls.values() for row in wall.rows]] = True
-    inner, at_rim = (float(laid.distances[some].max(initial=0.0)) for some in (~rim, rim))
+    inner = float(laid.distances[~rim].max(initial=0.0))
+    at_rim = float(laid.distances[rim].max(initial=0.0))
     words = f"{of} lies on {motion.path.name}, at most {inner:.3g} away from it"
     if walls:
         words += f"; its rim stays on {' and '.join(walls)}, at most {at_rim:.3g} away from it"

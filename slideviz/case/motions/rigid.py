@@ -345,7 +345,7 @@ def rotated(arm: FloatArray, angle_deg: float, axis: tuple[float, float, float])
     sine = math.sin(angle)
     versine = 2.0 * math.sin(0.5 * angle) ** 2
     length = math.hypot(*axis)
-    a, b, c = (value / length for value in axis)
+    a, b, c = np.divide(axis, length).tolist()
     if arm.shape[1] == 2:
         x, y = arm.T
         return np.stack([-sine * c * y - versine * x, sine * c * x - versine * y], axis=1)

@@ -34,9 +34,11 @@ def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Pla
     """Return the planes of control points that FFD_CONTINUITY= ``continuity`` holds, by axis."""
     depth = CONTINUITIES[continuity]
     if not depth:
-        indices = [list_of(config.words[f"FFD_FIX_{letter}"]) for letter in "IJK"]
-        i, j, k = (frozenset(int(word.text) for word in words) for words in indices)
-        return i & _planes(box, 0), j & _planes(box, 1), k & _planes(box, 2)
+        fixed = []
+        for axis, letter in enumerate("IJK"):
+            words = list_of(config.words[f"FFD_FIX_{letter}"])
+            fixed.append(_planes(box, axis) & {int(word.text) for word in words})
+        return fixed[0], fixed[1], fixed[2]
     ends = _edges(mesh, config.markers, box)
     symmetric = config.words["FFD_SYMMETRY_PLANE"].upper() == "YES" and mesh.dim == 3
     cartesian = box.system.kind == "CARTESIAN"
@@ -142,7 +144,8 @@ def held_by_continuity(
             if variable.box != name:
                 continue
             request = request_of(config, variable)
-            free, left = (sum(map(reach, moves_of(box, request, to))) for to in (NONE, held))
+            free = sum(map(reach, moves_of(box, request, NONE)))
+            left = sum(map(reach, moves_of(box, request, held)))
             if left == 0 < free:
                 stuck.append(place)
             elif left < free:
@@ -175,8 +178,8 @@ def _held_in(zones: list[Su2Config], mesh: Mesh, box: Box) -> Planes:
         held_planes(zone, mesh, box, zone.words["FFD_CONTINUITY"].upper() or SU2_CONTINUITY)
         for zone in zones
     ]
-    i, j, k = (frozenset[int]().union(*planes) for planes in zip(*each, strict=True))
-    return i, j, k
+    i, j, k = zip(*each, strict=True)
+    return frozenset().union(*i), frozenset().union(*j), frozenset().union(*k)
 
 
 def _words(held: Planes) -> str:

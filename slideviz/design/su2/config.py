@@ -300,7 +300,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         raise CaseError(first_lines(path, [*faults]))
     zones = [replace(each[file], zone=zone) for zone, file in enumerate(files, 1)]
     first, reader = zones[0], _Reader(rows, problems)
-    mesh, out = (reader.file(key, FILES[key]) for key in ("MESH_FILENAME", "MESH_OUT_FILENAME"))
+    mesh = reader.file("MESH_FILENAME", FILES["MESH_FILENAME"])
+    out = reader.file("MESH_OUT_FILENAME", FILES["MESH_OUT_FILENAME"])
     strange = [key for key in rows if key not in _read_keys(rows)]
     case = first.case.change(
         source=path,

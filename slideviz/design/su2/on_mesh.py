@@ -72,7 +72,8 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
         return on_mesh(replace(config, zones=()), mesh)
     zones = tuple(_without_missing(_in_zone(each, mesh), mesh) for each in config.zones)
     still = tuple(map(_as_still, zones))
-    moves, asked = ({each.variables[0].group for each in some} for some in (still, zones))
+    asked = {each.variables[0].group for each in zones}
+    moves = {each.variables[0].group for each in still}
     if moves == {"nothing"} != asked:
         raise CaseError(_NO_MARKER.format(config.source))
     return joined(replace(config, case=with_marker_names(config.case, mesh)), still)

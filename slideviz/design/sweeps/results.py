@@ -159,8 +159,8 @@ class SweepResults:
 
     def _cells(self, row: DesignRow) -> list[object]:
         """Return the cells of a row, each in one line, so that a line cut off is known as such."""
-        problem, *warnings = (" ".join(text.split()) for text in (row.problem, *row.warnings))
-        plain = replace(row, problem=problem, warnings=tuple(warnings))
+        warnings = tuple(" ".join(text.split()) for text in row.warnings)
+        plain = replace(row, problem=" ".join(row.problem.split()), warnings=warnings)
         values = [row.values[name] for name in self._designs.columns]
         return cells_of(row.design, values, plain, self._words, self._folder)
 
