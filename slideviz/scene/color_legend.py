@@ -56,10 +56,8 @@ class LegendPlate:
 
     def color_at(self, height: float) -> tuple[int, ...]:
         """Return red, green, blue and opacity (0 to 255) at a height from 0 to 1 of the view."""
-        below, above = (
-            np.array(pv.Color(name).int_rgb, float)
-            for name in (self._scheme.background, self._scheme.background_top)
-        )
+        below = np.array(pv.Color(self._scheme.background).int_rgb, float)
+        above = np.array(pv.Color(self._scheme.background_top).int_rgb, float)
         mixed: FloatArray = below + np.clip(height, 0.0, 1.0) * (above - below)
         return (*(int(part) for part in mixed.round()), round(255 * OPACITY))
 
@@ -218,7 +216,7 @@ def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
     It begins ``below`` pixels (at normal letter size) under the view's upper edge, where lines
     about points may be. Return the rectangle of the bar and its letters, with a margin.
     """
-    width, height = (max(side, 1) for side in plotter.window_size)
+    width, height = np.maximum(plotter.window_size, 1).tolist()
     bar, bottom = plotter.scalar_bars[title], _BOTTOM
     bar.SetPosition(1.0 - (STRIP - 14) * scale / width, bottom)
     # The title is centred on this width: a short one keeps away from the edge of the view.

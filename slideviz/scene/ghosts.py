@@ -86,8 +86,7 @@ class BoxLayer(KeyedLayer):
     def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
         at, words = [], []
         for name, box in boxes.items():
-            first, i, j, k = (box.points[end] for end in ENDS)
-            at += [first, i, j, k][: dim + 1]
+            at += [box.points[end] for end in ENDS[: dim + 1]]
             words += [f"\u2002{word}" for word in (name, *"ijk")[: dim + 1]]
         labels = self.stage.plotter.add_point_labels(
             lifted(np.array(at)[:, :dim], lift),
@@ -235,7 +234,8 @@ class GhostLayer(Layer):
 
     def _rim_color(self, color: str) -> tuple[float, float, float]:
         """Return a color that contrasts with the ghost: its color mixed with that of the text."""
-        base, text = (np.array(pv.Color(one).float_rgb) for one in (color, self.stage.scheme.text))
+        base = np.array(pv.Color(color).float_rgb)
+        text = np.array(pv.Color(self.stage.scheme.text).float_rgb)
         red, green, blue = (0.5 * (base + text)).tolist()
         return red, green, blue
 

@@ -306,7 +306,8 @@ class PolygonActor:
 
 def plain_color(scheme: ColorScheme) -> tuple[float, float, float]:
     """Return the color of polygons without values, visible on any background."""
-    cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (scheme.cell, scheme.ghost))
+    cell = np.array(pv.Color(scheme.cell).float_rgb)
+    ghost = np.array(pv.Color(scheme.ghost).float_rgb)
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue
 

@@ -365,9 +365,8 @@ class PictureDialog(PixelFields, QDialog):
 
     def _make_size(self) -> None:
         self._make_pixels(SIZES)
-        self.width_cm, self.height_cm = (
-            decimal_box(1.0, 200.0, length, self._changed, unit=" cm") for length in PAPER[:2]
-        )
+        self.width_cm = decimal_box(1.0, 200.0, PAPER[0], self._changed, unit=" cm")
+        self.height_cm = decimal_box(1.0, 200.0, PAPER[1], self._changed, unit=" cm")
         tip = "Pixels per inch on paper; journals ask for 300 or more."
         self.dpi = number_box(50, 1200, round(PAPER[2]), self._changed, unit=" dpi", tip=tip)
         self._form = QFormLayout()
@@ -411,8 +410,8 @@ class PictureDialog(PixelFields, QDialog):
         if self.size_choice.currentData() != "paper":
             return PictureOptions(self.pixels, background, **picked, letters=text * LETTERS)
         dpi = float(self.dpi.value())
-        wide, high = (round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
-        size = wide, high
+        wide = round(self.width_cm.value() / 2.54 * dpi)
+        size = (wide, round(self.height_cm.value() / 2.54 * dpi))
         letters = text * PAPER_POINTS / 72.0 * dpi / 13.0 / font_scale(size)
         return PictureOptions(size, background, **picked, letters=letters, dpi=dpi)
 
@@ -436,8 +435,8 @@ class PictureDialog(PixelFields, QDialog):
         known = asdict(usual)
         try:
             known.update(json.loads(kept) if kept else {})
-            width, height = (int(length) for length in known["size"])
-            across, high, dpi = (float(number) for number in known.get("paper", PAPER))
+            width, height = map(int, known["size"])
+            across, high, dpi = map(float, known.get("paper", PAPER))
         except (TypeError, ValueError, KeyError):
             known, (width, height), (across, high, dpi) = asdict(usual), usual.size, PAPER
         self.width_px.setValue(width)

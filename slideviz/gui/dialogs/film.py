@@ -60,9 +60,9 @@ class PixelFields:
     def _make_pixels(self, words: Mapping[str, str]) -> None:
         self.size_choice = Choice(words)
         self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = (
-            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
-        )
+        typed = self._pixels_typed
+        self.width_px = number_box(SMALLEST, LARGEST, SMALLEST, typed, unit=" px")
+        self.height_px = number_box(SMALLEST, LARGEST, SMALLEST, typed, unit=" px")
 
     @property
     def pixels(self) -> tuple[int, int]:

@@ -110,7 +110,7 @@ class BrushCanvas(PlotCanvas):
         super().paintEvent(event)
         if self.band is None or not self.figure.axes:
             return
-        left, right = (self.pixel_of(value) for value in self.band)
+        left, right = map(self.pixel_of, self.band)
         top, height = self.axes_rows()
         painter = QPainter(self)
         color = QColor(SELECTED_COLOR)

@@ -336,9 +336,8 @@ class SectionsPanel(Panel):
             choice.triggered.connect(lambda _=False, paper=paper: self._want_picture(paper))
         self.sizes.addAction("Other size…").triggered.connect(self._want_other_size)
         self.sizes.addSeparator()
-        self.titled, self.with_axes = (
-            self.sizes.addAction(words) for words in ("With title", "With axes")
-        )
+        self.titled = self.sizes.addAction("With title")
+        self.with_axes = self.sizes.addAction("With axes")
         for part in (self.titled, self.with_axes):
             part.setCheckable(True)
             part.setChecked(True)

@@ -252,7 +252,8 @@ def is_larger_stacked(extent: tuple[float, float], available: tuple[int, int]) -
     ``extent`` (float, float): width and height of one section, in the mesh's length unit.
     ``available`` (int, int): width and height of both views together, in pixels.
     """
-    wide, high = (max(length, 1e-300) for length in extent)
+    wide = max(extent[0], 1e-300)
+    high = max(extent[1], 1e-300)
     width, height = available
     beside = min(0.5 * width / wide, (height - FRAME_PX) / high)
     above = min(width / wide, (0.5 * height - FRAME_PX) / high)

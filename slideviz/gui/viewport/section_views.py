@@ -169,7 +169,8 @@ class PlaneHandle:
         self._dragging(dragging)
 
     def _color(self, scheme: ColorScheme) -> None:
-        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOR, scheme.text))
+        strong = pv.Color(SELECTED_COLOR).float_rgb
+        plain = pv.Color(scheme.text).float_rgb
         shape = self.shape
         shape.SetForegroundColor(*plain)
         shape.SetEdgeColor(*plain)

@@ -209,7 +209,8 @@ class PlotCanvas(QWidget):
         if self._stale:
             return
         ratio = self.devicePixelRatioF()
-        wide, high = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
+        wide = max(1, round(ratio * self.width()))
+        high = max(1, round(ratio * self.height()))
         paper = PlotFormat(wide, high, ratio, self.style_)
         self._coming = draw_in_thread(self.drawing(), paper, self._picture.place)
         self._look_after.start()

@@ -189,7 +189,8 @@ def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, floa
     dialog = QDialog(parent)
     dialog.setWindowTitle("Size of the picture")
     form = QFormLayout(dialog)
-    wide, high = (decimal_box(4.0, 100.0, value, unit=" cm") for value in (width, height))
+    wide = decimal_box(4.0, 100.0, width, unit=" cm")
+    high = decimal_box(4.0, 100.0, height, unit=" cm")
     form.addRow("Width", wide)
     form.addRow("Height, at most", high)
     kinds = QDialogButtonBox.StandardButton

@@ -65,7 +65,8 @@ class SpanWalls(Panel):
             end.show_value((span or self._by_name or ("", ""))[k])
 
     def _chosen(self, _: object) -> None:
-        hub, shroud = (end.currentData() for end in self.ends)
+        hub = self.ends[0].currentData()
+        shroud = self.ends[1].currentData()
         if hub and shroud:
             span = None if (hub, shroud) == self._by_name else (hub, shroud)
             self.store.change(changes.set_case, span=span)
