@@ -138,9 +138,9 @@ def test_slanted_walls_are_solved_together(tmp_path, monkeypatch):
     turned = mesh.with_points(mesh.points @ turn)
     shift = np.array([-0.05, 0.03])
     case = case.change(influence_factor=2.5)
-    plain = case.change(motions=(sv.case.model.Translate("BLOCK", tuple(shift)),))
+    plain = case.change(motions=(Translate("BLOCK", tuple(shift)),))
     aslant = case.change(
-        motions=(sv.case.model.Translate("BLOCK", tuple(shift @ turn)),),
+        motions=(Translate("BLOCK", tuple(shift @ turn)),),
         influence_factor=2.5 * mesh.extent / turned.extent,
     )
     seen = counted(monkeypatch, together=False)
