@@ -167,8 +167,9 @@ def test_coordinates_that_are_not_finite_are_refused_by_node(bad):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_displacement_that_overflows_is_told(method):
     mesh = builders.square(6)
+    case = square_case(mesh, vector=(9e49, 9e49), sliding=method)
     with pytest.raises(CaseError, match="so move it less"):
-        last(square_case(mesh, vector=(1e308, 1e308), sliding=method), mesh)
+        last(case.change(motions=2 * case.motions), mesh)
 
 
 def test_nothing_known_is_refused():
@@ -284,10 +285,9 @@ def test_a_zero_axis_is_told():
         motions=(Translate("blade", (0.0, 0.0, 0.01)),),
         periodic="periodic",
         periodic_type="rotational",
-        axis=(0.0, 0.0, 0.0),
     )
-    with pytest.raises((CaseError, MeshError), match=r"(?i)axis"):
-        next(sv.deform(case, mesh))
+    with pytest.raises(CaseError, match=r"the axis \(0, 0, 0\) has no direction"):
+        case.change(axis=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("method", ["none", "ds"])

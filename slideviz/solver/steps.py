@@ -167,13 +167,13 @@ class Step:
     safe: SafeFraction | None = None
     """How far this step, straight on, may go until the first cell folds; None where it was not
     asked for."""
-    check_limits: Callable[[Mesh], tuple[LimitResult, ...]] = lambda _: ()
-    """Returns whether a mesh meets each limit of the case."""
+    check_limits: Callable[[Mesh], tuple[LimitResult, ...]] | None = None
+    """Returns whether a mesh meets each limit of the case; None where it has none."""
 
     @cached_property
     def limits(self) -> tuple[LimitResult, ...]:
         """Return whether the mesh meets each limit of the case; measured when first asked for."""
-        return self.check_limits(self.mesh)
+        return () if self.check_limits is None else self.check_limits(self.mesh)
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,7 +118,9 @@ def test_rims_are_on_flat_walls_and_corners_on_both_whatever_the_motion(data):
         for text in last(free, mesh).warnings
         for wall, distance in re.findall(LEFT, text)
     }
-    assert set(told) == {wall for wall, off in measured.items() if off > 1e-6}
+    # Rounding decides of a wall that is off by the threshold itself.
+    assert set(told) >= {wall for wall, off in measured.items() if off > 1.001e-6}
+    assert set(told) <= {wall for wall, off in measured.items() if off > 0.999e-6}
     for wall, distance in told.items():
         assert distance == pytest.approx(measured[wall], rel=6e-3)
 
