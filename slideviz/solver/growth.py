@@ -175,12 +175,17 @@ def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> l
     These are nodes of moving boundaries that they share with sliding or internal ones; and, where
     blades move over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
     """
-    off_span, off_walls = _off_span(setup, case, mesh, points), _off_walls(setup, mesh, points)
+    farthest: dict[tuple[str, str], _OffWall] = {}
+    for off in (*_off_span(setup, case, mesh, points), *_off_walls(setup, mesh, points)):
+        # A wall with edges has several pieces, and is told of once.
+        known = farthest.setdefault((off.boundary, off.wall), off)
+        if off.distance > known.distance:
+            farthest[off.boundary, off.wall] = off
     return [
         f"node {mesh.number(off.node)} of {off.boundary} at "
         f"({', '.join(f'{value:.6g}' for value in points[off.node])}) has left {off.wall} by "
         f"{off.distance:.3g}{off.why}"
-        for off in (*off_span, *off_walls)
+        for off in farthest.values()
     ]
 
 

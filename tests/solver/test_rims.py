@@ -380,3 +380,16 @@ def test_symmetry_planes_of_su2_stay_planes(tmp_path, monkeypatch, capsys):
     assert run(["def", "a.cfg", "--set", "RIMS=SLIDE"]) == 0
     assert "has left" not in capsys.readouterr().err
     assert off_planes(mesh, sv.read("out.su2").points, "z_m")["y_m"] == 0.0
+
+
+def test_a_wall_with_edges_is_told_of_once():
+    mesh = builders.passage((3, 8, 6))
+    roles = blade(mesh) | {"per1": "fixed", "per2": "fixed"}  # so that facets of the hub are flat
+    case = case_of(roles, [sv.Translate("blade", (0.02, 0.01, 0.0))], rims="free")
+    case = case.change(feature_angle_deg=1.0)
+    setup = make_setup(case, mesh)
+    step = last(case, mesh)
+    told = re.findall(LEFT, "\n".join(step.warnings))
+    names = [wall for wall, _ in told]
+    assert len(setup.rims.walls) > len(set(names)) > 0
+    assert len(names) == len(set(names))
