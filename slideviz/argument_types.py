@@ -66,7 +66,8 @@ def check_types(function: Callable[P, Result]) -> Callable[P, Result]:
     fits a tuple. The function raises ArgumentError for arguments of other types. It checks neither
     arguments without annotation, nor which text it is of several in a ``Literal``.
     """
-    code, defaults = function.__code__, function.__defaults__ or ()
+    code = function.__code__
+    defaults = function.__defaults__ or ()
     names = code.co_varnames[: code.co_argcount]
     needed = [name for name in names[: len(names) - len(defaults)] if name not in ("self", "cls")]
     called = f"{function.__qualname__.removesuffix('.__init__')}({', '.join(needed)})"
@@ -99,7 +100,8 @@ def check_fields(value: Any) -> None:
         if isinstance(field, list | np.ndarray) and origin_of(hints[name]) is not np.ndarray:
             object.__setattr__(value, name, _plain(field))
     for name, field in fields.items():
-        chosen, known = getattr(value, name), field.metadata
+        chosen = getattr(value, name)
+        known = field.metadata
         if known and chosen not in (*known, field.default):
             raise CaseError(f"{name}: {not_one_of(chosen, known)}")
 
@@ -123,7 +125,8 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
     for name, value in given:
         wrong = _misfit(value, needed.get(name, Any), name)
         if wrong is not None:
-            value_words, type_words = _value_words(wrong.value), _type_words(wrong.needed)
+            value_words = _value_words(wrong.value)
+            type_words = _type_words(wrong.needed)
             raise ArgumentError(f"{called}: {wrong.place} is {value_words}; expected {type_words}")
 
 
@@ -203,7 +206,8 @@ def _is_numeric(value: object, *, whole: bool) -> bool:
 
 def _parts(value: Any, hint: Any, place: str) -> Iterator[tuple[object, Any, str]]:
     """Yield keys and values of a mapping, or values of a sequence, with their types and places."""
-    kind, inner = origin_of(hint), get_args(hint)
+    kind = origin_of(hint)
+    inner = get_args(hint)
     if kind is Mapping:
         yield from ((key, inner[0], f"a key of {place}") for key in value)
         yield from ((each, inner[1], f"{place}[{key!r}]") for key, each in value.items())
@@ -220,7 +224,8 @@ def _value_words(value: object) -> str:
 
 
 def _type_words(hint: Any) -> str:
-    kind, inner = origin_of(hint) or hint, get_args(hint)
+    kind = origin_of(hint) or hint
+    inner = get_args(hint)
     if kind is Annotated:
         return str(inner[1])
     if hint is ArrayLike or kind is np.ndarray:

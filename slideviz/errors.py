@@ -36,7 +36,8 @@ class NodeError(DeformError):
 
     def __init__(self, sentence: str, *nodes: int) -> None:
         super().__init__(sentence.format(*nodes))
-        self.sentence, self.nodes = sentence, nodes
+        self.sentence = sentence
+        self.nodes = nodes
 
 
 class UnsoundError(DeformError):

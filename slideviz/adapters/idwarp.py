@@ -112,7 +112,8 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
     """Return the surface of undeformed coordinates (N, d); CaseError if they are of another."""
     boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
-    far, surface = np.asarray(distance), SolverSurface(mesh, moving, boundary[found])
+    far = np.asarray(distance)
+    surface = SolverSurface(mesh, moving, boundary[found])
     if far.max(initial=0.0) > surface.tolerance:
         worst = int(far.argmax())
         raise CaseError(
@@ -208,7 +209,8 @@ class USMesh:
 
         Raises CaseError if there is no such coordinate.
         """
-        indices, size = np.asarray(ind, np.int64).ravel(), self._order.size * self._points.shape[1]
+        indices = np.asarray(ind, np.int64).ravel()
+        size = self._order.size * self._points.shape[1]
         if len(indices) and not 0 <= indices.min() <= indices.max() < size:
             raise CaseError(
                 f"indices of the solver's grid go from {indices.min()} to {indices.max()}; the "
@@ -349,7 +351,8 @@ class USMesh:
 
         ``solver``: in the order of `getSolverGrid`; else of `getWarpGrid`.
         """
-        given, dim = np.asarray(values, np.float64).ravel(), self._points.shape[1]
+        given = np.asarray(values, np.float64).ravel()
+        dim = self._points.shape[1]
         places = (self._order[:, None] * dim + np.arange(dim)).ravel()
         if solver:
             places = places[self._indices]
@@ -383,7 +386,8 @@ def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
             "mesh deforms",
             stacklevel=3,
         )
-    mesh, case = options["gridFile"], options["case"]
+    mesh = options["gridFile"]
+    case = options["case"]
     if not isinstance(mesh, Mesh):
         mesh = read(mesh)
     if not isinstance(case, Case):

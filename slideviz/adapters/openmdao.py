@@ -35,7 +35,9 @@ Slope = tuple[float, "FloatArray"]  # a number, and its derivative by the points
 SURFACE = MPhysVariables.Aerodynamics.Surface.COORDINATES
 MESH_SURFACE = MPhysVariables.Aerodynamics.Surface.Mesh.COORDINATES
 VOLUME = "aero_vol_coords"
-MINIMUM, MEAN, MARGIN = "minimum_quality", "mean_quality", "minimum_margin"
+MINIMUM = "minimum_quality"
+MEAN = "mean_quality"
+MARGIN = "minimum_margin"
 
 
 class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
@@ -134,7 +136,9 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
 
         ``points`` (n, d) are those of the deformed mesh, if known.
         """
-        deformer, kept, options = self.options["deformer"], self._measured, self.options
+        deformer = self.options["deformer"]
+        kept = self._measured
+        options = self.options
         if kept is None or kept[0] is not deformer or not np.array_equal(kept[1], displacement):
             found: dict[str, Slope] = {}
             if options["quality"] or options["margin"]:
@@ -196,7 +200,8 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
         p: float = 50.0,
     ) -> None:
         super().__init__()
-        self.deformer, self.solver = deformer, solver
+        self.deformer = deformer
+        self.solver = solver
         self.in_coupling = in_coupling or solver is None
         self._options = {"deformer": deformer, "quality": quality, "margin": margin, "p": p}
 
@@ -238,7 +243,8 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
 
         Raises MeshError if the mesh has no such boundary.
         """
-        mesh, found = self.deformer.mesh, np.zeros(len(self.deformer.nodes), bool)
+        mesh = self.deformer.mesh
+        found = np.zeros(len(self.deformer.nodes), bool)
         for tag in tags:
             found |= np.isin(self.deformer.nodes, mesh.marker(tag).nodes)
         return np.flatnonzero(found)

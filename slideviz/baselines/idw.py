@@ -66,8 +66,10 @@ def weighted_means(
     scale = np.full((4, 1), 1.0 / basis.radius)
     if basis.period > 0:
         scale[1:3] = 1.0
-    x, c = padded_rows(targets, 4) * scale, padded_rows(sources, 4) * scale
-    v, g = padded_rows(values.T, 3), np.ascontiguousarray(weights, float)
+    x = padded_rows(targets, 4) * scale
+    c = padded_rows(sources, 4) * scale
+    v = padded_rows(values.T, 3)
+    g = np.ascontiguousarray(weights, float)
     total = x.shape[1]
     out = np.empty((3, total))
     size = max(1, CHUNK // max(1, c.shape[1]))
@@ -89,7 +91,8 @@ def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solutio
 
     Raises DeformError if coinciding nodes are asked to move differently.
     """
-    nodes, values = problem.known, problem.values
+    nodes = problem.known
+    values = problem.values
     for level in (problem.edge, problem.surface):
         if not len(level):
             continue
@@ -98,7 +101,8 @@ def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solutio
             free = within(problem, level, free)
         with timer.phase("project"):
             slid: Array = problem.project(level, free)
-        nodes, values = np.concatenate([nodes, level]), join(values, slid)
+        nodes = np.concatenate([nodes, level])
+        values = join(values, slid)
     displacement, field = _means(problem, timer, nodes, values, problem.features, weights)
     errors = largest_norm(take(displacement, nodes) - values)
     return Solution(
@@ -124,7 +128,8 @@ def _means(
     From ``values`` (..., b, d) at nodes ``known`` (b,), coinciding nodes merged.
     """
     nodes, data = merge(problem, known, values)
-    sources, power = columns(problem.features, nodes), weights.power
+    sources = columns(problem.features, nodes)
+    power = weights.power
     node_weights = weights.of(value(data))
     field = WeightedField(problem.basis, value(sources), value(data), node_weights, power)
     with timer.phase("evaluate") as tick:
@@ -171,20 +176,36 @@ def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
 
     Of values w (3, n) at sources c (4, n), with weights g (n,) besides that of the distance.
     """
-    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
-    w0, w1, w2 = w[0], w[1], w[2]
+    c0 = c[0]
+    c1 = c[1]
+    c2 = c[2]
+    c3 = c[3]
+    w0 = w[0]
+    w1 = w[1]
+    w2 = w[2]
     for i in prange(x.shape[1]):
-        x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
-        s0, s1, s2, total = 0.0, 0.0, 0.0, 0.0
+        x0 = x[0, i]
+        x1 = x[1, i]
+        x2 = x[2, i]
+        x3 = x[3, i]
+        s0 = 0.0
+        s1 = 0.0
+        s2 = 0.0
+        total = 0.0
         for j in range(c.shape[1]):
-            d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
+            d0 = x0 - c0[j]
+            d1 = x1 - c1[j]
+            d2 = x2 - c2[j]
+            d3 = x3 - c3[j]
             squared = max(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3, TINY)
             p = g[j] * _weight(squared, power)
             s0 += w0[j] * p
             s1 += w1[j] * p
             s2 += w2[j] * p
             total += p
-        out[0, i], out[1, i], out[2, i] = s0 / total, s1 / total, s2 / total
+        out[0, i] = s0 / total
+        out[1, i] = s1 / total
+        out[2, i] = s2 / total
 
 
 @njit(**OPTIONS)
@@ -193,11 +214,17 @@ def _squares(x, c, start, count, period_over_pi, q):  # type: ignore[no-untyped-
 
     With a rotational period, as ``compiled.distances``; at least ``TINY``.
     """
-    c0, c1 = c[0, start : start + count], c[1, start : start + count]
-    c2, c3 = c[2, start : start + count], c[3, start : start + count]
-    r, sine, cosine, z = x[0], x[1], x[2], x[3]
+    c0 = c[0, start : start + count]
+    c1 = c[1, start : start + count]
+    c2 = c[2, start : start + count]
+    c3 = c[3, start : start + count]
+    r = x[0]
+    sine = x[1]
+    cosine = x[2]
+    z = x[3]
     for j in range(count):
-        dr, dz = r - c0[j], z - c3[j]
+        dr = r - c0[j]
+        dz = z - c3[j]
         chord = 2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
         q[j] = max(dr * dr + chord + dz * dz, TINY)
 
@@ -229,7 +256,10 @@ def weigh_rotational(x, c, w, g, power, period_over_pi, out):  # type: ignore[no
         q = np.empty(BLOCK)
         first = task * TARGETS_PER_TASK
         for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            s0, s1, s2, total = 0.0, 0.0, 0.0, 0.0
+            s0 = 0.0
+            s1 = 0.0
+            s2 = 0.0
+            total = 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 _squares(x[:, i], c, start, count, period_over_pi, q)
@@ -240,4 +270,6 @@ def weigh_rotational(x, c, w, g, power, period_over_pi, out):  # type: ignore[no
                     s1 += w[1, start + j] * p
                     s2 += w[2, start + j] * p
                     total += p
-            out[0, i], out[1, i], out[2, i] = s0 / total, s1 / total, s2 / total
+            out[0, i] = s0 / total
+            out[1, i] = s1 / total
+            out[2, i] = s2 / total

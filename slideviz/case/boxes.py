@@ -68,7 +68,8 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
 def _defined(
     case: Case, dim: int, name: str, numbers: tuple[float, ...], degrees: tuple[int, int, int]
 ) -> Box:
-    corners, system = np.array(numbers).reshape(8, 3), system_of(case)
+    corners = np.array(numbers).reshape(8, 3)
+    system = system_of(case)
     i, j, k = (*degrees[:dim], 1)[:3]
     first, second, third = (*case.ffd_orders[:dim], 2)[:3]
     if dim == 2 and system.kind == "POLAR":  # j goes about the axis

@@ -75,7 +75,8 @@ def set_key(case: Case, key: str, value: str) -> Case:
     try:
         wanted = row.kind.read(value.strip())
         if row.name in _ROLE_OF:
-            role, roles = _ROLE_OF[row.name], case.roles.items()
+            role = _ROLE_OF[row.name]
+            roles = case.roles.items()
             case = case.change(roles={k: r for k, r in roles if r != role and k not in wanted})
         changed = row.put(case, wanted)
     except CaseError as problem:
@@ -113,7 +114,9 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
             problems.append((entry.line, sentence))
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
-    case, values, remarks = Case(), dict[str, Any](), list[str]()
+    case = Case()
+    values = dict[str, Any]()
+    remarks = list[str]()
     for name, key in KEYS.items():
         if name not in rows:
             continue

@@ -111,7 +111,8 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
             if name in moving or name in seen or without_zone(name) in spelt:
                 continue
             seen.add(name)
-            remedy, several = f"one of the two is wrong{nearest(name, moving)}", name.split("+")
+            remedy = f"one of the two is wrong{nearest(name, moving)}"
+            several = name.split("+")
             if set(several) <= set(moving):
                 markers = ", ".join(several)
                 remedy = f"write several in brackets, as in (({markers}), translate, ...)"
@@ -260,7 +261,8 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
 def idle_roles(case: Case) -> tuple[str, ...]:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     problems = []
-    periodic, sliding = case.markers_with("periodic"), case.markers_with("sliding")
+    periodic = case.markers_with("periodic")
+    sliding = case.markers_with("sliding")
     if periodic and case.periodic == "none":
         problems.append(
             f"PERIODIC_MODE= none: {' and '.join(periodic)} will not stay periodic; with "

@@ -275,7 +275,8 @@ def _table_problems(
             problems.append((row_line[k], _with_count(sentence, int(np.count_nonzero(wrong)))))
     if differ.any():
         k = int(np.argmax(differ))
-        before, after = row_line[order[k]], row_line[order[k + 1]]
+        before = row_line[order[k]]
+        after = row_line[order[k + 1]]
         sentence = f"node {int(index[order[k]])} has another {what} in line {before}"
         sentence += "; keep one of the two"
         problems.append((after, _with_count(sentence, int(np.count_nonzero(differ)))))

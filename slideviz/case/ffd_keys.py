@@ -84,7 +84,8 @@ def _without_axis(case: Case) -> str:
 
 def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     """Return the FFD keys that contradict each other, with a sentence."""
-    boxes, degrees = len(case.ffd_boxes), len(case.ffd_degrees)
+    boxes = len(case.ffd_boxes)
+    degrees = len(case.ffd_degrees)
     if boxes == degrees or not boxes:
         return []
     sentence = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}" if degrees else ""

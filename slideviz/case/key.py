@@ -14,8 +14,13 @@ Put = Callable[[Case, Any], Case]
 Get = Callable[[Case], Any]
 Form = Literal["main", "more"]
 NO_DEFAULT = "not set"
-FILES, BOUNDARIES, MOTION = "Files", "Boundaries", "Motion"
-PERIODICITY, METHOD, REDUCTION, QUALITY = "Periodicity", "Method", "Data reduction", "Quality"
+FILES = "Files"
+BOUNDARIES = "Boundaries"
+MOTION = "Motion"
+PERIODICITY = "Periodicity"
+METHOD = "Method"
+REDUCTION = "Data reduction"
+QUALITY = "Quality"
 VIEW = "View"
 GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY, VIEW)
 
@@ -99,7 +104,8 @@ def field_row(
     Without a ``kind`` its values are those of the field's enumeration, or YES and NO. A field of
     the method panel has by default the key as its label. ``owner``: has the default.
     """
-    terms, default = owner.__dataclass_fields__[field].metadata, getattr(owner, field)
+    terms = owner.__dataclass_fields__[field].metadata
+    default = getattr(owner, field)
     kind = kind or (one_of(terms) if terms else YES_NO)
     if "form" in window:
         window = {"label": name.replace("_", " ").capitalize(), **window}

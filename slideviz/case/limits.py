@@ -114,7 +114,8 @@ def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
         assert measured.mesh is not None
         names = (marker,) if marker else measured.boundaries
         found = walls(measured.mesh, measured.reference, names)
-        boundary, corner = found.columns.boundary, found.columns.corner
+        boundary = found.columns.boundary
+        corner = found.columns.corner
         wanted = [one for one in found.markers if marker or one in found.layered]
         some = np.isin(boundary.marker, [boundary.names.index(one) for one in wanted])
         width = corner.shape[1]
@@ -397,8 +398,10 @@ def outcome(results: Sequence[LimitResult]) -> str:
 
 
 def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
-    row, quality = NUMBERS[limit.name], measured.quality
-    actual, total = np.nan, row.total is not None
+    row = NUMBERS[limit.name]
+    quality = measured.quality
+    actual = np.nan
+    total = row.total is not None
     if row.total is not None:
         actual = float(row.total(quality))
         if row.values is None:
@@ -410,7 +413,8 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
     assert row.values is not None
     values, ids, boundary, names = row.values(measured, limit.marker)
     low = limit.sign[0] == ">"
-    failing, by_how_much = [np.empty(0, np.int64)], [np.empty(0)]
+    failing = [np.empty(0, np.int64)]
+    by_how_much = [np.empty(0)]
     places = [np.empty(0, np.int64)]
     for first in range(0, len(values), PIECE):  # they may be in a file, and not fit into memory
         some = values[first : first + PIECE]
@@ -455,7 +459,8 @@ def read_limits(text: str) -> tuple[Limit, ...]:
     inside = inside.removeprefix("(").removesuffix(")").strip()
     if not inside or inside.upper() == "NONE":
         return ()
-    limits, problems = [], []
+    limits = []
+    problems = []
     for item in _ITEM.findall(inside):
         try:
             limits.append(_read_limit(item.strip()))

@@ -47,7 +47,8 @@ def greedy(
     Where a case has no data reduction, the value is checked and not kept.
     """
     field = field or name.lower()
-    usual, window = getattr(Reduction(), field), {"idle_reason": _why_no_reduction, **window}
+    usual = getattr(Reduction(), field)
+    window = {"idle_reason": _why_no_reduction, **window}
 
     def put(case: Case, value: Any) -> Case:
         if case.reduction is None:

@@ -13,7 +13,8 @@ from slideviz.mesh.periodic import pair_up
 if TYPE_CHECKING:
     from slideviz.case.model import Case
 
-HUBS, SHROUDS = ("hub",), ("shroud", "casing")
+HUBS = ("hub",)
+SHROUDS = ("shroud", "casing")
 """Words in the names of boundaries, by which SPAN= AUTO finds hub and shroud."""
 WALLS_KEY = "SPAN= ( HUB, SHROUD )"
 """How a case names both."""
@@ -53,8 +54,11 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
     The axis is that of the rotational period; without one that of PERIODIC_AXIS, PERIODIC_ORIGIN.
     Raises CaseError or MeshError where there is none.
     """
-    sides, (hub, shroud) = case.markers_with("periodic"), span_ends(case, mesh)
-    axis, origin, period = case.axis, case.origin, WHOLE
+    sides = case.markers_with("periodic")
+    (hub, shroud) = span_ends(case, mesh)
+    axis = case.axis
+    origin = case.origin
+    period = WHOLE
     if sides and mesh.dim == 3:
         inside = without_halo(mesh)[0]
         pair = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)[0]
@@ -63,7 +67,9 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
                 f"{mesh.name} repeats by a translation ({pair.describe()}), so it has no axis "
                 "for a span; move its boundaries otherwise, as with rotate or ffd-twist"
             )
-        axis, origin, period = pair.axis, pair.origin, pair.period
+        axis = pair.axis
+        origin = pair.origin
+        period = pair.period
     return find_span(mesh, hub, shroud, axis, origin, period)
 
 

@@ -34,7 +34,8 @@ MAX_STEPS = 9999  # largest number of steps that the window offers; a case file 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
 # What SU2 writes after each pair of periodic markers: centre, angles, translation.
-_SU2_PAIR, _SU2_GROUP = 2, 11
+_SU2_PAIR = 2
+_SU2_GROUP = 11
 
 
 @dataclass(frozen=True)

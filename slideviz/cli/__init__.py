@@ -54,7 +54,8 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         from slideviz.system.file_checks import protected
 
         arguments = parse(argv)
-        arguments.inputs, arguments.ranks = input_paths(arguments), ranks
+        arguments.inputs = input_paths(arguments)
+        arguments.ranks = ranks
         with (
             protected(lambda: arguments.inputs),
             note_compilation(getattr(arguments, "quiet", False)),
@@ -134,7 +135,8 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
     processes, of `launched`. ``run``: runs the command; called on rank 0 only, while the others
     serve it.
     """
-    count, rank = _number(variable), _number(dict(_LAUNCHERS)[variable])
+    count = _number(variable)
+    rank = _number(dict(_LAUNCHERS)[variable])
     if rank:
         _silence()
     if argv[:1] != ["run"] or not {"--stream", "--resume"} & set(argv):

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.study.combinations import Combination, CombinationRow
 
-TABLE, HISTORY = "compare.csv", "convergence.csv"
+TABLE = "compare.csv"
+HISTORY = "convergence.csv"
 KEPT_BYTES = 1_500_000_000
 """Most bytes of deformed meshes that are kept in memory, for the pictures."""
 
@@ -173,7 +174,8 @@ def _computed(
         terminal_line,
     )
 
-    table, histories = folder / TABLE, folder / HISTORY
+    table = folder / TABLE
+    histories = folder / HISTORY
     files = [table]
     rows: list[CombinationRow] = []
     reasons: list[str] = []

@@ -87,7 +87,8 @@ def run_def(arguments: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
-    output, kind = config.case.mesh_out, config.case.mesh_out_format
+    output = config.case.mesh_out
+    kind = config.case.mesh_out_format
     assert output is not None
     remedy = "choose another name in MESH_OUT_FILENAME, or add --force to write over it"
     replaces = config.case.mesh_file if arguments.force else None
@@ -109,7 +110,8 @@ def run_def(arguments: argparse.Namespace) -> int:
 
     def attempt(design: Su2Config) -> tuple[MovingSurface, list[Step]]:
         surface = first if design is config else make_surface(design, mesh)
-        moves, case = surface.displacement.any(), surface.case()
+        moves = surface.displacement.any()
+        case = surface.case()
         if surface.moves_whole_mesh or not moves:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
         return surface, run_steps(arguments, case, mesh)
@@ -165,7 +167,8 @@ def _relaxation_told(config: Su2Config) -> Iterator[None]:
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
     """Return the entry of the report for each value of the design variables."""
-    variables, idle = surface.config.variables, surface.idle
+    variables = surface.config.variables
+    idle = surface.idle
     return [
         {"kind": variables[place].kind, "value": variables[place].values[part], "idle": idle[place]}
         for place, part in surface.values

@@ -170,7 +170,8 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     from slideviz.design.sweeps.table import read_designs, require_distinct_times
     from slideviz.session.state import StepFrame
 
-    frames, warnings = [], list[str]()
+    frames = []
+    warnings = list[str]()
     cases = [("", case)]
     if arguments.designs is not None:
         table = read_designs(case, arguments.designs)
@@ -205,7 +206,8 @@ def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: 
         steps = counted(len(run.frames), "design" if last_frame.label else "step")
         print(f"{name}{steps}, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
     most = 1 + max(len(run.frames) for run in runs)
-    images, pace = film_options.count(most), film_options.pace(most)
+    images = film_options.count(most)
+    pace = film_options.pace(most)
     print(f"film: {arguments.output} ({images} images, {pace:.3g} a second)")
     if most - 1 < SMOOTH and not arguments.between:
         print("few steps; --between 20 puts 20 images between two of them")

@@ -80,7 +80,8 @@ def _gap(arguments: argparse.Namespace) -> int:
         with Bar(not arguments.quiet, begun=arguments.begun) as bar:
             *_, last = deform(case, mesh, bar)
         after = gaps(case, last.mesh, arguments.between, reference=mesh)
-        warnings, inverted = last.warnings, quality(last.mesh, mesh).inverted
+        warnings = last.warnings
+        inverted = quality(last.mesh, mesh).inverted
     report = {
         "case": str(case.source or ""),
         "mesh": str(mesh_file),

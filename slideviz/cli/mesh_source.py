@@ -81,7 +81,8 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     from slideviz.formats.files import read
     from slideviz.streaming.stream_input import open_read_only
 
-    folder, reference = Path(tempfile.gettempdir()), getattr(arguments, "reference", None)
+    folder = Path(tempfile.gettempdir())
+    reference = getattr(arguments, "reference", None)
     with ExitStack() as stack:
         with progress_of(arguments, "read") as tick:
 
@@ -109,7 +110,8 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
                 reference = None if base is None else case.mesh_file
         source = _source(stack, mesh, base, skin)
         if case is not None:
-            known, case = len(case.warnings), with_marker_names(case, skin)
+            known = len(case.warnings)
+            case = with_marker_names(case, skin)
             print_remarks(case.warnings[known:], quiet=False)
         read_base = partial(_mesh_of, base) if base is not None else lambda: None
         yield OpenMesh(source, case, reference, read_base, stack)

@@ -185,7 +185,8 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     from slideviz.case.check import idle_roles, raise_all
     from slideviz.errors import CaseError
 
-    before, problems = idle_roles(case), []
+    before = idle_roles(case)
+    problems = []
     taken: dict[str, tuple[str, Role]] = {}
     for text in texts:
         key, sign, value = text.partition("=")
@@ -251,7 +252,8 @@ def zoom(text: str) -> Zoom:
     try:
         *centre, width = map(float, text.split(","))
     except ValueError:
-        centre, width = [], 0.0
+        centre = []
+        width = 0.0
     if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
         raise argparse.ArgumentTypeError(
             f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"

@@ -75,8 +75,10 @@ class Bar:
     ) -> None:
         self._begun = begun
         self.enabled = enabled and sys.stderr.isatty()
-        self._head, self._expected = head, expected
-        self._next, self._phase = 0.0, ""
+        self._head = head
+        self._expected = expected
+        self._next = 0.0
+        self._phase = ""
         self._first = self._filled = 0.0
         self._start = time.monotonic()
 
@@ -118,7 +120,8 @@ class Bar:
         now = time.monotonic()
         self._first = self._first or now
         if progress.phase != self._phase or not progress.fraction:
-            self._phase, self._start = progress.phase, now
+            self._phase = progress.phase
+            self._start = now
         if not self.enabled or now < self._next:
             return
         self._next = now + _EVERY
@@ -127,7 +130,8 @@ class Bar:
         if progress.left is not None:
             spent = now - self._first
             self._filled = max(self._filled, spent / (spent + progress.left or 1.0))
-            filled, left = self._filled, f", about {progress.left:.0f} s left in all"
+            filled = self._filled
+            left = f", about {progress.left:.0f} s left in all"
         word = _PHASES.get(progress.phase, progress.phase)
         self._draw(filled, f"{self._head}{word}{progress.of_zone}: {100 * done:.0f} %{left}")
 

@@ -97,9 +97,11 @@ def quality(arguments: argparse.Namespace) -> int:
                 raise CaseError(f"{name} compares with the undeformed mesh; give a reference")
         rated: dict[Metric, MetricValues | None]
         rated = dict.fromkeys(name for name in METRICS if name in arguments.metrics)
-        mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)
+        mesh = opened.source.mesh
+        found = opened.quality(arguments, metrics=rated)
         values = {name: one for name, one in rated.items() if one is not None}
-        base, case = opened.read_base(), opened.case
+        base = opened.read_base()
+        case = opened.case
         names = case.walls(mesh.marker_names) if case else _not_periodic(base or mesh)
         layers = _walls(mesh, base, names)
         results = check_limits(arguments.limits, MeasuredMesh(found, mesh, base, names))
@@ -157,7 +159,8 @@ def _report(
     from slideviz.cli.run_outcome import report_limits
     from slideviz.cli.terminal import INVERTED
 
-    worst, reference = found.worst(WORST), opened.reference
+    worst = found.worst(WORST)
+    reference = opened.reference
     rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
     report = quality_report(opened.source.mesh.name, found, rows)
     walls = None if layers is None else layers.summary()

@@ -76,7 +76,8 @@ def repair(arguments: argparse.Namespace) -> int:
     from slideviz.formats.losses import warning_of_losses
 
     begin = time.perf_counter()
-    output, path = arguments.output, arguments.mesh
+    output = arguments.output
+    path = arguments.mesh
     replaces = path if arguments.force else None
     require_output_paths(
         arguments,

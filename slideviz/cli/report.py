@@ -66,7 +66,8 @@ def run_report(
     ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
     ``walls``: the layers at the boundaries; None where the mesh is in a file.
     """
-    last, safe = steps[-1], safe_fraction_of(steps)
+    last = steps[-1]
+    safe = safe_fraction_of(steps)
     changed = [] if walls is None else height_warnings(case, walls, last.mesh)
     each = [step.relaxed for step in steps if step.relaxed is not None]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
@@ -229,7 +230,8 @@ def _repaired(steps: Sequence[Step]) -> MeshRepair | None:
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:
     """Return VTK type and first inverted step of the first ``LISTED`` inverted cells, by number."""
     cells = quality.inverted_cells(LISTED)
-    types, when = mesh.cells.types[cells].tolist(), folded_at(steps, mesh, cells).tolist()
+    types = mesh.cells.types[cells].tolist()
+    when = folded_at(steps, mesh, cells).tolist()
     return dict(zip(cells.tolist(), zip(types, when, strict=True), strict=True))
 
 
@@ -257,7 +259,8 @@ def info_report(
     mesh: Mesh, pairs: Sequence[Any], counts: CellCounts, quality: Quality
 ) -> dict[str, Any]:
     """Return the JSON object of ``info --json``; ``mesh`` may be only the skin of the mesh."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    low = mesh.points.min(axis=0)
+    high = mesh.points.max(axis=0)
     halo = mesh.halo
     return {
         "mesh": mesh.name,

@@ -116,7 +116,9 @@ def run(arguments: argparse.Namespace) -> int:
         return report_warnings(*known, quiet=arguments.quiet)
     done = (_stream if streamed else _deform)(arguments, case, output, kind)
     case = with_marker_names(case, done.mesh)
-    found, before, seconds = done.quality, done.undeformed, dict(done.seconds)
+    found = done.quality
+    before = done.undeformed
+    seconds = dict(done.seconds)
     if qualities:
         seconds["write"] -= time.perf_counter()
         write_qualities(qualities, found)
@@ -378,7 +380,8 @@ def _format_of(output: Path, case: Case) -> FileFormat | None:
     """Return the format of MESH_OUT_FORMAT, or None; raise CaseError if ``-o`` contradicts it."""
     from slideviz.errors import CaseError
 
-    kind, ending = case.mesh_out_format, output.suffix.lower()
+    kind = case.mesh_out_format
+    ending = output.suffix.lower()
     if kind and output != case.mesh_out and ending in FORMATS and ending != f".{kind}":
         raise CaseError(
             f"{output}: its ending is {ending}, but MESH_OUT_FORMAT says {kind.upper()}; change "

@@ -59,7 +59,8 @@ def finished(about: str, files: list[Path]) -> tuple[dict, Folded, str] | None:
         is_whole = note.pop("digest") == _digest(note)
         if not is_whole or note["about"] != about or note["files"] != _states(files):
             return None
-        report, harmless = note["report"], note["harmless"]
+        report = note["report"]
+        harmless = note["harmless"]
         report["warnings"] = [Note(t) if t in harmless else t for t in report["warnings"]]
         folded = {cell: (vtk, step) for cell, vtk, step in note["folded"]}
         return report, folded, note["advice"]
@@ -183,7 +184,8 @@ def _print_run(
     )
     from slideviz.mesh.margin import SafeFraction
 
-    counts, spent = report["node_counts"], report["seconds"]
+    counts = report["node_counts"]
+    spent = report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
     auto = " (AUTO)" if report["tried"] else ""
     print(f"{report['case']}: {counted(report['steps'], 'step')}{auto}, {method}", end="")
@@ -295,7 +297,8 @@ def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
     from slideviz.mesh.elements import ELEMENTS
     from slideviz.mesh.margin import SafeFraction
 
-    inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]
+    inverted = report["quality"]["inverted"]
+    cells = report["quality"]["cells"]
     named = ", ".join(
         f"{cell} ({ELEMENTS[vtk].name}, step {step})"
         for cell, (vtk, step) in list(folded.items())[:5]

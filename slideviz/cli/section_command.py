@@ -171,7 +171,9 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     from slideviz.streaming.source import cut_cells, join_blocks
 
     with open_mesh(arguments, case) as opened:
-        mesh, path, case = opened.source.mesh, opened.reference, opened.case
+        mesh = opened.source.mesh
+        path = opened.reference
+        case = opened.case
         if mesh.dim == 2 and arguments.stream:
             raise CaseError(
                 f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
@@ -194,7 +196,8 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
     from slideviz.cli.report import save_json
     from slideviz.cli.terminal import DONE, INVERTED
 
-    mesh, chosen = scene.mesh, scene.chosen
+    mesh = scene.mesh
+    chosen = scene.chosen
     summary = shown.paint.summary(shown.ids)
     if mesh.part is not None:
         summary["worst_cell"] = int(mesh.part.cells[int(summary["worst_cell"])])
@@ -230,8 +233,11 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     from slideviz.session.passages import find_periods
 
     with open_mesh(arguments, case) as opened:
-        mesh, reference, case = opened.source.mesh, opened.reference, opened.case
-        base, quality = opened.read_base(), opened.quality(arguments)
+        mesh = opened.source.mesh
+        reference = opened.reference
+        case = opened.case
+        base = opened.read_base()
+        quality = opened.quality(arguments)
     undeformed = base or mesh
     periods = find_periods(undeformed, case)
     walls = find_walls(undeformed, case, periods, arguments.between, remedy=WALLS_OPTION)

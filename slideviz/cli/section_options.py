@@ -114,7 +114,8 @@ def pixels(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is no size; write it as 1600x1000")
-    width, height = int(match[1]), int(match[2])
+    width = int(match[1])
+    height = int(match[2])
     if not (300 <= width <= 20000 and 200 <= height <= 20000):
         raise argparse.ArgumentTypeError(
             f"{text!r}: pictures are 300x200 to 20000x20000 pixels large"

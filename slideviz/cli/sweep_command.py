@@ -181,7 +181,8 @@ def _pulled(
     from slideviz.system.cleanup import keep_partial
 
     found: list[DesignRow] = []
-    begin, earlier = time.monotonic(), 0
+    begin = time.monotonic()
+    earlier = 0
     with Bar(not arguments.quiet) as bar:
         bar.count(0, total, "designs:")
         for row in rows:

@@ -102,7 +102,8 @@ def _encodable(text: str, encoding: str) -> str:
 @contextmanager
 def terminal_streams() -> Iterator[None]:
     """Context in which stdout and stderr are each a `Terminal`."""
-    out, err = Terminal(sys.stdout, needed=True), Terminal(sys.stderr, needed=False)
+    out = Terminal(sys.stdout, needed=True)
+    err = Terminal(sys.stderr, needed=False)
     with redirect_stdout(out), redirect_stderr(err):
         yield
 

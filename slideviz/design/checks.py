@@ -208,8 +208,10 @@ class Checks:
 
     def off_track(self, coords: FloatArray) -> FloatArray:
         """Return the largest distance, (...,), of a sliding node from its track, in the frame."""
-        tracks, sliding = self.setup.tracks, self.setup.classes.sliding
-        label, off = tracks.of_node[sliding], np.zeros(coords.shape[:-2])
+        tracks = self.setup.tracks
+        sliding = self.setup.classes.sliding
+        label = tracks.of_node[sliding]
+        off = np.zeros(coords.shape[:-2])
         for index, facets in self.facets.items():
             at = flat(coords[..., sliding[label == index], :])
             guess = np.tile(facets, len(at) // len(facets))
@@ -231,7 +233,8 @@ class Checks:
 
 def facets_of(setup: Setup, coords: FloatArray) -> dict[int, IntArray]:
     """Return for each track the simplex (s,) of each sliding node, at ``coords`` in the frame."""
-    tracks, sliding = setup.tracks, setup.classes.sliding
+    tracks = setup.tracks
+    sliding = setup.classes.sliding
     label = tracks.of_node[sliding]
     return {
         index: tracks.tracks[index].nearest(coords[sliding[label == index]])[1]

@@ -114,7 +114,8 @@ def _further(
     Each selection begins with the control nodes of ``chosen``, the solution of the same step for
     another displacement, and adds more where these do not suffice.
     """
-    coords, total = setup.coords, len(parts)
+    coords = setup.coords
+    total = len(parts)
     made: list[Solution] = []
     carried: CarriedError | None = None
     for k, (part, solution) in enumerate(zip(parts, chosen, strict=True)):

@@ -170,7 +170,8 @@ class Deformer:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         case = with_marker_names(case, mesh)
         asked = motion.displacements(case, mesh)
-        self.mesh, self.case = mesh, case
+        self.mesh = mesh
+        self.case = case
         self.nodes, self.displacement = asked.nodes, asked.vectors
         designs = asked.vectors if displacements is None else displacements
         designs = self._checked(designs, "displacements")
@@ -442,7 +443,8 @@ class Deformer:
 
         Returns their errors and error estimates, (2, k). Raises as `_deformed`.
         """
-        setup, (step,) = self._setup, self._steps
+        setup = self._setup
+        (step,) = self._steps
         targets = value(self._input.target(displacement))
         state = step.moved(StepState(setup.coords), targets, out)
         errors = np.maximum(self._checks.off_track(out), state.number("max_error"))

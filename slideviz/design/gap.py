@@ -136,11 +136,13 @@ def gaps(
     for first, second in between:
         if written.get(first, first) == written.get(second, second):
             raise CaseError(f"between: {first!r} is given twice; name two boundaries")
-    at, base = np.asarray(places, float), reference or mesh
+    at = np.asarray(places, float)
+    base = reference or mesh
     zones = zip(zone_cases(case, mesh, False), zones_of(mesh), zones_of(base), strict=True)
     names = [names_from(mesh, part) for part in mesh.zone_parts] or [{}]
     each = zip(zones, names, _by_zone(mesh, between), strict=True)
-    out, blades = list[Gap](), False
+    out = list[Gap]()
+    blades = False
     for number, ((one, zone, start), name, pairs) in enumerate(each, 1):
         if one.markers_with("moving") or pairs or not mesh.zone_parts:
             measure = _Measure(one, zone, start, at, name)
@@ -165,10 +167,13 @@ class _Measure:
         self._labels = labels
         base = without_halo(reference)[0]
         mesh = without_halo(mesh)[0]
-        self.mesh, self.places = mesh, places
+        self.mesh = mesh
+        self.places = places
         self._surfaces = {one.name: one for one in find_surfaces(mesh)}
         names = [n for n in case.markers_with("periodic") if len(mesh.marker(n).cells)]
-        kind, axis, origin = case.periodic_type, case.axis, case.origin
+        kind = case.periodic_type
+        axis = case.axis
+        origin = case.origin
         pairs: Sequence[Pair] = pair_up(base, names, kind, axis, origin) if names else ()
         model = pairs[0] if pairs else None
         self.periods = (-1, 0, 1) if model is not None else (0,)
@@ -216,7 +221,8 @@ class _Measure:
         return of.span(of.meridional(points))[0]
 
     def throat(self) -> Gap | None:
-        nodes, corners = self.nodes(self.blades), self.corners(self.blades)
+        nodes = self.nodes(self.blades)
+        corners = self.corners(self.blades)
         made = bodies(nodes, self.sides)
         several: Gap | None = None
         for body, others in zip(
@@ -231,7 +237,8 @@ class _Measure:
 
     def wall_gap(self, name: str, wall: str, end: int) -> Gap:
         assert self.walls is not None
-        curves, blades = self.walls.curves, self.corners(self.blades)
+        curves = self.walls.curves
+        blades = self.corners(self.blades)
         points = blades.reshape(-1, 3)
         off = np.abs(self.spans(points) - end)
         # Where the tip is along the wall, whatever its distance from it.
@@ -241,7 +248,8 @@ class _Measure:
         def m_prime(at: FloatArray) -> FloatArray:
             return curves.plane(curves.field.meridional(at))[:, 0]
 
-        low, high = float(m_prime(tip).min()), float(m_prime(tip).max())
+        low = float(m_prime(tip).min())
+        high = float(m_prime(tip).max())
 
         def chord(at: FloatArray) -> FloatArray:
             return (m_prime(at) - low) / (high - low)
@@ -250,8 +258,10 @@ class _Measure:
         return replace(gap, first=self._words([wall]), second=self._words(self.blades))
 
     def distance(self, first: str, second: str) -> Gap:
-        one, two = self.corners((first,)), self.images(self.corners((second,)))
-        first, second = self._words([first]), self._words([second])
+        one = self.corners((first,))
+        two = self.images(self.corners((second,)))
+        first = self._words([first])
+        second = self._words([second])
         gap = self._gap(f"{first} to {second}", one, two, self.spans, "span")
         return replace(gap, first=first, second=second)
 
@@ -286,7 +296,8 @@ def _by_zone(mesh: Mesh, between: Sequence[tuple[str, str]]) -> list[list[tuple[
     """Return pairs of boundaries for each zone, with the names of its file."""
     if not mesh.zone_parts:
         return [list(between)]
-    written, out = spellings(mesh), [list[tuple[str, str]]() for _ in mesh.zone_parts]
+    written = spellings(mesh)
+    out = [list[tuple[str, str]]() for _ in mesh.zone_parts]
     for first, second in between:
         one = mesh.marker(written.get(first, first)).name
         other = mesh.marker(written.get(second, second)).name

@@ -62,7 +62,8 @@ class KnownNodeMap:
         ``vectors`` and ``moved`` (..., m, d), (..., s, d): Cartesian displacements of the moving
         nodes, and those of the sources in the frame.
         """
-        setup, mesh = self.setup, self.mesh
+        setup = self.setup
+        mesh = self.mesh
         if len(self.others):
             overwrite = vectors[..., self.others, :]
             follow = difference(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
@@ -75,7 +76,8 @@ class KnownNodeMap:
             self._refuse(vectors)
 
     def _refuse(self, vectors: FloatArray) -> None:
-        setup, mesh = self.setup, self.mesh
+        setup = self.setup
+        mesh = self.mesh
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)
             there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
@@ -96,7 +98,8 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
     of_known = spread.source(setup.known)
     known = np.flatnonzero(of_known >= 0)
     nodes, place = np.unique(of_known[known], return_inverse=True)
-    given, turn = nodes.copy(), None
+    given = nodes.copy()
+    turn = None
     if mesh.halo is not None:
         turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
         row = np.full(len(mesh.points), -1)

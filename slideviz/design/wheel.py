@@ -137,7 +137,8 @@ def wheel(
     cases = [row.case for row in rows]
     if len(rows) < max(counts):
         cases.append(case)
-    points, warnings = [], list[str]()
+    points = []
+    warnings = list[str]()
     for each in cases:
         points.append(mesh.points)
         if each.motions:
@@ -175,7 +176,8 @@ def _repeated(
     case: Case, mesh: Mesh, passages: Count | Sequence[Count]
 ) -> list[tuple[Mesh, tuple[Pair, ...], int]]:
     """Return the passage of each zone without halo, its periodic sides, and how many it has."""
-    cases, zones = zone_cases(case, mesh, False), zones_of(mesh)
+    cases = zone_cases(case, mesh, False)
+    zones = zones_of(mesh)
     each = [passages] * len(zones) if isinstance(passages, int | str) else passages
     if len(each) != len(zones):
         raise CaseError(
@@ -252,12 +254,16 @@ def write_wheel(
         for case, rated, each in zip(cases, measured, moved, strict=True)
         for result in check_case_limits(case, rated, each, mesh)
     ]
-    contents, zones, first = [], [], 0
+    contents = []
+    zones = []
+    first = 0
     for index, (base, pairs, count) in enumerate(_repeated(cases[-1], mesh, passages)):
         copies = [base.with_points(zones_of(each)[index].points) for each in moved]
         size = len(zones_of(mesh)[index].cells)
         rated = [each.take(np.arange(first, first + size)) for each in measured]
-        end, first = len(cases) - 1, first + size  # of ``end`` all further passages are copies
+        # Of ``end`` all further passages are copies.
+        end = len(cases) - 1
+        first = first + size
         wheel = Wheel([copies[min(k, end)] for k in range(count)], pairs, numbered)
         with _in_zone(mesh, index):
             contents.append(wheel.content())
@@ -311,7 +317,8 @@ def _write(
     path: Path, contents: Sequence[ZoneContent], progress: Callable[[Progress], None]
 ) -> None:
     """Write the wheels of zones, and call ``progress`` after each block."""
-    total, done = sum(each.n_cells + each.n_points for each in contents), 0
+    total = sum(each.n_cells + each.n_points for each in contents)
+    done = 0
 
     def counted(content: ZoneContent) -> ZoneContent:
         def points(i: int, j: int) -> FloatArray:

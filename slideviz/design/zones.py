@@ -76,12 +76,14 @@ def zone_designs(
     ``nodes`` (m,): the nodes of the design. ``references`` (k, m, d): the designs to choose control
     nodes for. ``make`` returns a deformer for a zone, its case and its designs.
     """
-    motion, designs = InterfaceMotion(case, mesh), list[ZoneDesign]()
+    motion = InterfaceMotion(case, mesh)
+    designs = list[ZoneDesign]()
     shared = np.concatenate([nodes[:0], *(each.nodes for each in motion.interfaces)])
     shift = np.zeros((len(references), *mesh.points.shape))
     deformed = np.zeros(len(mesh.points), bool)
     for index, ahead in motion.leaders_first():
-        part, own = mesh.zone_parts[index], motion.cases[index]
+        part = mesh.zone_parts[index]
+        own = motion.cases[index]
         points = np.arange(part.points.start, part.points.stop)
         on = [part.mesh.marker(name).nodes for name in own.markers_with("moving")]
         mine = np.unique(np.concatenate(on)) + part.points.start

@@ -120,7 +120,8 @@ class HeldRows:
 
 def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
     """Return the rows that hold blocks of unknowns; ``place`` (n,) is the block of each node."""
-    nodes, across = problem.normal_nodes, np.zeros((0, value(problem.coords).shape[1]))
+    nodes = problem.normal_nodes
+    across = np.zeros((0, value(problem.coords).shape[1]))
     on_axis = np.flatnonzero(body.axis)
     if len(on_axis):
         assert body.frame.axis is not None
@@ -137,7 +138,8 @@ def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
 
 def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
     """Return the projections P_k (count, d, d) on the directions in which unknowns may move."""
-    nodes, held = problem.normal_nodes, held_rows(problem, body, place)
+    nodes = problem.normal_nodes
+    held = held_rows(problem, body, place)
     own = cartesian_normals(body.frame, value(problem.coords)[nodes], value(problem.normals))
     normals = np.concatenate([own, held.axis])
     normals[held.images] = np.einsum("mij,mj->mi", held.back, normals[held.images])
@@ -145,7 +147,8 @@ def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> F
     free = np.tile(np.eye(value(problem.coords).shape[1]), (count, 1, 1))
     # The first constraint of each block, then the second of each, and so on.
     for k in range(int(held.turn.max(initial=-1)) + 1):
-        here, normal = held.place[held.turn == k], normals[held.turn == k]
+        here = held.place[held.turn == k]
+        normal = normals[held.turn == k]
         left = np.einsum("mij,mj->mi", free[here], normal)
         length = np.linalg.norm(left, axis=1)
         # Normals that are nearly alike are one: those of the two sides of a periodic mesh.

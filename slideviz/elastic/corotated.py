@@ -43,7 +43,8 @@ LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))  # Lamé's constants f
 LANES = 64
 """Elements that are computed together: loops over fewer are unrolled, and become no vectors."""
 
-NEWTON, CLOSE = 6, 1e-7
+NEWTON = 6
+CLOSE = 1e-7
 """Newton's iterations for the polar part, and the change in the last one that proves that it
 converged (quadratically)."""
 
@@ -115,7 +116,8 @@ class Corotated:
 
     def _summed(self, field: FloatArray, rotations: FloatArray, shapes: float) -> FloatArray:
         """Return the sum of R K (R^T field - shapes X)."""
-        turn, y = _plain(rotations), _plain(field)
+        turn = _plain(rotations)
+        y = _plain(field)
 
         def add(elements: Elements, rows: slice, out: FloatArray) -> None:
             turned(elements, turn[rows], y, shapes, out)
@@ -126,7 +128,8 @@ class Corotated:
         self, x: FloatArray, along: FloatArray, turns: FloatArray | None, *, reverse: bool
     ) -> FloatArray:
         turn = _plain(self.rotations(x) if turns is None else turns)
-        at, t = _plain(x), _plain(along)
+        at = _plain(x)
+        t = _plain(along)
 
         def add(elements: Elements, rows: slice, out: FloatArray) -> None:
             changed(elements, turn[rows], at, t, reverse, out)
@@ -145,7 +148,8 @@ class Corotated:
 
             body = _plain(self.points), sealed(part.nodes), part.shape, sealed(modulus)
             in_parts(partial(_add_part, add, body, rows.start, corners), m)
-        out, (indptr, entries) = np.empty((n, d)), self._corners
+        out = np.empty((n, d))
+        (indptr, entries) = self._corners
         in_parts(lambda s: gather(indptr[s.start : s.stop + 1], entries, each, out[s]), n)
         return out
 
@@ -285,10 +289,16 @@ def _polar(m, change):  # type: ignore[no-untyped-def]
     """
     for _ in range(NEWTON):
         for k in range(LANES):
-            a, b, c = _row(m, 0, k), _row(m, 1, k), _row(m, 2, k)
-            x, y, z = cross3(b, c), cross3(c, a), cross3(a, b)
+            a = _row(m, 0, k)
+            b = _row(m, 1, k)
+            c = _row(m, 2, k)
+            x = cross3(b, c)
+            y = cross3(c, a)
+            z = cross3(a, b)
             det = dot3(a, x)
-            x, y, z = _half_change(x, a, det), _half_change(y, b, det), _half_change(z, c, det)
+            x = _half_change(x, a, det)
+            y = _half_change(y, b, det)
+            z = _half_change(z, c, det)
             size = abs(x[0]) + abs(x[1]) + abs(x[2]) + abs(y[0]) + abs(y[1]) + abs(y[2])
             change[k] = size + abs(z[0]) + abs(z[1]) + abs(z[2]) if det > 0.0 else np.inf
             _set_row(m, 0, k, add3(a, x))
@@ -299,11 +309,17 @@ def _polar(m, change):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def turns(points, nodes, x, out):  # type: ignore[no-untyped-def]
     """Write the rotations of elements at positions x (n, d) to out (m, d, d)."""
-    n, d = nodes.shape[1], points.shape[1]
-    corners, w = np.empty((n, d, LANES)), np.empty((n, d, LANES))
-    r, f = np.empty((d, d, LANES)), np.empty(9 * LANES)
-    fast, change, one = np.empty(9 * LANES), np.empty(LANES), np.empty((d, d))
-    work, vectors = np.empty((4, 4)), np.empty((4, 4))
+    n = nodes.shape[1]
+    d = points.shape[1]
+    corners = np.empty((n, d, LANES))
+    w = np.empty((n, d, LANES))
+    r = np.empty((d, d, LANES))
+    f = np.empty(9 * LANES)
+    fast = np.empty(9 * LANES)
+    change = np.empty(LANES)
+    one = np.empty((d, d))
+    work = np.empty((4, 4))
+    vectors = np.empty((4, 4))
     change[:] = np.inf
     for first in range(0, len(nodes), LANES):
         _corners(points, nodes, first, corners)
@@ -328,8 +344,10 @@ def _lanes(elements, first, turn, field, shapes, y):  # type: ignore[no-untyped-
 
     The last element fills the lanes that are left over.
     """
-    points, nodes = elements[0], elements[1]
-    n, d = nodes.shape[1], points.shape[1]
+    points = elements[0]
+    nodes = elements[1]
+    n = nodes.shape[1]
+    d = points.shape[1]
     for lane in range(LANES):
         e = min(first + lane, len(nodes) - 1)
         for a in range(n):
@@ -344,7 +362,8 @@ def _lanes(elements, first, turn, field, shapes, y):  # type: ignore[no-untyped-
 @njit(**OPTIONS)
 def _placed(elements, first, turn, f, out):  # type: ignore[no-untyped-def]
     """Write R f of the elements from ``first`` on, f (a, d, LANES), to out (m, a, d)."""
-    n, d = f.shape[0], f.shape[1]
+    n = f.shape[0]
+    d = f.shape[1]
     for lane in range(min(LANES, len(elements[1]) - first)):
         for a in range(n):
             for i in range(d):
@@ -370,11 +389,14 @@ def _stiffness_times(elements, first, x, y, f, scratch):  # type: ignore[no-unty
 
     Loops over lanes become vectors, which they only do with places that are known in advance.
     """
-    gradients, weights, moduli = elements[2], elements[3], elements[4]
+    gradients = elements[2]
+    weights = elements[3]
+    moduli = elements[4]
     jacobian, slopes, modulus = scratch
     for k in range(LANES):
         modulus[k] = moduli[min(first + k, len(moduli) - 1)]
-    n, d = x.shape[0], x.shape[1]
+    n = x.shape[0]
+    d = x.shape[1]
     f[:] = 0.0
     for q in range(len(weights)):
         jacobian[:] = 0.0
@@ -385,21 +407,27 @@ def _stiffness_times(elements, first, x, y, f, scratch):  # type: ignore[no-unty
             for j in range(d):
                 c = gradients[q, a, j]
                 for i in range(d):
-                    at, there = (3 * j + i) * LANES, (3 * i + j) * LANES
+                    at = (3 * j + i) * LANES
+                    there = (3 * i + j) * LANES
                     for k in range(LANES):
                         jacobian[at + k] += c * x[a, i, k]
                     for k in range(LANES):
                         slopes[there + k] += c * y[a, i, k]
         for k in range(LANES):
-            one, two, three = _row(jacobian, 0, k), _row(jacobian, 1, k), _row(jacobian, 2, k)
-            a, b, c = cross3(two, three), cross3(three, one), cross3(one, two)
+            one = _row(jacobian, 0, k)
+            two = _row(jacobian, 1, k)
+            three = _row(jacobian, 2, k)
+            a = cross3(two, three)
+            b = cross3(three, one)
+            c = cross3(one, two)
             # The cofactors are det J^-1: the gradients are divided by det here, the forces there.
             size = modulus[k] * weights[q] / abs(dot3(one, a))
             g = _combined(_row(slopes, 0, k), a, b, c)
             h = _combined(_row(slopes, 1, k), a, b, c)
             u = _combined(_row(slopes, 2, k), a, b, c)
             trace = LAM * (g[0] + h[1] + u[2])
-            s01, s02 = size * (MU * (g[1] + h[0])), size * (MU * (g[2] + u[0]))
+            s01 = size * (MU * (g[1] + h[0]))
+            s02 = size * (MU * (g[2] + u[0]))
             s12 = size * (MU * (h[2] + u[1]))
             stress = size * (trace + 2.0 * MU * g[0]), s01, s02
             _set_row(slopes, 0, k, (dot3(stress, a), dot3(stress, b), dot3(stress, c)))
@@ -422,8 +450,11 @@ def turned(elements, turn, field, shapes, out):  # type: ignore[no-untyped-def]
 
     ``elements``: points, nodes, gradients and weights of the shape, and moduli (m,).
     """
-    n, d = out.shape[1], out.shape[2]
-    x, y, f = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    n = out.shape[1]
+    d = out.shape[2]
+    x = np.empty((n, d, LANES))
+    y = np.empty((n, d, LANES))
+    f = np.empty((n, d, LANES))
     scratch = np.empty(9 * LANES), np.empty(9 * LANES), np.empty(LANES)
     for first in range(0, len(out), LANES):
         _corners(elements[0], elements[1], first, x)
@@ -435,24 +466,28 @@ def turned(elements, turn, field, shapes, out):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _add_crossed(u, v, lane, sign, out):  # type: ignore[no-untyped-def]
     """Add ``sign`` times the sum of u_a x v_a, of a lane of (a, d, LANES), to out (3,)."""
-    n, d = u.shape[0], u.shape[1]
+    n = u.shape[0]
+    d = u.shape[1]
     for a in range(n):
         for k in range(2 if d == 2 else 0, 3):
-            i, j = (k + 1) % 3, (k + 2) % 3
+            i = (k + 1) % 3
+            j = (k + 2) % 3
             out[k] += sign * (u[a, i, lane] * v[a, j, lane] - u[a, j, lane] * v[a, i, lane])
 
 
 @njit(**OPTIONS)
 def _add_spun(omega, u, lane, sign, out):  # type: ignore[no-untyped-def]
     """Add ``sign`` times omega x u_a, of a lane of u (a, d, LANES), to that of out."""
-    n, d = u.shape[0], u.shape[1]
+    n = u.shape[0]
+    d = u.shape[1]
     for a in range(n):
         if d == 2:
             out[a, 0, lane] -= sign * omega[2] * u[a, 1, lane]
             out[a, 1, lane] += sign * omega[2] * u[a, 0, lane]
         else:
             for k in range(3):
-                i, j = (k + 1) % 3, (k + 2) % 3
+                i = (k + 1) % 3
+                j = (k + 2) % 3
                 out[a, k, lane] += sign * (omega[i] * u[a, j, lane] - omega[j] * u[a, i, lane])
 
 
@@ -463,12 +498,20 @@ def changed(elements, turn, at, along, reverse, out):  # type: ignore[no-untyped
     Parts (m, a, d) of the corners of elements, as ``turned``; ``along`` (n, d) is the change of the
     positions or, with ``reverse``, the adjoint of the forces.
     """
-    n, d = out.shape[1], out.shape[2]
-    x, u, y = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
-    k_u, k_y, w = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    n = out.shape[1]
+    d = out.shape[2]
+    x = np.empty((n, d, LANES))
+    u = np.empty((n, d, LANES))
+    y = np.empty((n, d, LANES))
+    k_u = np.empty((n, d, LANES))
+    k_y = np.empty((n, d, LANES))
+    w = np.empty((n, d, LANES))
     scratch = np.empty(9 * LANES), np.empty(9 * LANES), np.empty(LANES)
-    s, r, f = np.empty((d, d)), np.empty((d, d, LANES)), np.empty(9 * LANES)
-    omega, moment = np.empty((LANES, 3)), np.empty((LANES, 3))
+    s = np.empty((d, d))
+    r = np.empty((d, d, LANES))
+    f = np.empty(9 * LANES)
+    omega = np.empty((LANES, 3))
+    moment = np.empty((LANES, 3))
     for first in range(0, len(out), LANES):
         _corners(elements[0], elements[1], first, x)
         _lanes(elements, first, turn, at, 1.0, u)

@@ -98,7 +98,8 @@ class LaplacianCycle:
 
     def __call__(self, right: FloatArray) -> FloatArray:
         """Return what one V-cycle makes of a right-hand side (k, d)."""
-        turned, d = self.axes.ndim == 3, right.shape[1]
+        turned = self.axes.ndim == 3
+        d = right.shape[1]
         wide = np.zeros((len(right), 3))
         wide[:, :d] = value(transform(self.axes, right)) if turned else right
         out = self._cycle(wide, 0)[:, :d]
@@ -113,7 +114,9 @@ class LaplacianCycle:
                 with enough_threads(0.0):  # the same bits for any number of threads
                     out[:, mine] = cho_solve(factor, right[:, mine], check_finite=False)
             return out
-        level, x, group = self.levels[depth], np.empty_like(right), tuple(self.group.tolist())
+        level = self.levels[depth]
+        x = np.empty_like(right)
+        group = tuple(self.group.tolist())
         with one_at_a_time(3 * len(level.matrix[1])):
             forward(level.matrix, level.middle, level.inverse, group, right, x, out)
             residual(level.matrix, level.middle, group, x, out)
@@ -134,7 +137,8 @@ def _hierarchy(
 
     ``free`` (k, w): 1 in the rows of each group that are not held, 0 in others.
     """
-    levels, modes = [], free
+    levels = []
+    modes = free
     while len(modes) > COARSE:
         up, modes_below = _prolongation(matrix, modes)
         count = len(modes_below)
@@ -142,7 +146,8 @@ def _hierarchy(
         below = _product(down, _product(matrix, up, count), count)
         below = _rearranged(below, lambda each: each.sorted_indices(), count)
         levels.append(_level(matrix, modes > 0.0, up, down))
-        matrix, modes = below, modes_below
+        matrix = below
+        modes = modes_below
     factors = []
     for g in range(modes.shape[1]):
         dense = _of_group(matrix, g).toarray() * np.outer(modes[:, g] > 0.0, modes[:, g] > 0.0)
@@ -202,7 +207,8 @@ def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:
     with one_at_a_time(len(one[1]) * 10):
         add_rows(one, two, columns, indptr, *nothing)
         np.cumsum(indptr, out=indptr)
-        indices, data = np.empty(indptr[-1], np.int32), np.empty((indptr[-1], two[2].shape[1]))
+        indices = np.empty(indptr[-1], np.int32)
+        data = np.empty((indptr[-1], two[2].shape[1]))
         add_rows(one, two, columns, indptr, indices, data)
     return indptr, indices, data
 
@@ -228,7 +234,8 @@ def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
     with one_at_a_time(len(corners) * 10):
         assemble(graph, entries, indptr, np.empty(0, np.int32), np.empty((0, 1)))
         np.cumsum(indptr, out=indptr)
-        indices, data = np.empty(indptr[-1], np.int32), np.empty((indptr[-1], 1))
+        indices = np.empty(indptr[-1], np.int32)
+        data = np.empty((indptr[-1], 1))
         assemble(graph, entries, indptr, indices, data)
     return indptr, indices, data
 
@@ -243,7 +250,8 @@ def _gradients_part(
 
 
 def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> LaplacianLevel:
-    middle, inverse = np.empty(len(free), np.int32), np.empty(free.shape)
+    middle = np.empty(len(free), np.int32)
+    inverse = np.empty(free.shape)
     diagonals(matrix, free, middle, inverse)
     return LaplacianLevel(_single(matrix), middle, inverse, _single(up), _single(down))
 
@@ -256,8 +264,11 @@ def _single(matrix: Sparse) -> Sparse:
 def gradients(elements, modulus, out):  # type: ignore[no-untyped-def]
     """Write the integrals of modulus * grad N_a . grad N_b of elements to ``out`` (m, a, a)."""
     points, nodes, _, weights = elements
-    n, d = nodes.shape[1], points.shape[1]
-    inverse, x, slopes = np.empty((3, 3)), np.empty((n, d)), np.empty((n, d))
+    n = nodes.shape[1]
+    d = points.shape[1]
+    inverse = np.empty((3, 3))
+    x = np.empty((n, d))
+    slopes = np.empty((n, d))
     total = np.empty((n, n))
     for e in range(len(nodes)):
         total[:] = 0.0
@@ -290,12 +301,17 @@ def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-
         place = np.full(rows, -1)
         stop = np.int64(indptr[part * chunk]) if len(indices) else np.int64(0)
         for row in range(part * chunk, min(rows, (part + 1) * chunk)):
-            base, diagonal = stop, 0.0
-            place[row], stop = base, stop + 1
+            base = stop
+            diagonal = 0.0
+            place[row] = base
+            stop = stop + 1
             if len(indices):
                 indices[base] = row
             for k in range(starts[row], starts[row + 1]):
-                corner, first, ahead, p = np.int64(order[k]), np.int64(0), np.int64(0), 0
+                corner = np.int64(order[k])
+                first = np.int64(0)
+                ahead = np.int64(0)
+                p = 0
                 while corner - first >= sizes[p, 0] * sizes[p, 1]:
                     first += sizes[p, 0] * sizes[p, 1]
                     ahead += sizes[p, 0] * sizes[p, 1] * sizes[p, 1]
@@ -304,16 +320,19 @@ def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-
                 ahead += (corner - first) * a
                 first = corner - (corner - first) % a
                 for b in range(a):
-                    column, entry = corners[first + b], np.float64(entries[ahead + b])
+                    column = corners[first + b]
+                    entry = np.float64(entries[ahead + b])
                     if column == row:
                         continue  # itself, or an image of it in the same element
                     diagonal -= entry
                     if column < 0:
                         continue
                     if place[column] < base:
-                        place[column], stop = stop, stop + 1
+                        place[column] = stop
+                        stop = stop + 1
                         if len(indices):
-                            indices[place[column]], data[place[column], 0] = column, 0.0
+                            indices[place[column]] = column
+                            data[place[column], 0] = 0.0
                     if len(indices):
                         data[place[column], 0] += entry
             if len(indices) == 0:
@@ -321,11 +340,14 @@ def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-
                 continue
             data[base, 0] = diagonal
             for k in range(base + 1, stop):
-                column, entry, at = indices[k], data[k, 0], k
+                column = indices[k]
+                entry = data[k, 0]
+                at = k
                 while at > base and indices[at - 1] > column:
                     indices[at], data[at, 0] = indices[at - 1], data[at - 1, 0]
                     at -= 1
-                indices[at], data[at, 0] = column, entry
+                indices[at] = column
+                data[at, 0] = entry
 
 
 @njit(**PARALLEL)
@@ -334,7 +356,9 @@ def add_rows(one, two, columns, indptr, indices, data):  # type: ignore[no-untyp
 
     As `assemble` does. ``two`` has ``columns`` columns; ``one`` may have one number for all groups.
     """
-    rows, top, width = len(indptr) - 1, one[2].shape[1] - 1, two[2].shape[1]
+    rows = len(indptr) - 1
+    top = one[2].shape[1] - 1
+    width = two[2].shape[1]
     chunk = max(PART, rows // CHUNKS + 1)
     for part in prange((rows + chunk - 1) // chunk):
         place = np.full(columns, -1)
@@ -394,20 +418,27 @@ def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-
     And to ``left`` (k, 3) what it subtracted from.
     """
     indptr, indices, data = matrix
-    rows, top = len(x), data.shape[1] - 1
+    rows = len(x)
+    top = data.shape[1] - 1
     g0, g1, g2 = group
-    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    d0 = min(g0, top)
+    d1 = min(g1, top)
+    d2 = min(g2, top)
     for part in prange((rows + PART - 1) // PART):
         first = part * PART
         for row in range(first, min(rows, first + PART)):
-            s0, s1, s2 = right[row, 0], right[row, 1], right[row, 2]
+            s0 = right[row, 0]
+            s1 = right[row, 1]
+            s2 = right[row, 2]
             for k in range(indptr[row], middle[row]):
                 j = indices[k]
                 if j >= first:
                     s0 -= data[k, d0] * x[j, 0]
                     s1 -= data[k, d1] * x[j, 1]
                     s2 -= data[k, d2] * x[j, 2]
-            left[row, 0], left[row, 1], left[row, 2] = s0, s1, s2
+            left[row, 0] = s0
+            left[row, 1] = s1
+            left[row, 2] = s2
             x[row, 0], x[row, 1] = s0 * inverse[row, g0], s1 * inverse[row, g1]
             x[row, 2] = s2 * inverse[row, g2]
 
@@ -416,33 +447,46 @@ def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-
 def residual(matrix, middle, group, x, left):  # type: ignore[no-untyped-def]
     """Subtract from ``left`` (k, 3), as `forward` left it, what it did not yet."""
     indptr, indices, data = matrix
-    rows, top = len(x), data.shape[1] - 1
+    rows = len(x)
+    top = data.shape[1] - 1
     g0, g1, g2 = group
-    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    d0 = min(g0, top)
+    d1 = min(g1, top)
+    d2 = min(g2, top)
     for part in prange((rows + PART - 1) // PART):
         first = part * PART
         for row in range(first, min(rows, first + PART)):
-            s0, s1, s2 = left[row, 0], left[row, 1], left[row, 2]
+            s0 = left[row, 0]
+            s1 = left[row, 1]
+            s2 = left[row, 2]
             for k in range(indptr[row], indptr[row + 1]):
                 j = indices[k]
                 if j < first or k >= middle[row]:
                     s0 -= data[k, d0] * x[j, 0]
                     s1 -= data[k, d1] * x[j, 1]
                     s2 -= data[k, d2] * x[j, 2]
-            left[row, 0], left[row, 1], left[row, 2] = s0, s1, s2
+            left[row, 0] = s0
+            left[row, 1] = s1
+            left[row, 2] = s2
 
 
 @njit(**PARALLEL)
 def backward(matrix, inverse, group, right, x, out):  # type: ignore[no-untyped-def]
     """Write what a backward sweep makes of x (k, 3) to out (k, 3): the transpose of `forward`."""
     indptr, indices, data = matrix
-    rows, top = len(x), data.shape[1] - 1
+    rows = len(x)
+    top = data.shape[1] - 1
     g0, g1, g2 = group
-    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    d0 = min(g0, top)
+    d1 = min(g1, top)
+    d2 = min(g2, top)
     for part in prange((rows + PART - 1) // PART):
-        first, last = part * PART, min(rows, (part + 1) * PART)
+        first = part * PART
+        last = min(rows, (part + 1) * PART)
         for row in range(last - 1, first - 1, -1):
-            s0, s1, s2 = right[row, 0], right[row, 1], right[row, 2]
+            s0 = right[row, 0]
+            s1 = right[row, 1]
+            s2 = right[row, 2]
             for k in range(indptr[row], indptr[row + 1]):
                 j = indices[k]
                 if row < j < last:
@@ -464,12 +508,18 @@ def add_product(matrix, group, x, out):  # type: ignore[no-untyped-def]
     indptr, indices, data = matrix
     top = data.shape[1] - 1
     g0, g1, g2 = group
-    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    d0 = min(g0, top)
+    d1 = min(g1, top)
+    d2 = min(g2, top)
     for row in prange(len(out)):
-        s0, s1, s2 = out[row, 0], out[row, 1], out[row, 2]
+        s0 = out[row, 0]
+        s1 = out[row, 1]
+        s2 = out[row, 2]
         for k in range(indptr[row], indptr[row + 1]):
             j = indices[k]
             s0 += data[k, d0] * x[j, 0]
             s1 += data[k, d1] * x[j, 1]
             s2 += data[k, d2] * x[j, 2]
-        out[row, 0], out[row, 1], out[row, 2] = s0, s1, s2
+        out[row, 0] = s0
+        out[row, 1] = s1
+        out[row, 2] = s2

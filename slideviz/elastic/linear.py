@@ -41,14 +41,16 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
     as known nodes. Raises DeformError if a cell has no volume, the solver does not converge, or
     coinciding nodes are asked to move differently.
     """
-    nodes, values = problem.known, problem.values
+    nodes = problem.known
+    values = problem.values
     displacement = _equilibrium(problem, timer, body, nodes, values)
     sliding = np.concatenate([problem.edge, problem.surface])
     if len(sliding):
         free = within(problem, sliding, take(displacement, sliding))
         with timer.phase("project"):
             slid: Array = problem.project(sliding, free)
-        nodes, values = np.concatenate([nodes, sliding]), join(values, slid)
+        nodes = np.concatenate([nodes, sliding])
+        values = join(values, slid)
         gap = np.abs(value(slid) - value(free)).max()
         if gap > AGREE * problem.basis.radius:
             displacement = _equilibrium(problem, timer, body, nodes, values, displacement)
@@ -82,7 +84,8 @@ def _equilibrium(
         mesh = ElasticMesh.at(at, body.parts, body.stiffness)
         matrix = mesh.matrix(prescribed, lambda f: tick(ASSEMBLING * f))
         inside = np.flatnonzero(prescribed.place >= 0)
-        place, turn = prescribed.place[inside], prescribed.turn[inside]
+        place = prescribed.place[inside]
+        turn = prescribed.turn[inside]
         guess = np.zeros((len(prescribed.free), at.shape[1]))
         if start is not None:
             moved = body.frame.points(coords + value(start)) - at

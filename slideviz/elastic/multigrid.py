@@ -123,7 +123,8 @@ def solve(
     def exact() -> LinearSolution:
         return while_ticking(lambda: factorised(matrix, residual, start, scale), tick)
 
-    size, at_once = len(right), DIRECT[matrix.blocksize[0]]
+    size = len(right)
+    at_once = DIRECT[matrix.blocksize[0]]
     ways = [exact, iterated] if size <= at_once else [iterated, exact]
     found = ways[0]()
     if found.error <= LIMIT or size > LAST * at_once:
@@ -139,7 +140,8 @@ def factorised(
     The error is the last correction, so that the solution is better than it says; inf where the
     matrix is singular.
     """
-    x, before = start, np.inf
+    x = start
+    before = np.inf
     with enough_threads(0.0):  # the same bits for any number of threads
         try:
             factor = splu(matrix.tocsc())
@@ -236,7 +238,8 @@ def _product(matrix: Any, x: FloatArray) -> FloatArray:
 
 def _sweep(level: Level, right: FloatArray, x: FloatArray, backward: bool) -> None:
     """Smooth x (n,) in place by one Gauss-Seidel sweep."""
-    matrix, shape = level.matrix, level.inverse.shape[:2]
+    matrix = level.matrix
+    shape = level.inverse.shape[:2]
     blocks = right.reshape(shape), x.reshape(shape)
     sweep(matrix.indptr, matrix.indices, matrix.data, level.inverse, *blocks, backward)
 
@@ -291,10 +294,13 @@ def _conjugate_gradients(
     tolerance: float,
     scale: float,
 ) -> LinearSolution:
-    x, left = np.zeros_like(right), right.copy()
+    x = np.zeros_like(right)
+    left = right.copy()
     z = _cycle(levels, left)
-    energy, along = float(left @ z), z
-    sizes, turns = [1.0], [0.0]
+    energy = float(left @ z)
+    along = z
+    sizes = [1.0]
+    turns = [0.0]
     for _ in range(MAX_ITERATIONS):
         part = _part(z, x, scale)
         if not energy > 0.0 or part <= tolerance * _smallest(sizes, turns):
@@ -309,7 +315,8 @@ def _conjugate_gradients(
         x += size * along
         left -= size * image
         z = _cycle(levels, left)
-        before, energy = energy, float(left @ z)
+        before = energy
+        energy = float(left @ z)
         along = z + (energy / before) * along
         sizes.append(size)
         turns.append(energy / before)
@@ -322,7 +329,8 @@ def _smallest(sizes: list[float], turns: list[float]) -> float:
 
     ``sizes``, ``turns``: of each iteration alpha and beta, after a first one of 1 and 0.
     """
-    alpha, beta = np.array(sizes[1:]), np.array(turns)[: len(sizes) - 1]
+    alpha = np.array(sizes[1:])
+    beta = np.array(turns)[: len(sizes) - 1]
     if not len(alpha):
         return 1.0
     diagonal = 1.0 / alpha + beta / np.array(sizes[:-1])

@@ -46,7 +46,8 @@ ITERATIONS = 6  # enough to come to the mean quality of the equilibrium within 0
 SIZE = 1.5
 """The step, as a part of the direction, at which the energy's slope is found for the best step."""
 
-TRIES, SLOWER = 20, 0.85
+TRIES = 20
+SLOWER = 0.85
 """How often the safeguard changes the parts of the relaxation that it leaves, and how much slower
 they grow each time."""
 
@@ -60,7 +61,8 @@ PARTS = 0.5, 0.25  # parts of the relaxation that are tried everywhere
 
 TINY = 1e-9  # growth along edges of no length, and between periodic images
 
-WORSE, ENOUGH = 0.9, 0.3
+WORSE = 0.9
+ENOUGH = 0.3
 """The lowest quality may become ``WORSE`` times what it was, or ``ENOUGH`` if that is less."""
 
 Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
@@ -134,7 +136,8 @@ class Relaxation:
 
         ``place`` (n,) and ``free`` (k, d, d) are those of undeformed conditions.
         """
-        x, frame = self.mesh.points, self.body.frame
+        x = self.mesh.points
+        frame = self.body.frame
         made = _MADE.get(self.mesh)
         axes = np.eye(x.shape[1])
         if frame.cylindrical:
@@ -163,10 +166,13 @@ class Relaxation:
     ) -> tuple[Array, float]:
         """Return the relaxed displacement, and the last residual over the first."""
         frame = self.body.frame
-        unknowns, start = _Unknowns.of(given), points(frame, problem.coords + moved)
-        at, force = start, unknowns.collected(_force(forces, start))
+        unknowns = _Unknowns.of(given)
+        start = points(frame, problem.coords + moved)
+        at = start
+        force = unknowns.collected(_force(forces, start))
         along: Array = np.zeros_like(value(force))
-        before, energies = value(force), list[float]()
+        before = value(force)
+        energies = list[float]()
         for k in range(ITERATIONS):
             tick(MAKING + (1.0 - MAKING) * k / (ITERATIONS + 1))
             steep = unknowns.within(_preconditioned(cycle, -force))
@@ -175,7 +181,8 @@ class Relaxation:
                 last = max(energies[-2], 1e-300)
                 turned = max(0.0, (energies[-1] + _inner(before, steep)) / last)
                 steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
-            along, before = steep, value(force)
+            along = steep
+            before = value(force)
             step = unknowns.moved(along * SIZE)
             there = unknowns.collected(_force(forces, at + step))
             size = partial(_size, _inner(along, force), _inner(along, there))
@@ -201,7 +208,8 @@ class Relaxation:
         All of it if possible. Else the one with the best mean of `PARTS` of it everywhere, and of
         parts that are smaller near the cells that would be worse; zero if none is better.
         """
-        first, n = self._quality(problem, before), len(self.mesh.points)
+        first = self._quality(problem, before)
+        n = len(self.mesh.points)
 
         def tried(theta: FloatArray) -> tuple[np.ndarray, float]:
             now = self._quality(problem, blended(problem, before, after, theta, tie))
@@ -232,7 +240,8 @@ class Relaxation:
         At worse cells (``bad``; ``tried`` returns those of a part, and the mean) the part is
         halved, up to zero, and grows from there as far as that strains cells by ``strain``.
         """
-        theta, cap = np.ones(graph.shape[0]), np.full(graph.shape[0], np.inf)
+        theta = np.ones(graph.shape[0])
+        cap = np.full(graph.shape[0], np.inf)
         for k in range(1, TRIES):
             nodes = np.unique(self.domain.cells.take(bad).nodes)
             cap[nodes] = np.where(theta[nodes] > LEAST, 0.5 * theta[nodes], 0.0)
@@ -245,7 +254,8 @@ class Relaxation:
 
     def _graph(self, problem: Problem, before: FloatArray, after: FloatArray) -> csr_array:
         """Return the length of each edge of the mesh over how far its nodes are relaxed, (n, n)."""
-        frame, n = self.body.frame, len(self.mesh.points)
+        frame = self.body.frame
+        n = len(self.mesh.points)
         coords = value(problem.coords)
         shift = frame.points(coords + after) - frame.points(coords + before)
         size = np.linalg.norm(shift, axis=1)

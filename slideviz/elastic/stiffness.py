@@ -106,13 +106,16 @@ def _pyramid() -> ReferenceShape:
     With p = 1 - z the function of the corner at x = 1 is ((p + x)^2 - y^2) / (4 p), others by
     symmetry, and z that of the apex.
     """
-    side, near, far = 0.5, 0.1531754163448146, 0.6372983346207416
+    side = 0.5
+    near = 0.1531754163448146
+    far = 0.6372983346207416
     places = [(side, 0, near), (0, side, near), (-side, 0, near), (0, -side, near), (0, 0, far)]
     gradients = np.zeros((len(places), 5, 3))
     for q, (x, y, z) in enumerate(places):
         p = 1.0 - z
         for a, (s, t, _) in enumerate(_CORNERS[PYRAMID][:4]):
-            along, across = p + s * x + t * y, t * x + s * y
+            along = p + s * x + t * y
+            across = t * x + s * y
             gradients[q, a, 0] = (s * along - t * across) / (2.0 * p)
             gradients[q, a, 1] = (t * along - s * across) / (2.0 * p)
             gradients[q, a, 2] = (along**2 - across**2) / (4.0 * p**2) - along / (2.0 * p)
@@ -221,7 +224,8 @@ class ElasticMesh:
         Raises DeformError if an element has no volume. Inverted elements count with the absolute
         value of their Jacobian, so that the matrix stays positive definite (with nu below 0.5).
         """
-        count, d = len(conditions.free), self.points.shape[1]
+        count = len(conditions.free)
+        d = self.points.shape[1]
         indptr, indices = _pattern(self.parts, conditions.place, count)
         data = np.zeros((len(indices), d, d))
         entry = conditions.place, conditions.turn, conditions.plain
@@ -289,7 +293,9 @@ def _count(parts: list[ShapeBlock]) -> int:
 
 def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return indptr and indices of the matrix blocks: pairs of unknowns that share an element."""
-    rows, columns, offset = [], [], 0
+    rows = []
+    columns = []
+    offset = 0
     for part in parts:
         at = place[part.nodes]
         element = offset + np.arange(len(at))[:, None] + np.zeros_like(at)
@@ -340,7 +346,9 @@ def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
     c01 = J[1, 2] * J[2, 0] - J[1, 0] * J[2, 2]
     c02 = J[1, 0] * J[2, 1] - J[1, 1] * J[2, 0]
     det = J[0, 0] * c00 + J[0, 1] * c01 + J[0, 2] * c02
-    inverse[0, 0], inverse[1, 0], inverse[2, 0] = c00 / det, c01 / det, c02 / det
+    inverse[0, 0] = c00 / det
+    inverse[1, 0] = c01 / det
+    inverse[2, 0] = c02 / det
     inverse[0, 1] = (J[0, 2] * J[2, 1] - J[0, 1] * J[2, 2]) / det
     inverse[1, 1] = (J[0, 0] * J[2, 2] - J[0, 2] * J[2, 0]) / det
     inverse[2, 1] = (J[0, 1] * J[2, 0] - J[0, 0] * J[2, 1]) / det
@@ -422,15 +430,20 @@ def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-
     points, nodes, gradients, weights = elements
     place, turn, plain = conditions
     indptr, indices = pattern
-    n, d = nodes.shape[1], points.shape[1]
-    inverse, x = np.empty((3, 3)), np.empty((n, d))
-    g, m = np.empty(n * d), np.empty((n * d, n * d))
-    block, half = np.empty((d, d)), np.empty((d, d))
+    n = nodes.shape[1]
+    d = points.shape[1]
+    inverse = np.empty((3, 3))
+    x = np.empty((n, d))
+    g = np.empty(n * d)
+    m = np.empty((n * d, n * d))
+    block = np.empty((d, d))
+    half = np.empty((d, d))
     for e in range(len(nodes)):
         _gather(points, nodes, e, x)
         if not _products(x, gradients, weights, inverse, g, m):
             return e
-        mu, lam = modulus[e] * lame[0], modulus[e] * lame[1]
+        mu = modulus[e] * lame[0]
+        lam = modulus[e] * lame[1]
         for a in range(n):
             first = nodes[e, a]
             row = place[first]
@@ -452,7 +465,8 @@ def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-
                     _into(turn[first], block, half, True)
                 if not plain[second]:
                     _into(turn[second], block, half, False)
-                low, high = indptr[row], indptr[row + 1] - 1
+                low = indptr[row]
+                high = indptr[row + 1] - 1
                 while low < high:
                     middle = (low + high) // 2
                     if indices[middle] < column:
@@ -469,9 +483,14 @@ def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-
 def add_forces(elements, modulus, lame, moved, out):  # type: ignore[no-untyped-def]
     """Add the forces of a displacement (n, d) to ``out`` (n, d); parameters as of ``add``."""
     points, nodes, gradients, weights = elements
-    n, d = nodes.shape[1], points.shape[1]
-    inverse, x, y = np.empty((3, 3)), np.empty((n, d)), np.empty((n, d))
-    g, slopes, f = np.empty((d, d)), np.empty((n, d)), np.empty((n, d))
+    n = nodes.shape[1]
+    d = points.shape[1]
+    inverse = np.empty((3, 3))
+    x = np.empty((n, d))
+    y = np.empty((n, d))
+    g = np.empty((d, d))
+    slopes = np.empty((n, d))
+    f = np.empty((n, d))
     for e in range(len(nodes)):
         _gather(points, nodes, e, x)
         _gather(moved, nodes, e, y)

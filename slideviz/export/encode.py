@@ -101,7 +101,8 @@ def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
 
         def add(image: Pixels, seconds: float) -> None:
             nonlocal shown
-            before, shown = round(shown * rate), shown + Fraction(seconds).limit_denominator(1000)
+            before = round(shown * rate)
+            shown = shown + Fraction(seconds).limit_denominator(1000)
             try:
                 for _ in range(max(1, round(shown * rate) - before)):
                     pipe.write(image.data)
@@ -172,7 +173,8 @@ def _gif(file: Path, settings: EncoderSettings) -> Iterator[Add]:
 
     palette = _palette(settings.samples())
     before: NDArray | None = None
-    shown, ticks = 0.0, 0
+    shown = 0.0
+    ticks = 0
     with atomic_write(file, SlidevizError) as out:
 
         def add(pixels: Pixels, seconds: float) -> None:
@@ -188,7 +190,8 @@ def _gif(file: Path, settings: EncoderSettings) -> Iterator[Add]:
             # A GIF counts hundredths of a second: round the sum, not each duration.
             duration = max(round(100 * shown) - ticks, 2)
             ticks += duration
-            part, length = image.crop(box), 10 * min(duration, 65535)
+            part = image.crop(box)
+            length = 10 * min(duration, 65535)
             for block in GifImagePlugin.getdata(part, box[:2], duration=length):
                 out.write(block)
 
@@ -201,7 +204,8 @@ def _changed(colors: NDArray, before: NDArray | None) -> tuple[int, int, int, in
     if before is None:
         return 0, 0, colors.shape[1], colors.shape[0]
     differs = colors != before
-    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    rows = np.flatnonzero(differs.any(axis=1))
+    columns = np.flatnonzero(differs.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1

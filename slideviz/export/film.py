@@ -36,7 +36,8 @@ from slideviz.session.state import Session, StepFrame
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
 """Default width and height in pixels, by the kind of film."""
-FPS, SECONDS = 10.0, 3.0
+FPS = 10.0
+SECONDS = 3.0
 """Default images per second; and the duration in seconds below which there are fewer per second."""
 
 
@@ -78,7 +79,8 @@ def check_film(
 
     ``file``: see `film`. ``frames``: the number of frames, if it is known already.
     """
-    kind, size = film_kind(file), film_options.pixels(file)
+    kind = film_kind(file)
+    size = film_options.pixels(file)
     check_size(size)
     if kind == ".mp4" and (size[0] % 2 or size[1] % 2):
         raise SlidevizError(
@@ -145,7 +147,8 @@ def render_frames(
     mesh and all steps. ``draw``: given a position (the number of a step, or a number between two),
     returns a generator that draws the image in pieces and returns it.
     """
-    total, pace = film_options.count(frames), film_options.pace(frames)
+    total = film_options.count(frames)
+    pace = film_options.pace(frames)
     samples = []
     if film_kind(file) == ".gif":  # only there colors have to be chosen
         for at in sorted({0, frames // 2, frames - 1}):
@@ -309,7 +312,8 @@ def film_frame_at(
 
 def frame_words(frames: Sequence[StepFrame], position: float) -> str:
     """Return what is shown at a position in words, as `place_words`, by the labels of frames."""
-    last, following = frames[int(position)], frames[min(int(position) + 1, len(frames) - 1)]
+    last = frames[int(position)]
+    following = frames[min(int(position) + 1, len(frames) - 1)]
     if not following.label:
         return place_words(position, planned_steps(frames[1:]))
     if position == int(position):
@@ -360,10 +364,12 @@ def _titles_of_runs(
     ``detail``: note that only a part of the mesh is shown; ``between``: there are images in
     between.
     """
-    pair, what = len(runs) == 2, runs[0].view.color_by
+    pair = len(runs) == 2
+    what = runs[0].view.color_by
 
     def words(session: Session, place: str, stats: Quality) -> str:
-        run, text = session.run_shown, caption(place, stats, what)
+        run = session.run_shown
+        text = caption(place, stats, what)
         if pair and run is not None:
             return f"{run.name}{DETAIL if detail else ''}\n{text}"
         return text + (DETAIL if detail else "")

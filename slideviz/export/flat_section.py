@@ -104,7 +104,8 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
         painted = painted.within(*session.color_range)
     around = matrices(session, Period().of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
-    cutter, points = Cutter.of(frame.mesh), frame.mesh.points
+    cutter = Cutter.of(frame.mesh)
+    points = frame.mesh.points
     only = _choice(session, section)
     at = session.view.frame
     return SectionInRun(
@@ -119,7 +120,8 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
 
 def _choice(session: Session, section: Section) -> CellsInRange | None:
     """Return the cells within the view's threshold; None without one, and for a curve."""
-    frame, threshold = session.frame, session.view.threshold
+    frame = session.frame
+    threshold = session.view.threshold
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole_cells
     if frame is None or threshold is None or curve:
         return None

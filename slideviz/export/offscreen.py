@@ -19,7 +19,8 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.scene.color_legend import set_letters
 
-SMALLEST, LARGEST = 64, 8192
+SMALLEST = 64
+LARGEST = 8192
 """Least and largest width or height of a picture in pixels; drivers draw no larger ones."""
 TITLE = 16  # height of the title's letters in pixels, at normal size
 _NORMAL_HEIGHT = 620  # height in pixels of a picture with letters of normal size

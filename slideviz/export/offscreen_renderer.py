@@ -96,7 +96,8 @@ class OffscreenRenderer:
         self._plotter.render_window.Render()  # initializes OpenGL
         yield
         self._scene = Scene(self._plotter, PAPER)
-        shown, overview = PictureOptions().drawn_session(self.session), self.overview
+        shown = PictureOptions().drawn_session(self.session)
+        overview = self.overview
         part = None if overview is None else overview.cells
         yield from self._scene.opening(shown, self.surfaces, part)
         if self.like is not None:
@@ -186,7 +187,8 @@ class OffscreenRenderer:
         """Return the pixels between two pictures: background, with a line in the middle."""
         from pyvista import Color
 
-        scheme, height = self._scene.scheme, options.size[1]
+        scheme = self._scene.scheme
+        height = options.size[1]
         down = np.linspace(0.0, 1.0, height)[:, None, None]
         top = np.array(Color(scheme.background_top).int_rgb)
         bottom = np.array(Color(scheme.background).int_rgb)
@@ -211,7 +213,8 @@ class OffscreenRenderer:
     def window(self, options: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the ranges of x and of y that a picture of a 2D mesh shows."""
         self.aim(options)
-        camera, (width, height) = self._plotter.camera, options.size
+        camera = self._plotter.camera
+        (width, height) = options.size
         unit = 2.0 * camera.parallel_scale / height
         ranges = []
         for centre, length, shift in zip(
@@ -254,7 +257,8 @@ class OffscreenRenderer:
 
     def _prepare(self, session: Session, options: PictureOptions) -> None:
         """Update the scene to a session, in the size and style of a picture; the camera stays."""
-        plotter, scene = self._plotter, self._scene
+        plotter = self._plotter
+        scene = self._scene
         resize(plotter, options.size)
         scene.stage.font_scale = options.scale
         scene.stage.has_legend = options.legend
@@ -272,7 +276,9 @@ class OffscreenRenderer:
 
     def _aim(self, session: Session, options: PictureOptions) -> None:
         """Set camera and color scheme for a picture: of the view, of the overview, or fitted."""
-        scene, camera, like = self._scene, self._plotter.camera, self.like
+        scene = self._scene
+        camera = self._plotter.camera
+        like = self.like
         if len(self.shown(session, options)) == 2:
             options = panes(options, options.gap)[0]
         scene.set_scheme(PAPER if like is None or options.background != "shown" else like.scheme)

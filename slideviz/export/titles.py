@@ -62,7 +62,8 @@ def names_of(session: Session) -> list[str]:
     run = session.run_shown
     if run is None:
         return ["Deformed"]
-    number, words = f"Run {run.number}", run_words(run)
+    number = f"Run {run.number}"
+    words = run_words(run)
     others = differences_from_all(run, session.runs)
     full = [f"{number}, {words}, {others}"] if others else []
     return [*full, f"{number}, {words}", number]
@@ -165,7 +166,8 @@ _AWAY = 9.0  # distance in pixels between the cell and its label, at normal lett
 
 def mark_words(session: Session) -> str:
     """Return the label of the marked cell: its number and value; empty if none is marked."""
-    cell, frame = session.view.marked_cell, session.frame
+    cell = session.view.marked_cell
+    frame = session.frame
     if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
         return ""
     words = f"cell {cell:,}"
@@ -195,7 +197,8 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     if not words:
         return
     corners = padded(_corners(scene.session))
-    place, spots = vtkCoordinate(), []
+    place = vtkCoordinate()
+    spots = []
     place.SetCoordinateSystemToWorld()
     for corner in (*corners, corners.mean(axis=0)):
         place.SetValue(*corner)

@@ -31,7 +31,10 @@ from slideviz.terms import COLOR_BY, ROLES, WALL_VALUES
 SUFFIXES = (".svg", ".pdf")  # suffixes of such pictures
 MOST_CELLS = 100_000  # most cells of such a picture: viewers take minutes to show more
 _SCREEN_DPI = 200.0  # pixels per inch of a picture whose size is given in pixels only
-_LETTERS, _LINE, _CUT, _EDGE = 13.0, 1.4, 0.8, 0.3
+_LETTERS = 13.0
+_LINE = 1.4
+_CUT = 0.8
+_EDGE = 0.3
 """Size of letters, and widths of boundaries, section lines and edges, in pixels at normal size."""
 _ORDER = {RIM: 1.3, BAND: 1.4, NAME: 1.5}
 """matplotlib's zorder of sections: above the mesh's cells (1), and below its boundaries (2)."""
@@ -137,11 +140,14 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     """Draw cells, sections and boundaries; a pixel at normal size is ``pixel_pt`` points wide."""
     from matplotlib.collections import LineCollection
 
-    frame, view = session.frame, session.view
+    frame = session.frame
+    view = session.view
     assert frame is not None
     assert session.mesh is not None
-    mesh, cutter = frame.mesh, Cutter.of(frame.mesh)
-    edge, only = _EDGE * pixel_pt * options.edges, None
+    mesh = frame.mesh
+    cutter = Cutter.of(frame.mesh)
+    edge = _EDGE * pixel_pt * options.edges
+    only = None
     paint = _Paint(None, None, edge)
     if view.color_by != "role":
         values = frame.shown_values(view.color_by, session.mesh)
@@ -205,7 +211,8 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     """Draw the legend at the right, on a half-transparent plate: the roles, or the color bar."""
     from matplotlib.patches import Patch, Rectangle
 
-    width, scale = options.size[0], options.scale
+    width = options.size[0]
+    scale = options.scale
     letters = _LETTERS * scale * 72.0 / figure.dpi
     clear = options.background == "transparent"
     if session.view.color_by == "role":
@@ -222,7 +229,8 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
         return
     inverted = session.frame is not None and session.frame.quality.inverted > 0
     # The bar is above the plate, which is above the mesh.
-    left, wide = 1.0 - (STRIP - 14) * scale / width, 20 * scale / width
+    left = 1.0 - (STRIP - 14) * scale / width
+    wide = 20 * scale / width
     place = figure.add_axes((left, 0.16, wide, 0.62), zorder=1)
     colors = color_scale(session.view.color_map, session.color_range)
     bar = color_bar(place, colors, "", letters, inverted=inverted, upright=True)

@@ -68,12 +68,16 @@ class CoordinateSystem:
         first, theta, last = np.moveaxis(q, -1, 0)
         d_first, d_theta, d_last = np.moveaxis(rates, -1, 0)
         if self.kind == "CYLINDRICAL":
-            r, dx, dr = first, d_last, d_first
+            r = first
+            dx = d_last
+            dr = d_first
         else:
             x, r = _spherical(first, last)
             along, across = _spherical(d_first, last)
-            dx, dr = along - r * d_last, across + x * d_last
-        sine, cosine = np.sin(theta), np.cos(theta)
+            dx = along - r * d_last
+            dr = across + x * d_last
+        sine = np.sin(theta)
+        cosine = np.cos(theta)
         turned = r * d_theta
         return np.stack([dx, dr * cosine - turned * sine, dr * sine + turned * cosine], -1)
 
@@ -117,7 +121,8 @@ def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatA
     ``at`` (m,) float64: parametric coordinates; outside of [0, 1] the outermost polynomials are
     continued.
     """
-    knot, degree = knots(count, order), order - 1
+    knot = knots(count, order)
+    degree = order - 1
     span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)
     lower = np.zeros((len(at), 0))
     basis = np.ones((len(at), 1))
@@ -294,7 +299,8 @@ def points_at(index: tuple[int, ...]) -> tuple[int | slice, ...]:
 
 def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
     """Return the sums (m, c) of values (I, J, K, c) times factors (m, I), (m, J), (m, K)."""
-    m, (i, j, k, c) = len(u), lattice.shape
+    m = len(u)
+    (i, j, k, c) = lattice.shape
     plane = (u @ lattice.reshape(i, -1)).reshape(m, j, k * c)
     line = np.einsum("mj,mjx->mx", v, plane).reshape(m, k, c)
     return np.einsum("mk,mkc->mc", w, line)

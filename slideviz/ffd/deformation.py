@@ -26,7 +26,9 @@ MET = 1e-13
 """Distance from a point at which Newton's method ends, in parts of the box's size on each axis."""
 CLOSE = 1e-9  # largest distance at which a point counts as found, in the same measure
 ROUNDING = 1e-14  # part of the largest coordinate that is added to `CLOSE`
-STEPS, HALVINGS, STARTS = 40, 12, 4
+STEPS = 40
+HALVINGS = 12
+STARTS = 4
 """Most steps of Newton's method, most halvings of a step, and number of starts of a point."""
 SAMPLES = 3  # sampled points for each control point and direction; the nearest ones are the starts
 REACH = 0.5  # Newton's method stays so near to [0, 1] in each parametric coordinate
@@ -45,7 +47,8 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
         straight = replace(box, points=box.q, system=CARTESIAN)
         return parametric(straight, box.system.q_of(spatial))
     control = box.points.reshape(-1, 3)
-    low, high = control.min(axis=0), control.max(axis=0)
+    low = control.min(axis=0)
+    high = control.max(axis=0)
     # A point of the box is a mean of control points, with weights that are not negative.
     size = high - low
     slack = INSIDE * size
@@ -241,7 +244,8 @@ class BoxDeformation:
 
     def _in_parent(self, box: Box) -> Embedding:
         """Return the control points of a nested box, embedded in its parent."""
-        parent, points = self._by_name[box.parent], box.points.reshape(-1, 3)
+        parent = self._by_name[box.parent]
+        points = box.points.reshape(-1, 3)
         uvw, inside = parametric(parent, points)
         if not inside.all():
             raise CaseError(
@@ -264,7 +268,9 @@ class BoxDeformation:
 
     def _carry(self, box: Box) -> None:
         """Move the control points of a nested box with its parent; embed its nodes anew."""
-        name, parent, cage = box.name, box.parent, self._carried.get(box.name)
+        name = box.name
+        parent = box.parent
+        cage = self._carried.get(box.name)
         change = np.zeros(box.points.shape)
         if cage is not None:
             change = cage.sums(self.change[parent]).reshape(change.shape)
@@ -323,7 +329,8 @@ class BoxDeformation:
 
     def _place(self, box: Box) -> None:
         """Displace the nodes of a box to where its control points take them now."""
-        name, inside = box.name, self._embedded[box.name]
+        name = box.name
+        inside = self._embedded[box.name]
         done = tuple(self._done.get(name, ()))
         shifts = all(isinstance(drive.move, Shift) for drive, _ in done)
         if box.system.kind == "CARTESIAN" and not box.level and shifts:
@@ -377,11 +384,13 @@ class BoxDeformation:
         """Scale the displacement of a box back to the bound, as SU2 does: by one more pass."""
         nodes = self._embedded[box.name].nodes
         lengths = np.linalg.norm(self.nodes[nodes], axis=1)
-        bound, largest = self.limits.bound, float(lengths.max(initial=0.0))
+        bound = self.limits.bound
+        largest = float(lengths.max(initial=0.0))
         if largest <= bound:
             return
         node = nodes[int(np.argmax(lengths))]
-        vector, before = self.nodes[node].copy(), self._relax
+        vector = self.nodes[node].copy()
+        before = self._relax
         self._relax = before * (bound / largest - 1.0)
 
         def rates_of(rates: _Rates) -> None:
@@ -427,7 +436,9 @@ class BoxDeformation:
         """
         if not self._is_folded(box):
             return
-        step, total, depth = -0.5, 0.5, 0
+        step = -0.5
+        total = 0.5
+        depth = 0
         for number in range(1, self.limits.iterations + 1):
             self._apply(box, step)
             self._place(box)

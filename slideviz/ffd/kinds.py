@@ -182,7 +182,8 @@ def moves_of(box: Box, request: Request, held: Planes = NONE) -> tuple[Move, ...
 
 def variable_problem(box: Box, request: Request, dim: int, values: Sequence[float]) -> str:
     """Return why a variable cannot move a box; "" if it can. ``dim`` is that of the mesh."""
-    kind, index = request.kind, request.index
+    kind = request.kind
+    index = request.index
     if kind not in WHOLE_LINES and -1 in index:
         return f"{kind} has no index -1; write one from 0"
     if _is_polar(box, kind) and index[1] == -1:
@@ -297,7 +298,8 @@ def _gull(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
 
 
 def _nacelle(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
-    index, last = request.index, box.degrees
+    index = request.index
+    last = box.degrees
     if index == (-1, -1, -1):
         return ()
     i, j, k = index

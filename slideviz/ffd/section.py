@@ -120,7 +120,9 @@ class _Reader:
     """Reads one box from its lines; all methods raise MeshError for a mistake."""
 
     def __init__(self, mesh: Mesh, entries: Entries, system: CoordinateSystem) -> None:
-        self.mesh, self.entries, self.system = mesh, entries, system
+        self.mesh = mesh
+        self.entries = entries
+        self.system = system
         self.name = entries["FFD_TAG"].value
 
     def box(self) -> Box:
@@ -220,7 +222,8 @@ class _Reader:
 
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
-        key, part = "FFD_SURFACE_POINTS", self.mesh.part
+        key = "FFD_SURFACE_POINTS"
+        part = self.mesh.part
         n_points = len(self.mesh.points) if part is None else part.n_points
         on: dict[str, list[Row]] = {}
         for line, words in self.rows(key, self.count(key)):
@@ -246,7 +249,8 @@ class _Reader:
             nodes, first = np.unique(number.astype(np.int64), return_index=True)
             if part is not None:  # which has all nodes of markers
                 inside = np.isin(nodes, part.points)
-                nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]
+                nodes = np.searchsorted(part.points, nodes[inside])
+                first = first[inside]
             surfaces[marker] = nodes, table[first, 1:]
         return surfaces
 

@@ -73,10 +73,12 @@ def binary_layouts(texts: Sequence[Text], *, is_result: bool) -> list[BinaryLayo
     tables = [_counted(text) for text in texts]
     lengths = [int(before[-1] @ _WIDTHS) for before in tables]
     short = max(*lengths, *(text.n_points for text in texts)) <= LARGEST_4 and not is_result
-    width, begin = 4 if short else 8, HEAD
+    width = 4 if short else 8
+    begin = HEAD
     layouts: list[BinaryLayout] = []
     for number, (text, before, length) in enumerate(zip(texts, tables, lengths, strict=True), 1):
-        dim, conn = text.zone.dim, np.dtype(f"<u{width}")
+        dim = text.zone.dim
+        conn = np.dtype(f"<u{width}")
         point = np.dtype([("x", "<f8", (dim,)), ("i", conn)])
         offsets = begin + 8 + width
         entries = offsets + width * (text.n_cells + 1)
@@ -98,7 +100,8 @@ def _counted(text: Text) -> IntArray:
     """Return how many elements of each type are before each piece (`BinaryLayout.before`)."""
     from slideviz.formats.su2.loops import count_types
 
-    pieces, rows = text.zone.elements, text.n_cells
+    pieces = text.zone.elements
+    rows = text.n_cells
     before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
     out = before[1:]
     # The types with fewest and most nodes: if all elements are one of these, the total tells it.
@@ -130,8 +133,11 @@ def write_layouts(
 
 
 def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool) -> None:
-    text, conn, place = layout.text, layout.conn, layout.place
-    zone, lines = text.zone, text.lines
+    text = layout.text
+    conn = layout.conn
+    place = layout.place
+    zone = text.zone
+    lines = text.lines
     tasks: list[_Task] = [
         (kind, first, min(first + PIECES, len(pieces)))
         for kind, pieces in (("cells", zone.elements), ("points", zone.points))
@@ -190,9 +196,12 @@ def _layout_tasks(
 
 def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
     """Write the elements of piece ``k``, sorted by type, to file descriptor ``out``; return 0."""
-    text, table, size = layout.text, layout.place.cells, layout.conn.itemsize
+    text = layout.text
+    table = layout.place.cells
+    size = layout.conn.itemsize
     piece = text.zone.elements[k]
-    types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
+    types = np.empty(piece.rows, np.uint8)
+    nodes = np.empty(piece.nodes, np.int64)
     fill_cells(text.lines, piece, types, nodes, dim=text.zone.dim, n_points=text.n_points)
     cells = Cells.from_types(types, nodes)
     totals = layout.before[-1]

@@ -159,7 +159,9 @@ def main() -> None:
     # Whatever prints must not get into the answer.
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
+        seconds = int(sys.argv[2])
+        memory = int(sys.argv[3])
+        path = Path(sys.argv[4])
         _limit(seconds, memory)
         try:
             mesh = replace(MESHIO, reader=sys.argv[5]).function("reader")(path)
@@ -234,8 +236,10 @@ def convert(
     >>> sv.convert("square.su2", "square.su2b")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    source, target = Path(source), Path(target)
-    row, mesh = format_for(target), read(source, zone)
+    source = Path(source)
+    target = Path(target)
+    row = format_for(target)
+    mesh = read(source, zone)
     alone = zone is not None and mesh.zones > 1
     if warn is not None:
         if alone and mesh.origin.ending == row.ending:

@@ -50,7 +50,8 @@ def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
 
 def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
     """Return what the file of a mesh has besides points, cells and boundaries, in words."""
-    keys, has_halo = [], mesh.halo is not None
+    keys = []
+    has_halo = mesh.halo is not None
     for document in (zone.origin for zone in zones_of(mesh)):
         keys += ["FFD_NBOX"] if document.ffd else []
         if isinstance(document, Document):
@@ -117,7 +118,8 @@ def warning_of_losses(
     row = format_for(output, file_format)
     if row.require:
         row.function("require")(mesh, output)
-    lost, ending = lost_in(row, mesh), usual_ending(mesh)
+    lost = lost_in(row, mesh)
+    ending = usual_ending(mesh)
     if lost != [OTHER_ZONES] and not FORMATS[ending].sections and not FORMATS[ending].copies:
         ending = ".su2"
     return sentence_of_lost(output, mesh.name, lost, ending, alone=alone)

@@ -80,7 +80,8 @@ class StepSeries:
             return
         if name not in group:
             chunk = max(min(len(rows), _CHUNK_ROWS), 1)
-            shape, dtype = rows.shape[1:], rows.dtype
+            shape = rows.shape[1:]
+            dtype = rows.dtype
             group.create_dataset(
                 name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(chunk, *shape)
             )
@@ -200,7 +201,8 @@ def _clean(name: str) -> str:
 
 def _free(name: str, taken: set[str]) -> str:
     """Return a unique name: with a number added if it is taken or reserved in VTKHDF."""
-    number, free = 1, name
+    number = 1
+    free = name
     while free in taken or free == "Assembly":
         number += 1
         free = f"{name}_{number}"

@@ -70,7 +70,8 @@ class Actions:
         """Say the support radius when it is switched on, and when it changes while it is drawn."""
         if new.mesh is None or new.mesh is not old.mesh or "support" not in new.view.drawn:
             return
-        before, now = support_case(old), support_case(new)
+        before = support_case(old)
+        now = support_case(new)
         changed = before is not now and support_key(before, new.mesh) != support_key(now, new.mesh)
         if changed or "support" not in old.view.drawn:
             self.window.show_status(support_words(new))

@@ -37,7 +37,8 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     app.setDesktopFileName("slideviz")
     app.setWindowIcon(logo())
     places = QStandardPaths.StandardLocation
-    kept, cache = _folder(places.AppDataLocation), _folder(places.CacheLocation)
+    kept = _folder(places.AppDataLocation)
+    cache = _folder(places.CacheLocation)
     crashes = cache / "crashes"
     _keep_private(kept, cache)
     with crash_log(crashes):

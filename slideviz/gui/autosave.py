@@ -114,7 +114,8 @@ class SessionRecovery(QObject):
 
         Its results count as those of the session's case only if the file says so.
         """
-        panel, session = self.window.dock_manager.panel(DesignsPanel), self.window.store.session
+        panel = self.window.dock_manager.panel(DesignsPanel)
+        session = self.window.store.session
         try:
             table, current = found.designs()
         except CaseError as error:
@@ -161,7 +162,8 @@ class Autosave(QObject):
         super().__init__(parent)
         self.store = store
         self.path = folder / f"session-{os.getpid()}-{next(_numbers)}.cfg"
-        self._camera, self._designs = camera, designs
+        self._camera = camera
+        self._designs = designs
         self._lock: QLockFile | None = None
         self._written_key: tuple[object, ...] = ()
         self._pending_key: tuple[object, ...] = ()
@@ -287,7 +289,8 @@ def find_sessions(folder: Path) -> tuple[list[OrphanedSession], list[str]]:
     The lock of each session returned is held. Unreadable and half-written files are renamed to
     ``….broken``.
     """
-    found, problems = [], []
+    found = []
+    problems = []
     for path in sorted(folder.glob("session-*.cfg"), key=_modified, reverse=True):
         lock = _lock(path)
         if not lock.tryLock(0):

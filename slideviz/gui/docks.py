@@ -47,7 +47,8 @@ TAB_MARGINS = 24  # space in pixels that the style leaves beside the text of a t
 
 def _fit_texts(bar: QTabBar) -> None:
     """Leave less space beside the texts of tabs, instead of cutting them, where it is short."""
-    metrics, tabs = bar.fontMetrics(), range(bar.count())
+    metrics = bar.fontMetrics()
+    tabs = range(bar.count())
     wide = sum(metrics.horizontalAdvance(bar.tabText(k)) + TAB_MARGINS for k in tabs)
     set_style(bar, "tight", wide > bar.width())
 
@@ -64,7 +65,8 @@ class DockTabs(QObject):
         self, window: QMainWindow, docks: Iterable[QDockWidget], bare: set[QDockWidget]
     ) -> None:
         super().__init__(window)
-        self.window, self._bare = window, bare
+        self.window = window
+        self._bare = bare
         self._docks = {dock.windowTitle(): dock for dock in docks}
         for dock in self._docks.values():
             for change in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
@@ -127,7 +129,8 @@ class DockTabs(QObject):
 
     def take_out(self, dock: QDockWidget) -> None:
         """Make a dock a window of its own, near its old place, of the same size."""
-        size, at = dock.size(), dock.mapToGlobal(QPoint(-_DOWN, _DOWN))
+        size = dock.size()
+        at = dock.mapToGlobal(QPoint(-_DOWN, _DOWN))
         for other in self.window.tabifiedDockWidgets(dock):
             # A dock behind another tab keeps an old size.
             size = size.expandedTo(other.size())
@@ -139,9 +142,11 @@ class DockTabs(QObject):
 
 Panel = TypeVar("Panel", bound=QWidget)
 Side = Qt.DockWidgetArea
-LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
+RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
-LEFT_WIDTH, RIGHT_WIDTH = 356, 316
+LEFT_WIDTH = 356
+RIGHT_WIDTH = 316
 """Least initial width in pixels of the docks on each side of a window of `FULL_WIDTH`."""
 
 NARROWEST = {LEFT: 236, RIGHT: 224}  # least width in pixels of the docks on each side
@@ -272,7 +277,9 @@ class Docks(QObject):
 
     def restore(self, settings: QSettings) -> None:
         """Restore the window's geometry and the docks' layout; the initial one if none is saved."""
-        window, state, geometry = self.window, settings.value("state"), settings.value("geometry")
+        window = self.window
+        state = settings.value("state")
+        geometry = settings.value("geometry")
         if geometry is not None:
             window.restoreGeometry(geometry)
         self._fit_screen()
@@ -291,7 +298,8 @@ class Docks(QObject):
 
     def _fit_screen(self) -> None:
         """Shrink and move the window so that all of it is on the screen."""
-        window, room = self.window, available_area(self.window)
+        window = self.window
+        room = available_area(self.window)
         window.resize(window.size().boundedTo(room.size()))
         corner = window.pos()
         x = min(max(corner.x(), room.left()), room.right() + 1 - window.width())
@@ -310,7 +318,8 @@ class Docks(QObject):
 
     def _arrange(self, side: Side | None = None) -> None:
         """Put the docks of a side to their places, as they are shown; or all, as at first."""
-        window, rows = self.window, [row for row in DOCKS if side in (None, row.area)]
+        window = self.window
+        rows = [row for row in DOCKS if side in (None, row.area)]
         docks = {row: self.by_name[row.name] for row in rows}
         shown = {row: row.shown if side is None else not docks[row].isHidden() for row in rows}
         front = [dock for dock in docks.values() if side is not None and _is_in_front(dock)]
@@ -345,14 +354,16 @@ class Docks(QObject):
 
     def _follow_height(self) -> None:
         """Make the boundaries a tab in a low window, unless the user has moved these panels."""
-        low, rows = self.window.height() < LOW_HEIGHT, [row for row in DOCKS if row.area == LEFT]
+        low = self.window.height() < LOW_HEIGHT
+        rows = [row for row in DOCKS if row.area == LEFT]
         if low != self._low and all(self._has_initial_place(row, rows) for row in rows):
             self._arrange(LEFT)
             self._distribute_space(LEFT)
 
     def _has_initial_place(self, row: DockRow, rows: Sequence[DockRow]) -> bool:
         """Return whether a dock has its initial place, among those of its side."""
-        window, dock = self.window, self.by_name[row.name]
+        window = self.window
+        dock = self.by_name[row.name]
         first = {one.name: self._tab_neighbour(one) or one.name for one in rows}
         tab = {name: first[after] for name, after in first.items()}
         beside = {self.by_name[name] for name in tab if tab[name] == tab[row.name]}
@@ -362,7 +373,8 @@ class Docks(QObject):
     def _usual_widths(self) -> dict[Side, int]:
         """Return the width in pixels that each side has unless the user has changed it."""
         width = self.window.width()
-        part, wide = round(SIDE_FRACTION * width), min(1.0, width / FULL_WIDTH)
+        part = round(SIDE_FRACTION * width)
+        wide = min(1.0, width / FULL_WIDTH)
         usual = {LEFT: round(wide * LEFT_WIDTH), RIGHT: round(wide * RIGHT_WIDTH)}
         return {side: max(part, usual[side], least) for side, least in NARROWEST.items()}
 
@@ -417,7 +429,8 @@ class Docks(QObject):
 
     def show_hidden(self) -> None:
         """Show the docks again that `toggle_all` has hidden, unless one is visible already."""
-        state, self._hidden = self._hidden, None
+        state = self._hidden
+        self._hidden = None
         if state is not None and not any(dock.isVisible() for dock in self.by_name.values()):
             self.window.restoreState(state)
 

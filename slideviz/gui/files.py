@@ -81,7 +81,8 @@ class Files(QObject):
     def ask_and_open(self) -> None:
         """Ask for a mesh or case, first in the folder of the open one, and open it."""
         session = self.window.store.session
-        folder, here = self.folder(), session.case.source or session.path
+        folder = self.folder()
+        here = session.case.source or session.path
         if here is not None and here.parent.is_dir() and sample_folder() not in here.parents:
             folder = here.parent
         if path := questions.ask_open(self.window, folder):
@@ -157,7 +158,8 @@ class Files(QObject):
         ``again``: repeats the action; called after a job has saved the mesh, for which False is
         returned. ``before``: what the user wants to do that would lose the changes, in words.
         """
-        window, designs = self.window, self.window.dock_manager.panel(DesignsPanel)
+        window = self.window
+        designs = self.window.dock_manager.panel(DesignsPanel)
         unsaved = self._unsaved()
         if self._answered or not unsaved.lost:
             return True
@@ -213,7 +215,8 @@ class Files(QObject):
         frame = session.frames[-1] if last and session.frames else session.frame
         if frame is None or self.window.runner.busy:
             return
-        run, whole = session.run_shown, frame is session.frames[-1]
+        run = session.run_shown
+        whole = frame is session.frames[-1]
         stopped = stopped_words(run) if whole else ""
         step = f"_step{session.view.frame}"
         if whole:
@@ -231,7 +234,8 @@ class Files(QObject):
         self.settings.setValue("folder", str(path.parent))
         torn = torn_interfaces(session.mesh, frame.mesh.points)
         said = (stopped, *(f"{each[0].upper()}{each[1:]}." for each in torn))
-        self.saving, self.after_save = True, then
+        self.saving = True
+        self.after_save = then
         self.window.running.start_job(
             f"Saving {path.name}",
             lambda saved: self._mesh_saved(saved, whole, said),

@@ -105,7 +105,8 @@ class Running(QObject):
     def repair(self) -> None:
         """Mend the last step of the run that is shown, or the mesh, as a new run."""
         session = self.store.session
-        frame, run = to_mend(session), session.run_shown
+        frame = to_mend(session)
+        run = session.run_shown
         if self.runner.busy or frame is None:
             return
         settings = {"repair": "yes", "repair_steps": False}
@@ -175,14 +176,16 @@ class Running(QObject):
         return self.runner.close()
 
     def _end(self, how: str) -> None:
-        self._finish, self._shows_design = None, False
+        self._finish = None
+        self._shows_design = False
         if self._deforms:
             self._deforms = False
             self.store.change(changes.end_run, how)
         self.ended.emit()
 
     def _start_next(self) -> None:
-        follow, self._next = self._next, None
+        follow = self._next
+        self._next = None
         if follow is not None:
             follow()
 

@@ -114,7 +114,8 @@ class MainWindow(Services):
 
     # Parts -----------------------------------------------------------------------------
     def _make_centre(self, multi_samples: int) -> None:
-        centre, stack = QWidget(), QWidget()
+        centre = QWidget()
+        stack = QWidget()
         grid = QGridLayout(stack)
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page covers the view, which must be shown to have a size.
@@ -151,7 +152,8 @@ class MainWindow(Services):
         self.statusBar().setSizeGripEnabled(False)
 
     def _connect(self) -> None:
-        running, panel = self.running, self.run_panel
+        running = self.running
+        panel = self.run_panel
         for shows in (panel, self.start):
             running.began.connect(shows.set_busy)
             running.progressed.connect(shows.show_progress)

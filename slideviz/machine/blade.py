@@ -40,17 +40,22 @@ def curve_at(
 
     The derivative is that by the values (k,), exact where no two slopes in turn change their sign.
     """
-    x, y = np.asarray(spans, float), np.asarray(values, float)
-    count, eye = len(x), np.eye(len(x))
+    x = np.asarray(spans, float)
+    y = np.asarray(values, float)
+    count = len(x)
+    eye = np.eye(len(x))
     if count == 1:
         return np.full(len(at), y[0]), np.ones((len(at), 1))
     h = np.diff(x)
-    secant, by = np.diff(y) / h, np.diff(eye, axis=0) / h[:, None]
-    slope, slope_by = np.zeros(count), np.zeros((count, count))
+    secant = np.diff(y) / h
+    by = np.diff(eye, axis=0) / h[:, None]
+    slope = np.zeros(count)
+    slope_by = np.zeros((count, count))
     for k in range(1, count - 1):
         one, two = secant[k - 1 : k + 1]
         if one * two > 0.0:  # else the curve is level there
-            w1, w2 = 2.0 * h[k] + h[k - 1], h[k] + 2.0 * h[k - 1]
+            w1 = 2.0 * h[k] + h[k - 1]
+            w2 = h[k] + 2.0 * h[k - 1]
             both = w1 * two + w2 * one
             slope[k] = (w1 + w2) * one * (two / both)
             parts = w1 * (two / both) ** 2, w2 * (one / both) ** 2
@@ -59,18 +64,24 @@ def curve_at(
         if count == 2:
             slope[k], slope_by[k] = secant[0], by[0]
             continue
-        h0, h1 = h[near], h[min(far, count - 2)]
-        w0, w1 = (2.0 * h0 + h1) / (h0 + h1), -h0 / (h0 + h1)
+        h0 = h[near]
+        h1 = h[min(far, count - 2)]
+        w0 = (2.0 * h0 + h1) / (h0 + h1)
+        w1 = -h0 / (h0 + h1)
         slope[k], slope_by[k] = w0 * secant[near] + w1 * secant[far], w0 * by[near] + w1 * by[far]
         if slope[k] * secant[near] <= 0.0:
-            slope[k], slope_by[k] = 0.0, 0.0
+            slope[k] = 0.0
+            slope_by[k] = 0.0
         elif secant[near] * secant[far] < 0.0 and abs(slope[k]) > 3.0 * abs(secant[near]):
             slope[k], slope_by[k] = 3.0 * secant[near], 3.0 * by[near]
     s = np.clip(at, x[0], x[-1])
     left = np.clip(np.searchsorted(x, s, "right") - 1, 0, count - 2)
-    t, step = (s - x[left]) / h[left], h[left]
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t)
-    c, d = step * t * (1.0 - t) ** 2, -step * t**2 * (1.0 - t)
+    t = (s - x[left]) / h[left]
+    step = h[left]
+    a = (1.0 + 2.0 * t) * (1.0 - t) ** 2
+    b = t**2 * (3.0 - 2.0 * t)
+    c = step * t * (1.0 - t) ** 2
+    d = -step * t**2 * (1.0 - t)
     value = a * y[left] + b * y[left + 1] + c * slope[left] + d * slope[left + 1]
     weights = (
         part[:, None] * table
@@ -117,13 +128,15 @@ class BladeSections:
         self._radius = coords[:, 1]
         self._start = plane[:, 0] + 1j * plane[:, 1]
         self._length = self.curves.length(plane)
-        low, high = self.spans.min(), self.spans.max()
+        low = self.spans.min()
+        high = self.spans.max()
         if not high - low > 1e-6:
             raise MeshError("the boundary has one span everywhere, so nothing can vary over it")
         levels = low + (high - low) * np.linspace(0.01, 0.99, SECTIONS)
         cuts = [_cut(self._start, self.spans, triangles, level) for level in levels]
         some = [len(cut) > 0 for cut in cuts]
-        levels, cuts = levels[some], [cut for cut in cuts if len(cut)]
+        levels = levels[some]
+        cuts = [cut for cut in cuts if len(cut)]
         edges = np.array([_edges(cut.ravel()) for cut in cuts])
         if stack is None:
             centres = np.array([_centroid(cut) for cut in cuts])
@@ -174,7 +187,8 @@ def change_of(
     """
     (value, slope), row = curve_at(spans, values, at), ROWS[kind]
     if row == ANGLE:
-        value, slope = np.radians(value), np.radians(slope)
+        value = np.radians(value)
+        slope = np.radians(slope)
     if row == CHORD:
         value, slope = np.log(value), slope / value[:, None]
     return row, value, slope
@@ -223,7 +237,8 @@ def _edges(outline: Complex) -> tuple[complex, complex]:
     far = np.abs(ends[:, None] - ends)
     size = far.max()
     one, two = np.nonzero(far >= (1.0 - TIED) * size)
-    chord, middle = ends[two] - ends[one], 0.5 * (ends[one] + ends[two])
+    chord = ends[two] - ends[one]
+    middle = 0.5 * (ends[one] + ends[two])
     steep = np.abs(chord.real) <= TIED * size
     ahead = np.where(steep, chord.imag >= 0.0, chord.real > 0.0)
     centre = _mid_range(middle[ahead].real) + 1j * _mid_range(middle[ahead].imag)

@@ -61,7 +61,8 @@ def nearest_on_segments(segments: FloatArray, surface: ClosestPoints) -> Nearest
         if not len(keep):
             break
         keep = keep[np.argsort(bound[keep], kind="stable")][:MOST_SEGMENTS]
-        segments, ends = segments[keep], ends[keep]
+        segments = segments[keep]
+        ends = ends[keep]
         middle = segments.mean(axis=1)
         there = measured(middle)
         halves = np.stack([segments[:, 0], middle, middle, segments[:, 1]], axis=1)
@@ -95,7 +96,8 @@ def level_lines(corners: FloatArray, level: FloatArray, value: float) -> FloatAr
     alone = np.where(count[cut, None] == 1, above[cut], ~above[cut]).argmax(axis=1)
     ends = []
     for other in (alone + 1) % 3, (alone + 2) % 3:
-        low, high = level[cut, alone], level[cut, other]
+        low = level[cut, alone]
+        high = level[cut, other]
         share = ((value - low) / (high - low))[:, None]
         ends.append((1.0 - share) * corners[cut, alone] + share * corners[cut, other])
     return np.stack(ends, axis=1)
@@ -155,7 +157,9 @@ def bodies(nodes: IntArray, sides: IntArray) -> list[Body]:
     for start in range(count):
         if start in turns:
             continue
-        turns[start], members, waiting = 0, [start], [start]
+        turns[start] = 0
+        members = [start]
+        waiting = [start]
         while waiting:
             now = waiting.pop()
             for low, high in links:

@@ -38,7 +38,8 @@ STIFF = 100.0  # weight of the distance of a rim from its wall, relative to that
 STILL = 1e-6  # weight of the change in a round, without which a matrix might be singular
 LAST = 8  # Newton steps of each node to where target, edges and walls meet
 TANGENT = 1e-3  # weight of the change in these, where two of them are nearly tangent
-ENOUGH, MOST = 1e-2, 100
+ENOUGH = 1e-2
+MOST = 100
 """Residual of the equations of a round, relative to their right side, and most iterations."""
 
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -141,7 +142,8 @@ class _Guide:
 
     def facing(self, points: FloatArray) -> FloatArray:
         """Return the cosine of the normals of boundary and target at each node."""
-        vectors, normals = facet_vectors(points, self.facets), np.zeros_like(points)
+        vectors = facet_vectors(points, self.facets)
+        normals = np.zeros_like(points)
         for column in self.facets.T:
             np.add.at(normals, column, vectors)
         return self.sign * _dots(unit(normals), self.target.surface(points)[1])
@@ -168,7 +170,8 @@ class _Guide:
     def equations(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return matrices (k, d, d) and right sides (k, d) of the least squares of each node."""
         rows, directions, ways, weights = self.conditions(moved)
-        blocks, right = np.zeros((*moved.shape, moved.shape[1])), np.zeros_like(moved)
+        blocks = np.zeros((*moved.shape, moved.shape[1]))
+        right = np.zeros_like(moved)
         weighted = weights[:, None] * directions
         np.add.at(blocks, rows, weighted[:, :, None] * directions[:, None])
         np.add.at(right, rows, weighted * ways[:, None])
@@ -215,7 +218,8 @@ def _fit(points: FloatArray, guide: _Guide) -> FloatArray:
     x = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
     pairs = combinations_with_replacement(range(dim), 2)
     terms = np.stack([np.ones(k), *x.T, *(x[:, i] * x[:, j] for i, j in pairs)], axis=1)
-    moved, before = points, np.zeros(terms.shape[1] * dim)
+    moved = points
+    before = np.zeros(terms.shape[1] * dim)
     for _ in range(FITS):
         blocks, right = guide.equations(moved)
         matrix = np.einsum("kt,kde,ks->tdse", terms, blocks, terms, optimize=True)
@@ -233,10 +237,12 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
     """
     from scipy.sparse import coo_array, diags_array
 
-    one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    one = facets.ravel()
+    two = np.roll(facets, -1, axis=1).ravel()
     edges = np.sort(np.stack([one, two], axis=1)[one != two], axis=1)
     one, two = np.unique(edges, axis=0).T
-    k, weights = len(points), 1.0 / np.linalg.norm(points[one] - points[two], axis=1)
+    k = len(points)
+    weights = 1.0 / np.linalg.norm(points[one] - points[two], axis=1)
     links = coo_array((weights, (one, two)), (k, k)).tocsr()
     links = links + links.T
     laplacian = diags_array(np.ones(k)) - diags_array(1.0 / links.sum(axis=1)) @ links

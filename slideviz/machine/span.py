@@ -45,10 +45,13 @@ FACING = 0.3  # least cosine between the directions from hub to shroud at both w
 AMID = 0.25  # curves begin at a node whose span is so near to the middle
 CUBIC = 3  # the degree of the splines between traced curves, which need one place more
 SPANS = 33  # curves that `SpanCurves` traces
-STEPS, MOST_STEPS = 64, 512
+STEPS = 64
+MOST_STEPS = 512
 """Steps of a curve along the extent of the walls, and most steps in each direction."""
 BEND = 0.5  # largest sine of the angle between a wall's normal and the way to it, before its rim
-NEWTON, EXACT, OFF = 12, 1e-15, 1e-9
+NEWTON = 12
+EXACT = 1e-15
+OFF = 1e-9
 """Most Newton steps to a span, its error that needs no further one, and its largest error."""
 ON_AXIS = 1e-9  # a point nearer to the axis, as a part of the largest radius, has no theta
 
@@ -96,7 +99,9 @@ class SpanField:
     def slopes(self, coords: FloatArray) -> FloatArray:
         """Return the derivative (n, 3, 3) of `points` by the coordinates (n, 3)."""
         _, r, theta = coords.T
-        cos, sin, e = np.cos(theta), np.sin(theta), axis_basis(self.axis)
+        cos = np.cos(theta)
+        sin = np.sin(theta)
+        e = axis_basis(self.axis)
         out = np.empty((len(coords), 3, 3))
         out[:, :, 0] = e[2]
         out[:, :, 1] = cos[:, None] * e[0] + sin[:, None] * e[1]
@@ -204,7 +209,8 @@ def _span_between(
 ) -> SpanField:
     if mesh.dim != 3:
         raise MeshError(f"{mesh.name}: the span between two boundaries needs a mesh in 3D")
-    boundary, facets = boundary_of(mesh), list[IntArray]()
+    boundary = boundary_of(mesh)
+    facets = list[IntArray]()
     for name in (hub, shroud):
         mesh.marker(name)  # which knows what to say of an unknown one
         facets.append(boundary.facets[boundary.marker == boundary.names.index(name)])
@@ -230,7 +236,8 @@ def _span_between(
         holes = facets[0][:0]
     else:
         closed = [closed_wall(coords, table, radius, period) for table in facets]
-        walls, holes = [wall for wall, _ in closed], np.concatenate([hole for _, hole in closed])
+        walls = [wall for wall, _ in closed]
+        holes = np.concatenate([hole for _, hole in closed])
     field = SpanField(axis, origin, middle, radius, (walls[0], walls[1]), holes)
     if hub == shroud or not _face(field, coords[nodes] / (1.0, 1.0, radius)):
         raise MeshError(
@@ -381,7 +388,8 @@ class SpanCurves:
     def _value(self, span: FloatArray, m_prime: FloatArray, k: int, order: int) -> FloatArray:
         """Return z, r or m (n,) for k = 0, 1, 2, or a derivative by m'; linear beyond the ends."""
         inside = np.clip(m_prime, self.m_prime[0], self.m_prime[-1])
-        spline, s = self._splines[k], np.clip(span, 0.0, 1.0)
+        spline = self._splines[k]
+        s = np.clip(span, 0.0, 1.0)
         value = spline.ev(s, inside, dy=order)
         beyond = m_prime - inside
         if order == 0:
@@ -399,7 +407,8 @@ class SpanCurves:
             )
         out = np.empty((len(spans), 2))
         for side in (spans <= first[0], spans > first[0]):
-            at, span = here.copy(), float(first[0])
+            at = here.copy()
+            span = float(first[0])
             order = np.flatnonzero(side)
             for k in order[::-1] if side[0] else order:
                 for part in range(1, 5):
@@ -430,7 +439,8 @@ class SpanCurves:
     def _trace(self, seeds: FloatArray, spans: FloatArray, step: float) -> FloatArray:
         """Return z, r and m (k, n, 3) on the curves from seeds (n, 2), by steps of m'."""
         at = np.column_stack([seeds, np.zeros(len(seeds))])
-        straight, ahead = np.zeros(len(seeds), bool), self._direction(seeds)[0]
+        straight = np.zeros(len(seeds), bool)
+        ahead = self._direction(seeds)[0]
         table = [at]
         while not straight.all() and len(table) <= MOST_STEPS:
             # By m': d(z, r) = r t dm', dm = r dm'.

@@ -24,7 +24,8 @@ TURNED = 0.5
 """Largest component along theta of the normals of a wall about an axis, contoured ones too, as a
 root of the mean square."""
 PLANE = 1e-6  # part by which the sum of the facets' vectors of a flat wall may be shorter
-RING, OCTANTS = 0.1, 8
+RING = 0.1
+OCTANTS = 8
 """A ring around the axis is in all octants, and its least radii there differ by no more than this
 part of the largest of them."""
 
@@ -37,7 +38,8 @@ def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
     """
     flat = []
     for facets in walls:
-        vectors, middles = facet_vectors(local, facets), local[facets].mean(axis=1)
+        vectors = facet_vectors(local, facets)
+        middles = local[facets].mean(axis=1)
         size = np.linalg.norm(vectors, axis=1)
         flat.append(np.linalg.norm(vectors.sum(axis=0)) >= (1.0 - PLANE) * size.sum())
         across = vectors[:, 1] * middles[:, 0] - vectors[:, 0] * middles[:, 1]
@@ -75,11 +77,13 @@ def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
     _, first = np.unique(np.round(places / (0.5 * apart)), axis=0, return_index=True)
     places = places[first]
     last = int(np.argmax(np.sum((places - places[0]) ** 2, axis=1)))
-    away, path = np.full(len(places), np.inf), [places[last]]
+    away = np.full(len(places), np.inf)
+    path = [places[last]]
     for _ in range(len(places) - 1):
         away = np.minimum(away, np.sum((places - places[last]) ** 2, axis=1))
         away[last] = np.inf
-        places, away = np.delete(places, last, axis=0), np.delete(away, last)
+        places = np.delete(places, last, axis=0)
+        away = np.delete(away, last)
         last = int(np.argmin(away))
         if np.sum((places[last] - path[-1]) ** 2) > apart**2:
             path.append(places[last])
@@ -124,10 +128,8 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     )
     graph = coo_array((np.ones(len(edges), bool), edges.T), shape=(len(coords),) * 2)
     part = connected_components(graph, directed=False)[1]
-    follows, rims = (
-        dict(edges[first[count == 1]].tolist()),
-        dict[int, list[tuple[FloatArray, IntArray]]](),
-    )
+    follows = dict(edges[first[count == 1]].tolist())
+    rims = dict[int, list[tuple[FloatArray, IntArray]]]()
     while follows:
         start, node = follows.popitem()
         rim = [start]

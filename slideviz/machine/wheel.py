@@ -56,11 +56,13 @@ class Wheel:
         Besides, the place (n,) of each node among those of its own kind, for the second side that
         of its image.
         """
-        mesh, (first, second) = self.passages[0], self._sides.T
+        mesh = self.passages[0]
+        (first, second) = self._sides.T
         axis = first[first == second]
         kind = np.full(len(mesh.points), -1)
         kind[mesh.cells.nodes] = 0
-        kind[second], kind[axis] = 1, 2
+        kind[second] = 1
+        kind[axis] = 2
         own = np.flatnonzero(kind == 0)
         place = np.zeros(len(mesh.points), np.int64)
         place[own], place[axis] = np.arange(len(own)), np.arange(len(axis))
@@ -82,7 +84,8 @@ class Wheel:
     def nodes(self, copy: int, nodes: IntArray) -> IntArray:
         """Return the numbers in the wheel of the nodes (k,) of a copy of the passage."""
         own, last, axis, place = self._numbering
-        count, many = len(own), len(self.passages)
+        count = len(own)
+        many = len(self.passages)
         at = np.full(len(place), copy * count)
         following = copy + 1 if copy + 1 < many else 0
         at[last] = following * count
@@ -97,11 +100,15 @@ class Wheel:
         points = self.passages[copy].points[nodes]
         if not copy:
             return points
-        pair, angle = self.pairs[0], copy * self.period
+        pair = self.pairs[0]
+        angle = copy * self.period
         local = in_axis_frame(points, pair.axis, pair.origin)
-        cos, sin = np.cos(angle), np.sin(angle)
-        x, y = local[:, 0].copy(), local[:, 1].copy()
-        local[:, 0], local[:, 1] = cos * x - sin * y, sin * x + cos * y
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        x = local[:, 0].copy()
+        y = local[:, 1].copy()
+        local[:, 0] = cos * x - sin * y
+        local[:, 1] = sin * x + cos * y
         back = along(axis_basis(pair.axis).T, local) + np.asarray(pair.origin)
         return np.asarray(back[:, : points.shape[1]])
 
@@ -123,7 +130,8 @@ class Wheel:
 
         Cells of one type follow each other, copy after copy.
         """
-        types, flats = [np.empty(0, np.uint8)], [np.empty(0, np.int64)]
+        types = [np.empty(0, np.uint8)]
+        flats = [np.empty(0, np.int64)]
         for vtk, copy, nodes in self._rows(i, j):
             types.append(np.full(len(nodes), vtk, np.uint8))
             flats.append(self.nodes(copy, nodes.ravel()))
@@ -148,7 +156,8 @@ class Wheel:
 
         Raises MeshError if two would have one name.
         """
-        many, mesh = len(self.passages), self.passages[0]
+        many = len(self.passages)
+        mesh = self.passages[0]
         positive = [(p.first, p.second) if p.angle > 0 else (p.second, p.first) for p in self.pairs]
         copies = {name: range(many) for name in mesh.marker_names}
         for first, second in positive:
@@ -192,7 +201,8 @@ class Wheel:
     def require_meeting(self) -> float:
         """Return the largest distance of nodes that become one; MeshError where it is too large."""
         first, second = self._sides.T
-        many, worst = len(self.passages), 0.0
+        many = len(self.passages)
+        worst = 0.0
         allowed = TOLERANCE * self.passages[0].extent
         checked: set[tuple[int, int]] = set()
         for copy in range(many if self.is_closed else many - 1):

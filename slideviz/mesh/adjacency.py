@@ -17,7 +17,8 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
 
-NONE, SEVERAL = -1, -2
+NONE = -1
+SEVERAL = -2
 """In place of a neighbour: there is no other cell, or more than one (a non-manifold mesh)."""
 
 SIDES = np.zeros(256, np.int64)  # number of sides of an element type, by VTK identifier
@@ -56,7 +57,8 @@ def sides_of(cells: Cells) -> Sides:
     table = cells.types, cells.offsets, cells.connectivity, SIDE_NODES, first, owner
     least = np.empty(first[-1], np.int64)
     in_parts(lambda part: _write_least(*table, part.start, part.stop, least), len(least))
-    begins, order = np.zeros(n_nodes + 1, np.int64), np.empty(first[-1], np.int64)
+    begins = np.zeros(n_nodes + 1, np.int64)
+    order = np.empty(first[-1], np.int64)
     _sort(least, begins, order)
     neighbour = np.full(first[-1], NONE, np.int32)
     in_parts(lambda part: _match(*table, begins, order, part.start, part.stop, neighbour), n_nodes)
@@ -65,8 +67,10 @@ def sides_of(cells: Cells) -> Sides:
 
 def cells_around(cells: Cells, n_points: int) -> CellsAround:
     """Return the cells of each of ``n_points`` nodes; not cached, for it takes much memory."""
-    offsets, count = np.zeros(n_points + 1, np.int64), len(cells.connectivity)
-    owner, local = np.empty(count, np.int32), np.empty(count, np.int8)
+    offsets = np.zeros(n_points + 1, np.int64)
+    count = len(cells.connectivity)
+    owner = np.empty(count, np.int32)
+    local = np.empty(count, np.int8)
     _write_around(cells.connectivity, cells.offsets, offsets, owner, local)
     return CellsAround(sealed(offsets), sealed(owner), sealed(local))
 
@@ -114,8 +118,10 @@ def _write_around(connectivity, offsets, begins, owner, local):  # type: ignore[
 def _nodes_of(types, offsets, connectivity, locals_, first, owner, side):  # type: ignore[no-untyped-def]
     """Return the nodes of a side, ascending; before those of a line or a triangle are -1."""
     cell = owner[side]
-    row, begin = locals_[types[cell], side - first[cell]], offsets[cell]
-    a, b = connectivity[begin + row[0]], connectivity[begin + row[1]]
+    row = locals_[types[cell], side - first[cell]]
+    begin = offsets[cell]
+    a = connectivity[begin + row[0]]
+    b = connectivity[begin + row[1]]
     c = connectivity[begin + row[2]] if row[2] >= 0 else -1
     d = connectivity[begin + row[3]] if row[3] >= 0 else -1
     a, b = min(a, b), max(a, b)

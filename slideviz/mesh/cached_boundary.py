@@ -18,7 +18,8 @@ _VTK = {2: 3, 3: 5, 4: 9}  # VTK identifier of a facet by its number of nodes
 
 def outer_facets(mesh: Mesh) -> Cells:
     """Return the sides that only one cell has, as lines (2D) or triangles and quadrilaterals."""
-    sides, tables = sides_of(mesh.cells), dict[int, list[IntArray]]()
+    sides = sides_of(mesh.cells)
+    tables = dict[int, list[IntArray]]()
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         for k, local in enumerate(ELEMENTS[vtk].facets):
             alone = sides.neighbour[sides.first[ids] + k] == NONE

@@ -86,7 +86,8 @@ def swept_crossing(
     ``before`` and ``after`` (n, d): all points of the mesh, before and after the motion; others as
     in `first_crossing`. Raises MeshError if an element has another dimension than a boundary.
     """
-    before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
+    before = np.asarray(before, np.float64)
+    after = np.asarray(after, np.float64)
     goes = reduce(np.logical_or, (before != after).T)
     going = np.flatnonzero(goes)
     body = FacetSimplices.of(moved, after.shape[1])
@@ -124,12 +125,14 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
     a, b = a.within(points, b, margin), b.within(points, a, margin)
     if not (len(a) and len(b)):
         return None
-    planes, touches = Planes.of(points, b, margin), []
+    planes = Planes.of(points, b, margin)
+    touches = []
     for part in _chunks(len(a)):
         nodes = a.nodes[part]
         corners = points[nodes]
         i, j = planes.near(corners, normals(corners)[:, None])
-        ends, at = nodes[i], corners[i]
+        ends = nodes[i]
+        at = corners[i]
         height = planes.heights(at, j)
         touch = np.abs(height) <= margin
         for k in range(ends.shape[1]):
@@ -207,7 +210,8 @@ def _strike(
     depth = planes.depths(points, j[rows]).min(axis=1)
     for k in np.flatnonzero(depth >= -planes.margin):
         row = int(rows[k])
-        begin, stop = np.searchsorted(i, i[row], "left"), np.searchsorted(i, i[row], "right")
+        begin = np.searchsorted(i, i[row], "left")
+        stop = np.searchsorted(i, i[row], "right")
         if depth[k] > planes.margin or planes.separates(points[k], j[begin:stop], lines[row]):
             return points[k], row
     return None

@@ -27,7 +27,8 @@ def _around_nodes(vtk: int) -> list[list[tuple[int, int, int]]]:
     right = {(f[k - 1], f[k]): at for at, f in enumerate(row.facets) for k in range(len(f))}
     edges = []
     for k in range(row.n_nodes):
-        face, ring = next(at for (here, _), at in right.items() if here == k), []
+        face = next(at for (here, _), at in right.items() if here == k)
+        ring = []
         for _ in [here for here, _ in right if here == k]:
             other = next(b for (a, b), at in right.items() if a == k and at == face)
             ring.append((other, face, right[other, k]))
@@ -47,7 +48,8 @@ for _vtk, _row in ELEMENTS.items():
 def write_middles(points, offsets, connectivity, begin, middles):  # type: ignore[no-untyped-def]
     """Write the means (m, 3) of the nodes of cells, from number ``begin`` on."""
     for i in range(len(middles)):
-        first, last = offsets[begin + i], offsets[begin + i + 1]
+        first = offsets[begin + i]
+        last = offsets[begin + i + 1]
         for axis in range(points.shape[1]):
             total = 0.0
             for k in range(first, last):
@@ -91,48 +93,62 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
     most = 0
     for i in range(found.shape[1]):
         most = max(most, starts[begin + i + 1] - starts[begin + i])
-    others, normals = np.empty(4 * most, np.int64), np.empty((4 * most, 3))
+    others = np.empty(4 * most, np.int64)
+    normals = np.empty((4 * most, 3))
     for i in range(found.shape[1]):
         k = begin + i
-        x, count, small, large = _point(points, k), 0, np.inf, 0.0
+        x = _point(points, k)
+        count = 0
+        small = np.inf
+        large = 0.0
         for entry in range(starts[k], starts[k + 1]):
-            cell, at = cells[entry], local[entry]
-            first, vtk = offsets[cell], types[cell]
+            cell = cells[entry]
+            at = local[entry]
+            first = offsets[cell]
+            vtk = types[cell]
             flat = vtk < 10
-            sign, to_middle = float(signs[cell]), minus3(_point(middles, cell), x)
+            sign = float(signs[cell])
+            to_middle = minus3(_point(middles, cell), x)
             start = x
             if not flat:
                 side = around[vtk, at, 0, 1]
                 start = minus3(_middle_of(points, connectivity, first, side_nodes, vtk, side), x)
-            face, across = start, cross3(start, to_middle)
+            face = start
+            across = cross3(start, to_middle)
             for ray in range(4):
                 if around[vtk, at, ray, 0] < 0:
                     break
-                other, turn = connectivity[first + around[vtk, at, ray, 0]], around[vtk, at, ray, 1]
+                other = connectivity[first + around[vtk, at, ray, 0]]
+                turn = around[vtk, at, ray, 1]
                 half = minus3(_point(points, other), x)
                 half = 0.5 * half[0], 0.5 * half[1], 0.5 * half[2]
                 inward = minus3(to_middle, half)
                 if flat:
                     normal = turn * inward[1], -turn * inward[0], 0.0
                     size = 0.5 * abs(half[0] * to_middle[1] - half[1] * to_middle[0])
-                    small, large = min(small, size), max(large, size)
+                    small = min(small, size)
+                    large = max(large, size)
                 else:
-                    side, after = around[vtk, at, ray, 2], start
+                    side = around[vtk, at, ray, 2]
+                    after = start
                     if side != around[vtk, at, 0, 1]:
                         after = _middle_of(points, connectivity, first, side_nodes, vtk, side)
                         after = minus3(after, x)
                     normal = cross3(inward, minus3(face, after))
                     normal = 0.5 * normal[0], 0.5 * normal[1], 0.5 * normal[2]
-                    before, across = across, cross3(after, to_middle)
+                    before = across
+                    across = cross3(after, to_middle)
                     for one in (before, across):
                         size = abs(dot3(half, one))  # six times the volume: ratios are wanted
-                        small, large = min(small, size), max(large, size)
+                        small = min(small, size)
+                        large = max(large, size)
                     face = after
                 place = 0
                 while place < count and others[place] != other:
                     place += 1
                 if place == count:
-                    others[place], count = other, count + 1
+                    others[place] = other
+                    count = count + 1
                     normals[place, 0] = normals[place, 1] = normals[place, 2] = 0.0
                 for axis in range(3):
                     normals[place, axis] += sign * normal[axis]
@@ -143,7 +159,10 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
 @njit(**OPTIONS)
 def _of_edges(points, x, others, normals, limits):  # type: ignore[no-untyped-def]
     """Return orthogonality and area ratio of a node at ``x`` with edges to ``others``."""
-    total, weighted, small, large = 0.0, 0.0, limits[0], limits[1]
+    total = 0.0
+    weighted = 0.0
+    small = limits[0]
+    large = limits[1]
     for place in range(len(others)):
         normal = normals[place, 0], normals[place, 1], normals[place, 2]
         along = minus3(_point(points, others[place]), x)
@@ -152,7 +171,8 @@ def _of_edges(points, x, others, normals, limits):  # type: ignore[no-untyped-de
         cosine = min(max(dot3(normal, along) / scale, -1.0), 1.0) if scale > 0.0 else 0.0
         total += size
         weighted += size * (90.0 - np.degrees(np.arccos(cosine)))
-        small, large = min(small, size), max(large, size)
+        small = min(small, size)
+        large = max(large, size)
     if len(others) == 0:
         return np.nan, np.nan
     return weighted / total if total > 0.0 else 0.0, large / small if small > 0.0 else np.inf

@@ -93,7 +93,8 @@ _ROWS = (
 
 ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}  # element type by VTK identifier
 
-SIZES, DIMS = np.zeros(256, np.int64), np.zeros(256, np.int64)
+SIZES = np.zeros(256, np.int64)
+DIMS = np.zeros(256, np.int64)
 """Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""
 for _row in _ROWS:
     SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim

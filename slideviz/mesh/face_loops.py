@@ -38,12 +38,12 @@ def _face(at, row, count, area, centre):  # type: ignore[no-untyped-def]
                 area[axis, c] = 0.5 * normal[axis]
                 centre[axis, c] = (at[axis, a, c] + at[axis, b, c] + at[axis, d, c]) / 3.0
         else:
-            x, y = (
-                half_sum(node(at, a, c), node(at, b, c)),
-                half_sum(node(at, d, c), node(at, e, c)),
-            )
+            x = half_sum(node(at, a, c), node(at, b, c))
+            y = half_sum(node(at, d, c), node(at, e, c))
             middle = half_sum(x, y)
-            total, sums, moment = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            total = 0.0
+            sums = (0.0, 0.0, 0.0)
+            moment = (0.0, 0.0, 0.0)
             p = node(at, e, c)
             for q in (node(at, a, c), node(at, b, c), node(at, d, c), p):
                 normal = cross3(minus3(p, middle), minus3(q, middle))
@@ -76,7 +76,9 @@ def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ig
         for k in range(len(polygons)):
             _face(at, polygons[k], count, areas[k], middles[k])
         for c in range(count):
-            top, total, moment = (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)
+            top = (0.0, 0.0, 0.0)
+            total = 0.0
+            moment = (0.0, 0.0, 0.0)
             for k in range(len(polygons)):
                 top = add3(top, (middles[k, 0, c], middles[k, 1, c], middles[k, 2, c]))
             top = top[0] / len(polygons), top[1] / len(polygons), top[2] / len(polygons)
@@ -110,21 +112,23 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
     """
     at = np.zeros((3, nodes.shape[1], LANES))
     area, middle, across = np.empty((3, 3, LANES))
-    share, ratio, worst = np.empty(LANES), np.empty(LANES), np.empty((3, LANES))
+    share = np.empty(LANES)
+    ratio = np.empty(LANES)
+    worst = np.empty((3, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
         cells = ids[start : start + count]
         gather(points, nodes, start, count, at)
-        worst[0], worst[1], worst[2] = 1.0, 0.0, 1.0
+        worst[0] = 1.0
+        worst[1] = 0.0
+        worst[2] = 1.0
         for k in range(len(sides)):
             _face(at, sides[k], count, area, middle)
             _across(cells, k, adjacent, rated, area, middle, across, share, ratio)
             for c in range(count):
                 worst[2, c] = max(worst[2, c], ratio[c])
-                s, d = (
-                    (area[0, c], area[1, c], area[2, c]),
-                    (across[0, c], across[1, c], across[2, c]),
-                )
+                s = (area[0, c], area[1, c], area[2, c])
+                d = (across[0, c], across[1, c], across[2, c])
                 scale = np.sqrt(dot3(d, d) * dot3(s, s))
                 cosine = signs[start + c] * dot3(s, d) / scale if scale > 0.0 else 0.0
                 worst[0, c] = min(worst[0, c], cosine if share[c] < 0.3 else 1.0)
@@ -152,8 +156,10 @@ def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # t
             for axis in range(3):
                 across[axis, c] = centres[other, axis] - centres[cell, axis]
         else:
-            share[c], ratio[c] = 0.4, 1.0
-            through, square = 0.0, 0.0
+            share[c] = 0.4
+            ratio[c] = 1.0
+            through = 0.0
+            square = 0.0
             for axis in range(3):
                 through += area[axis, c] * (middle[axis, c] - centres[cell, axis])
                 square += area[axis, c] * area[axis, c]
@@ -164,23 +170,28 @@ def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # t
 @njit(**OPTIONS)
 def _raise_skewness(at, row, cells, centres, area, middle, across, share, worst):  # type: ignore[no-untyped-def]
     """Raise ``worst`` (…) to the skewness of a face of ``cells`` (c,), local nodes ``row``."""
-    v, reach, own = np.empty((3, LANES)), np.zeros(LANES), np.empty((3, LANES))
+    v = np.empty((3, LANES))
+    reach = np.zeros(LANES)
+    own = np.empty((3, LANES))
     for c in range(len(cells)):
         for axis in range(3):
             own[axis, c] = centres[cells[c], axis]
     for c in range(len(cells)):
-        s, d = (area[0, c], area[1, c], area[2, c]), (across[0, c], across[1, c], across[2, c])
+        s = (area[0, c], area[1, c], area[2, c])
+        d = (across[0, c], across[1, c], across[2, c])
         p = middle[0, c] - own[0, c], middle[1, c] - own[1, c], middle[2, c] - own[2, c]
         part = dot3(s, p) / dot3(s, d)
         v[0, c], v[1, c], v[2, c] = p[0] - part * d[0], p[1] - part * d[1], p[2] - part * d[2]
     for k in row:
         if k >= 0:
             for c in range(len(cells)):
-                x, y = at[0, k, c] - middle[0, c], at[1, k, c] - middle[1, c]
+                x = at[0, k, c] - middle[0, c]
+                y = at[1, k, c] - middle[1, c]
                 along = v[0, c] * x + v[1, c] * y + v[2, c] * (at[2, k, c] - middle[2, c])
                 reach[c] = max(reach[c], abs(along))
     for c in range(len(cells)):
-        s, d = (area[0, c], area[1, c], area[2, c]), (across[0, c], across[1, c], across[2, c])
+        s = (area[0, c], area[1, c], area[2, c])
+        d = (across[0, c], across[1, c], across[2, c])
         square = dot3((v[0, c], v[1, c], v[2, c]), (v[0, c], v[1, c], v[2, c]))
         length = np.sqrt(square)
         skewness = square / max(share[c] * length * np.sqrt(dot3(d, d)), reach[c])

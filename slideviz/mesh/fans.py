@@ -65,7 +65,8 @@ def find_fans(
     real = np.ones(len(node), bool)
     if width == 4:
         real[3::4] = boundary.facets[:, 2] != boundary.facets[:, 3]
-    facet, node = facet[real], node[real]
+    facet = facet[real]
+    node = node[real]
     row = np.full(count * width, -1, np.int64)
     row[np.flatnonzero(real)] = np.arange(len(node))
     smooth = smooth_joints(boundary, points, feature_angle_deg)
@@ -84,14 +85,17 @@ def find_fans(
     place = np.lexsort((sum(corners[1:], corners[0]) / width).T)
     order = row.reshape(-1, width)[place].ravel()
     order = order[order >= 0]
-    facet, node, fan = facet[order], node[order], fan[order]
+    facet = facet[order]
+    node = node[order]
+    fan = fan[order]
     total = int(fan.max(initial=-1)) + 1
     first = np.empty(total, np.int64)
     first[fan[::-1]] = np.arange(len(fan))[::-1]
     is_first = np.zeros(len(fan), bool)
     is_first[first] = True
     fan = (np.cumsum(is_first) - 1)[first][fan]
-    fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
+    fan_node = np.empty(total, np.int64)
+    fan_marker = np.empty(total, np.int64)
     fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
 
@@ -125,7 +129,8 @@ def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # 
     triangle that repeats its last node (row 1).
     """
     for row in range(len(facet)):
-        f, squared = facet[row], 0.0
+        f = facet[row]
+        squared = 0.0
         triangle = facets.shape[1] == 4 and facets[f, 2] == facets[f, 3]
         for axis in range(coords.shape[1]):
             centre = 0.0
@@ -165,7 +170,8 @@ def _unite(a, b, label):  # type: ignore[no-untyped-def]
     linear set union algorithm, 1975), and are numbered in the order of their roots.
     """
     for k in range(len(a)):
-        one, two = _root(label, a[k]), _root(label, b[k])
+        one = _root(label, a[k])
+        two = _root(label, b[k])
         label[max(one, two)] = min(one, two)
     count = 0
     for i in range(len(label)):

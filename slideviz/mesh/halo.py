@@ -125,7 +125,8 @@ def _rooted(
     """
     row = np.full(count, -1)
     row[receivers] = np.arange(len(receivers))
-    donors, rotations = donors.copy(), rotations.copy()
+    donors = donors.copy()
+    rotations = rotations.copy()
     for _ in range(3):  # as many as there are periods at most
         copied = np.flatnonzero(row[donors] >= 0)
         via = row[donors[copied]]
@@ -193,7 +194,8 @@ def fit_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
 
     Reflections are excluded (Kabsch 1976).
     """
-    here, there = before.mean(axis=0), after.mean(axis=0)
+    here = before.mean(axis=0)
+    there = after.mean(axis=0)
     u, _, vt = np.linalg.svd((before - here).T @ (after - there))
     flip = np.ones(before.shape[1])
     flip[-1] = np.sign(np.linalg.det(vt.T @ u.T)) or 1.0

@@ -24,17 +24,20 @@ def find_interfaces(
     others = list(others)
     if not others:
         return ()
-    found, near = [], COINCIDENT * mesh.extent
+    found = []
+    near = COINCIDENT * mesh.extent
     nodes_of = {marker.name: marker.nodes for marker in mesh.markers}
     for zone, name, points in others:
-        low, high = points.min(axis=0) - near, points.max(axis=0) + near
+        low = points.min(axis=0) - near
+        high = points.max(axis=0) + near
         for marker in mesh.markers:
             nodes = nodes_of[marker.name]
             places = mesh.points[nodes]
             if not ((places >= low) & (places <= high)).all(axis=1).any():
                 continue
             distance, partner = nearest(points, places, near, near)
-            there, shared = np.isfinite(distance), np.zeros(len(mesh.points), bool)
+            there = np.isfinite(distance)
+            shared = np.zeros(len(mesh.points), bool)
             shared[nodes] = there
             if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
                 here = frozen_array(nodes[there], np.int64)

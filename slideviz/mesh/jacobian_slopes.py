@@ -36,7 +36,8 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     slope = np.empty_like(at)
-    alpha, spread = np.empty((len(table), LANES)), np.empty((len(table), LANES))
+    alpha = np.empty((len(table), LANES))
+    spread = np.empty((len(table), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, at)
@@ -91,17 +92,27 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
     ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
     """
     for k in range(len(table)):
-        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        o = table[k, 0]
+        i = table[k, 1]
+        j = table[k, 2]
         for c in range(count):
-            ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
-            bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
+            ax = at[0, i, c] - at[0, o, c]
+            ay = at[1, i, c] - at[1, o, c]
+            bx = at[0, j, c] - at[0, o, c]
+            by = at[1, j, c] - at[1, o, c]
             if vtk == 5:
-                aa, ab, bb = 2.0, -1.0, 2.0
+                aa = 2.0
+                ab = -1.0
+                bb = 2.0
             else:
-                one, two = ax * ax + ay * ay, bx * bx + by * by
+                one = ax * ax + ay * ay
+                two = bx * bx + by * by
                 length = np.sqrt(one * two)
-                aa, ab, bb = length / one, 0.0, length / two
-            w, s = alpha[k, c], spread[k, c]
+                aa = length / one
+                ab = 0.0
+                bb = length / two
+            w = alpha[k, c]
+            s = spread[k, c]
             by_a = w * by + s * (aa * ax + ab * bx), -w * bx + s * (aa * ay + ab * by)
             by_b = -w * ay + s * (ab * ax + bb * bx), w * ax + s * (ab * ay + bb * by)
             for axis in range(2):
@@ -114,12 +125,20 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
 def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
     for k in range(len(table)):
-        o, i, j, h = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
+        o = table[k, 0]
+        i = table[k, 1]
+        j = table[k, 2]
+        h = table[k, 3]
         for c in range(count):
-            x, y, z = edge(at, o, i, c), edge(at, o, j, c), edge(at, o, h, c)
-            yz, zx, xy = cross3(y, z), cross3(z, x), cross3(x, y)
+            x = edge(at, o, i, c)
+            y = edge(at, o, j, c)
+            z = edge(at, o, h, c)
+            yz = cross3(y, z)
+            zx = cross3(z, x)
+            xy = cross3(x, y)
             by_x, by_y, by_z = _spread_slopes(vtk, x, y, z)
-            w, s = alpha[k, c], spread[k, c]
+            w = alpha[k, c]
+            s = spread[k, c]
             for axis in range(3):
                 one = w * yz[axis] + s * by_x[axis]
                 two = w * zx[axis] + s * by_y[axis]
@@ -144,15 +163,21 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
         )
     if vtk == 14:
         half = half_sum(x, y)
-        u, v, w = z[0] - half[0], z[1] - half[1], z[2] - half[2]
+        u = z[0] - half[0]
+        v = z[1] - half[1]
+        w = z[2] - half[2]
         return (
             (2 * (x[0] - u), 2 * (x[1] - v), 2 * (x[2] - w)),
             (2 * (y[0] - u), 2 * (y[1] - v), 2 * (y[2] - w)),
             (4 * u, 4 * v, 4 * w),
         )
-    xx, yy, zz = dot3(x, x), dot3(y, y), dot3(z, z)
+    xx = dot3(x, x)
+    yy = dot3(y, y)
+    zz = dot3(z, z)
     product = np.sqrt(xx * yy * zz)
-    a, b, c = product / xx, product / yy, product / zz
+    a = product / xx
+    b = product / yy
+    c = product / zz
     return (
         (a * x[0], a * x[1], a * x[2]),
         (b * y[0], b * y[1], b * y[2]),
@@ -170,7 +195,8 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     slope = np.empty_like(at)
-    part, none = np.zeros((len(weights), LANES)), np.zeros((len(weights), LANES))
+    part = np.zeros((len(weights), LANES))
+    none = np.zeros((len(weights), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, at)
@@ -200,7 +226,8 @@ def pull_proof(vtk, at, table, count, weights, none, slope):  # type: ignore[no-
         _pull_solid(14, at, table, count, weights, none, slope)
 
 
-_U, _V = NODE.transpose(1, 0, 2), NODE
+_U = NODE.transpose(1, 0, 2)
+_V = NODE
 _SIDES = np.array(
     [[[_U[j, :, 0], _V[i, :, 0], _U[j, :, 1], _V[i, :, 1]] for j in range(2)] for i in range(2)]
 )
@@ -212,7 +239,8 @@ _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 @njit(**OPTIONS)
 def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
-    heights, factors = NODE.reshape(4, 2), np.empty((3, 4, LANES))
+    heights = NODE.reshape(4, 2)
+    factors = np.empty((3, 4, LANES))
     for i in range(2):
         for j in range(2):
             for p in range(2):
@@ -232,11 +260,15 @@ def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no
     ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cells, ``heights`` (h, 2) those
     of w, ``factors`` (3, h, ...).
     """
-    products, total = np.empty((3, 3, LANES)), np.zeros((3, 3, LANES))
+    products = np.empty((3, 3, LANES))
+    total = np.zeros((3, 3, LANES))
     for c in range(count):
-        u0, v0 = edge(at, sides[0, 0], sides[0, 1], c), edge(at, sides[1, 0], sides[1, 1], c)
-        u1, v1 = edge(at, sides[2, 0], sides[2, 1], c), edge(at, sides[3, 0], sides[3, 1], c)
-        low, top = cross3(u0, v0), cross3(u1, v1)
+        u0 = edge(at, sides[0, 0], sides[0, 1], c)
+        v0 = edge(at, sides[1, 0], sides[1, 1], c)
+        u1 = edge(at, sides[2, 0], sides[2, 1], c)
+        v1 = edge(at, sides[3, 0], sides[3, 1], c)
+        low = cross3(u0, v0)
+        top = cross3(u1, v1)
         middle = half_sum(cross3(u0, v1), cross3(u1, v0))
         for axis in range(3):
             products[0, axis, c] = low[axis]
@@ -257,7 +289,8 @@ def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no
                 slope[axis, two, c] += value
     for k in range(4):
         # By u0 and u1: v0 x a + v1 x b, v1 x d + v0 x b; by v0 and v1: a x u0 + b x u1, ...
-        upper, across = k // 2, 1 - k % 2
+        upper = k // 2
+        across = 1 - k % 2
         own, other = (across, 2 + across) if upper == 0 else (2 + across, across)
         for c in range(count):
             x = edge(at, sides[own, 0], sides[own, 1], c)

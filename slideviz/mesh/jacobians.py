@@ -66,7 +66,8 @@ def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:
         owner = np.tile(owner, 8)
         inverted[owner[~(parts[::2, ::2, ::2] > 0).all(axis=(0, 1, 2))]] = True
         open_ = ~(parts > 0).all(axis=(0, 1, 2)) & ~inverted[owner]
-        parts, owner = parts[..., open_], owner[open_]
+        parts = parts[..., open_]
+        owner = owner[open_]
     status = np.where(inverted, INVERTED, VALID).astype(np.uint8)
     status[owner] = UNPROVEN
     return status
@@ -169,11 +170,15 @@ def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
     derivatives.
     """
     for k in range(len(table)):
-        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        o = table[k, 0]
+        i = table[k, 1]
+        j = table[k, 2]
         if at.shape[0] == 2:
             for c in range(count):
-                ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
-                bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
+                ax = at[0, i, c] - at[0, o, c]
+                ay = at[1, i, c] - at[1, o, c]
+                bx = at[0, j, c] - at[0, o, c]
+                by = at[1, j, c] - at[1, o, c]
                 alpha[k, c] = ax * by - ay * bx
         else:
             h = table[k, 3]
@@ -190,18 +195,27 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
     `jacobian_slopes` has its derivatives.
     """
     for k in range(len(table)):
-        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        o = table[k, 0]
+        i = table[k, 1]
+        j = table[k, 2]
         if at.shape[0] == 2:
             for c in range(count):
-                ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
-                bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
-                aa, bb = ax * ax + ay * ay, bx * bx + by * by
+                ax = at[0, i, c] - at[0, o, c]
+                ay = at[1, i, c] - at[1, o, c]
+                bx = at[0, j, c] - at[0, o, c]
+                by = at[1, j, c] - at[1, o, c]
+                aa = ax * ax + ay * ay
+                bb = bx * bx + by * by
                 spread[k, c] = aa + bb - (ax * bx + ay * by) if vtk == 5 else np.sqrt(aa * bb)
             continue
         h = table[k, 3]
         for c in range(count):
-            x, y, z = edge(at, o, i, c), edge(at, o, j, c), edge(at, o, h, c)
-            xx, yy, zz = dot3(x, x), dot3(y, y), dot3(z, z)
+            x = edge(at, o, i, c)
+            y = edge(at, o, j, c)
+            z = edge(at, o, h, c)
+            xx = dot3(x, x)
+            yy = dot3(y, y)
+            zz = dot3(z, z)
             if vtk == 10:
                 squares = 1.5 * (xx + yy + zz)
                 spread[k, c] = squares - dot3(x, y) - dot3(y, z) - dot3(z, x)
@@ -222,9 +236,12 @@ def write_prism(at, count, found):  # type: ignore[no-untyped-def]
     Jacobians, and the volume is the sum of all, divided by 18.
     """
     for c in range(count):
-        a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
-        p, q = edge(at, 3, 4, c), edge(at, 3, 5, c)
-        low, top = cross3(a, b), cross3(p, q)
+        a = edge(at, 0, 1, c)
+        b = edge(at, 0, 2, c)
+        p = edge(at, 3, 4, c)
+        q = edge(at, 3, 5, c)
+        low = cross3(a, b)
+        top = cross3(p, q)
         middle = half_sum(cross3(a, q), cross3(p, b))
         for i in range(3):
             height = edge(at, i, i + 3, c)
@@ -256,7 +273,8 @@ def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
                 u1 = edge(at, NODE[0, j, 1], NODE[1, j, 1], c)
                 v0 = edge(at, NODE[i, 0, 0], NODE[i, 1, 0], c)
                 v1 = edge(at, NODE[i, 0, 1], NODE[i, 1, 1], c)
-                low, top = cross3(u0, v0), cross3(u1, v1)
+                low = cross3(u0, v0)
+                top = cross3(u1, v1)
                 middle = half_sum(cross3(u0, v1), cross3(u1, v0))
                 for p in range(2):
                     for q in range(2):
@@ -298,7 +316,8 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         gather(points, nodes, first, count, at)
         corners(at, table, count, alpha[:, here])
         spreads(vtk, at, table, count, spread[:, here])
-        sides, states = turn[here], status[here]
+        sides = turn[here]
+        states = status[here]
         states[:] = VALID
         if vtk == 12:
             write_hexahedron(at, count, coefficients)

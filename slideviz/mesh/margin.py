@@ -196,7 +196,8 @@ def least_margin(
     It is that of `margins`, which are found only of cells that may have the least one: of a
     hexahedron a bound costs less (`_write_bounds`).
     """
-    cells, ends = after.cells, cap * BOUNDED
+    cells = after.cells
+    ends = cap * BOUNDED
     bounded = np.zeros(len(cells), np.int8)
 
     def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
@@ -208,7 +209,8 @@ def least_margin(
     cells.in_parts(of_part)
     if after.halo is not None:
         bounded[after.halo.cells] = len(ends)
-    least, cell = cap, 0
+    least = cap
+    cell = 0
     for level, end in enumerate(ends):
         ids = np.flatnonzero(bounded == level)
         some = cells.take(ids)
@@ -217,7 +219,8 @@ def least_margin(
         start = before.points[nodes]
         found = margins(start, after.points[nodes] - start, here, cap, signs[ids])
         if len(found) and (found.min(), ids[found.argmin()]) < (least, cell):
-            least, cell = float(found.min()), int(ids[found.argmin()])
+            least = float(found.min())
+            cell = int(ids[found.argmin()])
         if least < end:
             break  # all others have larger ones
     return least, cell
@@ -235,8 +238,10 @@ def step_safety(
     ``before``, ``after``: the meshes before and after the step. ``part``: the fractions of the
     motion that they have. The cells of a halo do not count.
     """
-    first, length = part[0], part[1] - part[0]
-    signs, cells = reference_of(undeformed)[1], after.cells
+    first = part[0]
+    length = part[1] - part[0]
+    signs = reference_of(undeformed)[1]
+    cells = after.cells
     cap = (FARTHEST - first) / length
     margin, cell = least_margin(before, after, cap, signs)
     if margin >= cap:
@@ -268,8 +273,10 @@ def _write_bounds(before, after, nodes, turn, ends, found):  # type: ignore[no-u
     a₁ = |U| + s |F|, which is largest at the end of an interval.
     """
     start, stop = np.empty((2, 3, 8, LANES))
-    mean, off = np.empty((2, 3, 3, LANES)), np.empty((2, 3, LANES))
-    errors, level = np.empty((2, 2, LANES)), np.empty(LANES, np.int8)
+    mean = np.empty((2, 3, 3, LANES))
+    off = np.empty((2, 3, LANES))
+    errors = np.empty((2, 2, LANES))
+    level = np.empty(LANES, np.int8)
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(before, nodes, first, count, start)
@@ -282,7 +289,8 @@ def _write_bounds(before, after, nodes, turn, ends, found):  # type: ignore[no-u
         _write_sizes(stop, count, errors[1])
         _write_means(start, count, mean[0], off[0])
         _write_means(stop, count, mean[1], off[1])
-        level[:count], open_ = 0, count
+        level[:count] = 0
+        open_ = count
         for k in range(len(ends) - 1, -1, -1):
             if open_ == 0:
                 break
@@ -333,8 +341,11 @@ def _is_bounded(mean, off, errors, turn, end, c):  # type: ignore[no-untyped-def
     f = end * mean[1, 0, 0, c], end * mean[1, 0, 1, c], end * mean[1, 0, 2, c]
     g = end * mean[1, 1, 0, c], end * mean[1, 1, 1, c], end * mean[1, 1, 2, c]
     h = end * mean[1, 2, 0, c], end * mean[1, 2, 1, c], end * mean[1, 2, 2, c]
-    uv, fg, mixed = cross3(u, v), cross3(f, g), add3(cross3(u, g), cross3(f, v))
-    one, two = dot3(uv, h) + dot3(mixed, w), dot3(fg, w) + dot3(mixed, h)
+    uv = cross3(u, v)
+    fg = cross3(f, g)
+    mixed = add3(cross3(u, g), cross3(f, v))
+    one = dot3(uv, h) + dot3(mixed, w)
+    two = dot3(fg, w) + dot3(mixed, h)
     # Bernstein coefficients of the cubic on the interval.
     first = turn * dot3(uv, w)
     second = first + turn * one * THIRD
@@ -356,10 +367,13 @@ def _is_bounded(mean, off, errors, turn, end, c):  # type: ignore[no-untyped-def
 @njit(**OPTIONS)
 def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, found):  # type: ignore[no-untyped-def]
     """Write the margins of cells of one type, ``nodes`` (m, n), into ``found`` (m,)."""
-    dim, size = points.shape[1], len(cuts[2])
+    dim = points.shape[1]
+    size = len(cuts[2])
     start, motion, at = np.empty((3, dim, nodes.shape[1], LANES))
-    values, errors = np.empty((4, size, LANES)), np.empty((4, LANES))
-    scale, poly = np.empty(LANES), np.empty((size, 4))
+    values = np.empty((4, size, LANES))
+    errors = np.empty((4, LANES))
+    scale = np.empty(LANES)
+    poly = np.empty((size, 4))
     stack = np.empty((len(cuts[0]) * LEVELS + 2, size, 4))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
@@ -367,7 +381,8 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, fou
         gather(displacement, nodes, first, count, motion)
         _normalize(start, motion, count, scale, errors)
         for k in range(4):
-            a, b = (1.0, 1.0, 1.0, 0.0)[k], (0.0, 1.0, -1.0, 1.0)[k]
+            a = (1.0, 1.0, 1.0, 0.0)[k]
+            b = (0.0, 1.0, -1.0, 1.0)[k]
             for axis in range(dim):
                 for j in range(nodes.shape[1]):
                     for c in range(count):
@@ -391,9 +406,13 @@ def _normalize(start, motion, count, scale, errors):  # type: ignore[no-untyped-
     ``errors`` (4, LANES) become the polynomial that bounds the rounding errors of determinants.
     """
     for c in range(count):
-        far, fast, size, speed = 0.0, 0.0, 0.0, 0.0
+        far = 0.0
+        fast = 0.0
+        size = 0.0
+        speed = 0.0
         for axis in range(len(start)):
-            x, u = start[axis, 0, c], motion[axis, 0, c]
+            x = start[axis, 0, c]
+            u = motion[axis, 0, c]
             for j in range(start.shape[1]):
                 far = max(far, abs(start[axis, j, c]))
                 fast = max(fast, abs(motion[axis, j, c]))
@@ -405,7 +424,8 @@ def _normalize(start, motion, count, scale, errors):  # type: ignore[no-untyped-
         for axis in range(len(start)):
             for j in range(start.shape[1]):
                 motion[axis, j, c] *= scale[c]
-        speed, fast = speed * scale[c], fast * scale[c]
+        speed = speed * scale[c]
+        fast = fast * scale[c]
         if fast == 0.0:
             errors[:, c] = 0.0  # no coordinate changes: the proof decides
             continue
@@ -429,18 +449,25 @@ def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-unty
     safe = np.ones(LANES, np.bool_)
     for k in range(values.shape[1]):
         for c in range(len(turn)):
-            sign, t = turn[c], ends[c]
-            at, plus, minus = values[0, k, c], values[1, k, c], values[2, k, c]
+            sign = turn[c]
+            t = ends[c]
+            at = values[0, k, c]
+            plus = values[1, k, c]
+            minus = values[2, k, c]
             last = values[3, k, c]
             cubic = last if dim == 3 else 0.0
             square = 0.5 * (plus + minus) - at if dim == 3 else last
             d0 = sign * at - errors[0, c]
             d1 = sign * (0.5 * (plus - minus) - cubic) - errors[1, c]
-            d2, d3 = sign * square - errors[2, c], sign * cubic - errors[3, c]
-            values[0, k, c], values[1, k, c] = d0, d1
-            values[2, k, c], values[3, k, c] = d2, d3
+            d2 = sign * square - errors[2, c]
+            d3 = sign * cubic - errors[3, c]
+            values[0, k, c] = d0
+            values[1, k, c] = d1
+            values[2, k, c] = d2
+            values[3, k, c] = d3
             third = t * THIRD
-            low, high = d0 + d1 * third, d0 + (2 * d1 + d2 * t) * third
+            low = d0 + d1 * third
+            high = d0 + (2 * d1 + d2 * t) * third
             end = d0 + (d1 + (d2 + d3 * t) * t) * t
             safe[c] = safe[c] and d0 > 0 and low > 0 and high > 0 and 0 < end < np.inf
     return safe
@@ -458,12 +485,18 @@ def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
     low, high = _bounds(poly, corner, end)
     if len(strides) == 0 or low >= high * (1 - GAP):
         return min(low, high)
-    lows, depths = np.empty(len(stack)), np.empty(len(stack), np.int64)
-    stack[0], lows[0], depths[0] = poly, low, 0
-    least, top, parts = high, 1, 1
+    lows = np.empty(len(stack))
+    depths = np.empty(len(stack), np.int64)
+    stack[0] = poly
+    lows[0] = low
+    depths[0] = 0
+    least = high
+    top = 1
+    parts = 1
     while top:
         top -= 1
-        low, depth = lows[top], depths[top]
+        low = lows[top]
+        depth = depths[top]
         if low >= high * (1 - GAP) or depth == len(strides) * LEVELS or parts >= PARTS:
             least = min(least, low)
             continue
@@ -472,7 +505,8 @@ def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
         _cut(stack[top], strides[axis], firsts[axis], stack[top + 1])
         for k in range(2):
             lows[top + k], upper = _bounds(stack[top + k], corner, high)
-            high, depths[top + k] = min(high, upper), depth + 1
+            high = min(high, upper)
+            depths[top + k] = depth + 1
         if lows[top] < lows[top + 1]:  # the part that limits comes first
             for k in range(poly.shape[0]):
                 for j in range(4):
@@ -480,7 +514,8 @@ def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
                     stack[top, k, j] = stack[top + 1, k, j]
                     stack[top + 1, k, j] = swap
             lows[top], lows[top + 1] = lows[top + 1], lows[top]
-        top, parts = top + 2, parts + 1
+        top = top + 2
+        parts = parts + 1
     return min(least, high)
 
 
@@ -503,11 +538,17 @@ def _cut(poly, stride, firsts, half):  # type: ignore[no-untyped-def]
     """Cut a part in two along an axis: ``poly`` becomes the second half, ``half`` the first."""
     for k in firsts:
         for j in range(4):
-            a, b, c = poly[k, j], poly[k + stride, j], poly[k + 2 * stride, j]
-            ab, bc = 0.5 * (a + b), 0.5 * (b + c)
+            a = poly[k, j]
+            b = poly[k + stride, j]
+            c = poly[k + 2 * stride, j]
+            ab = 0.5 * (a + b)
+            bc = 0.5 * (b + c)
             middle = 0.5 * (ab + bc)
-            half[k, j], half[k + stride, j], half[k + 2 * stride, j] = a, ab, middle
-            poly[k, j], poly[k + stride, j] = middle, bc
+            half[k, j] = a
+            half[k + stride, j] = ab
+            half[k + 2 * stride, j] = middle
+            poly[k, j] = middle
+            poly[k + stride, j] = bc
 
 
 @njit(**OPTIONS)
@@ -519,7 +560,8 @@ def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
     if not 0.0 < a < np.inf:
         return 0.0
     third = end * THIRD
-    low, high = a + b * third, a + (2 * b + c * end) * third
+    low = a + b * third
+    high = a + (2 * b + c * end) * third
     at_end = a + (b + (c + d * end) * end) * end
     if low > 0 and high > 0 and at_end > 0:
         return end
@@ -528,8 +570,10 @@ def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
     inner = c * c - 3 * b * d
     if inner > 0:
         q = -(c + np.copysign(np.sqrt(inner), c))
-        one, two = b / q, q / (3 * d)  # q is not 0, for inner is not
-        first, second = min(one, two), max(one, two)
+        one = b / q  # q is not 0, for inner is not
+        two = q / (3 * d)
+        first = min(one, two)
+        second = max(one, two)
     left = 0.0
     for right in (first, second, end):
         if left < right <= end:
@@ -546,7 +590,8 @@ def _root_between(a, b, c, d, left, right):  # type: ignore[no-untyped-def]
     Newton's method, with bisection where that leaves the interval or is slow; at last steps down
     until the value is positive.
     """
-    t, width = 0.5 * (left + right), right - left
+    t = 0.5 * (left + right)
+    width = right - left
     for _ in range(200):
         value = a + (b + (c + d * t) * t) * t
         if value > 0:

@@ -196,7 +196,8 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     )
     if METRICS[name].where == "cells":
         return MetricValues(name, values, values, counted)
-    place, best = ("cells", name, turned), METRICS[name].best
+    place = ("cells", name, turned)
+    best = METRICS[name].best
     of_cells = _cached(mesh, place, lambda: {place: _worst_of_nodes(mesh, values, best)})
     used = ~np.isnan(values)
     if mesh.halo is not None:
@@ -238,7 +239,8 @@ def _worst_of_nodes(mesh: Mesh, values: FloatArray, best: str) -> FloatArray:
 def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no-untyped-def]
     """Write the smallest (``least``) or largest value of the nodes of cells into ``found``."""
     for i in range(len(found)):
-        begin, end = offsets[first + i], offsets[first + i + 1]
+        begin = offsets[first + i]
+        end = offsets[first + i + 1]
         worst = values[nodes[begin]]
         for k in range(begin + 1, end):
             value = values[nodes[k]]
@@ -265,15 +267,19 @@ def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
 
 def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     """Return the metrics that compare a cell with its neighbours."""
-    cells, sides = mesh.cells, sides_of(mesh.cells)
-    centres, volumes = np.empty((len(cells), 3)), np.empty(len(cells))
+    cells = mesh.cells
+    sides = sides_of(mesh.cells)
+    centres = np.empty((len(cells), 3))
+    volumes = np.empty(len(cells))
     found = np.empty((3, len(cells)))
 
     def find_centres(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        centre, volume = np.empty((len(ids), 3)), np.empty(len(ids))
+        centre = np.empty((len(ids), 3))
+        volume = np.empty(len(ids))
         polygons = shape_loops.POLYGONS[vtk]
         face_loops.write_centres(mesh.points, nodes, signs[ids], polygons, centre, volume)
-        centres[ids], volumes[ids] = centre, volume
+        centres[ids] = centre
+        volumes[ids] = volume
 
     def rate_faces(vtk: int, ids: IntArray, nodes: IntArray) -> None:
         around = (sides.first, sides.neighbour), (centres, volumes)
@@ -287,8 +293,10 @@ def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
 
 def _nodes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     """Return SU2's three metrics of the median dual mesh."""
-    cells, found = mesh.cells, np.empty((3, len(mesh.points)))
-    around, limits = cells_around(cells, len(mesh.points)), _boundary_areas(mesh)
+    cells = mesh.cells
+    found = np.empty((3, len(mesh.points)))
+    around = cells_around(cells, len(mesh.points))
+    limits = _boundary_areas(mesh)
     arrays = cells.offsets, cells.connectivity
     points = mesh.points if mesh.dim == 3 else np.pad(mesh.points, ((0, 0), (0, 1)))
     middles = np.empty((len(cells), 3))
@@ -328,9 +336,11 @@ def _outer_facets(mesh: Mesh) -> list[IntArray]:
     """Return the facets (f, 2 or 4) of each marker that only one cell has; cached for its cells."""
     known = _OUTER.get(mesh.cells)
     if known is None or known[0] is not mesh.markers:
-        boundary, sides = boundary_of(mesh), sides_of(mesh.cells)
+        boundary = boundary_of(mesh)
+        sides = sides_of(mesh.cells)
         inner = np.zeros(len(boundary.facets), bool)
-        types, first = mesh.cells.types[boundary.owner], sides.first[boundary.owner]
+        types = mesh.cells.types[boundary.owner]
+        first = sides.first[boundary.owner]
         begin = mesh.cells.offsets[boundary.owner]
         for k in range(SIDE_NODES.shape[1]):
             some = np.flatnonzero(k < SIDES[types])

@@ -112,7 +112,8 @@ class Cells:
     @check_types
     def from_blocks(cls, blocks: Iterable[tuple[int, ArrayLike]]) -> Cells:
         """Return cells from ``(vtk, connectivity (m, n))`` blocks, in that order."""
-        types, flats = [np.empty(0, np.uint8)], [np.empty(0, np.int64)]
+        types = [np.empty(0, np.uint8)]
+        flats = [np.empty(0, np.int64)]
         for vtk, nodes in blocks:
             table = np.asarray(nodes, np.int64).reshape(-1, ELEMENTS[vtk].n_nodes)
             types.append(np.full(len(table), vtk, np.uint8))

@@ -113,7 +113,8 @@ def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray
     row = row[within]
     if (row[1:] == row[:-1]).any():
         return None
-    distance, which = np.full(len(at), np.inf), np.full(len(at), len(points))
+    distance = np.full(len(at), np.inf)
+    which = np.full(len(at), len(points))
     distance[row] = np.sqrt(square[within])
     which[row] = number[within]
     return distance, which

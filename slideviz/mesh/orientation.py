@@ -85,7 +85,8 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
     rows = np.concatenate((first, first + m))
     columns = np.concatenate((second + shift, second + m - shift))
     labels = components(2 * m, rows, columns)
-    plain, mirrored = labels[:m], labels[m:]
+    plain = labels[:m]
+    mirrored = labels[m:]
     signs = np.where(plain <= mirrored, 1, -1).astype(np.int8)
     return signs, np.minimum(plain, mirrored)
 
@@ -95,16 +96,22 @@ def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
 
     Two cells agree if they traverse the facet in opposite directions.
     """
-    owners, facets, turns = [], [], []
+    owners = []
+    facets = []
+    turns = []
     for ids, nodes, turn in facets_of(cells):
         padded = np.full((len(nodes), 4), -1, np.int64)
         padded[:, : nodes.shape[1]] = nodes
         owners.append(ids)
         facets.append(padded)
         turns.append(turn)
-    owner, facet, turn = np.concatenate(owners), np.concatenate(facets), np.concatenate(turns)
+    owner = np.concatenate(owners)
+    facet = np.concatenate(facets)
+    turn = np.concatenate(turns)
     order = np.lexsort(facet.T)
-    owner, facet, turn = owner[order], facet[order], turn[order]
+    owner = owner[order]
+    facet = facet[order]
+    turn = turn[order]
     same = np.concatenate(([False], (facet[1:] == facet[:-1]).all(axis=1), [False]))
     # Only facets of exactly two cells are used.
     start = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
@@ -120,7 +127,8 @@ def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, NDArray[np.boo
         for local in ELEMENTS[vtk].facets:
             facet = nodes[:, local]
             least = facet.argmin(axis=1)
-            rows, size = np.arange(len(facet)), len(local)
+            rows = np.arange(len(facet))
+            size = len(local)
             after = facet[rows, (least + 1) % size]
             before = facet[rows, (least - 1) % size]
             # With two nodes after and before are the same; the direction is which comes first.

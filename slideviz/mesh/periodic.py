@@ -83,8 +83,10 @@ class Pair:
         # A full turn over the number of passages, where it is whole, so that a wheel closes.
         around = self.around
         angle = self.angle if around is None else np.copysign(2.0 * np.pi / around, self.angle)
-        cos, sin = np.cos(periods * angle), np.sin(periods * angle)
-        basis, origin = axis_basis(self.axis), np.asarray(self.origin)
+        cos = np.cos(periods * angle)
+        sin = np.sin(periods * angle)
+        basis = axis_basis(self.axis)
+        origin = np.asarray(self.origin)
         turn = basis.T @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ basis
         matrix[:3, :3] = turn
         matrix[:3, 3] = origin - turn @ origin
@@ -112,7 +114,8 @@ def match(
     have different numbers of nodes, or do not match to ``TOLERANCE``: then the message has the best
     transformation tried and its largest mismatch.
     """
-    a, b = mesh.marker(first).nodes, mesh.marker(second).nodes
+    a = mesh.marker(first).nodes
+    b = mesh.marker(second).nodes
     where = f"{mesh.name}: periodic markers {first!r} and {second!r} do not match"
     if len(a) != len(b):
         raise MeshError(
@@ -153,12 +156,15 @@ def _match_kind(
     """
     a = mesh.marker(first).nodes
     b = mesh.marker(second).nodes
-    xa, xb = mesh.points[a], mesh.points[b]
+    xa = mesh.points[a]
+    xb = mesh.points[b]
     axis = Z_AXIS if mesh.dim == 2 else axis
-    vector, angle = np.zeros(mesh.dim), 0.0
+    vector = np.zeros(mesh.dim)
+    angle = 0.0
     if kind == "translational":
         vector = ordered_sum(xb) / len(b) - ordered_sum(xa) / len(a)
-        image, target = xa + vector, xb
+        image = xa + vector
+        target = xb
     else:
         ya = in_axis_frame(xa, axis, origin)
         yb = in_axis_frame(xb, axis, origin)
@@ -167,7 +173,8 @@ def _match_kind(
         # A rotation turns the sum of all complex positions by its own angle.
         angle = float(np.angle(ordered_sum(zb) * np.conj(ordered_sum(za))))
         turned = za * np.exp(1j * angle)
-        image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
+        image = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1)
+        target = yb
     distance, partner = nearest(target, image, bound, TOLERANCE * mesh.extent)
     if not np.isfinite(distance).all():
         return None, np.inf
@@ -196,7 +203,8 @@ def turned_too(
 
     So do the sides of half a wheel, whose passages are turned by 180°.
     """
-    allowed, turned = TOLERANCE * mesh.extent, None
+    allowed = TOLERANCE * mesh.extent
+    turned = None
     for each in pairs:
         turned, worst = _match_kind(
             mesh, each.first, each.second, "rotational", axis=axis, origin=origin, bound=2 * allowed
@@ -298,7 +306,8 @@ def _left_over(
     If no pair matches, it is the error ``first``.
     """
     good: list[Pair] = []
-    alone, why = list(names), "they are no images of each other; choose other markers"
+    alone = list(names)
+    why = "they are no images of each other; choose other markers"
     for each in _KINDS[kind]:
         for one, other in combinations(names, 2):
             if one in alone and other in alone:

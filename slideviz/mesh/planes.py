@@ -45,7 +45,8 @@ class FacetSimplices:
 
         Raises MeshError if an element has another dimension than a boundary.
         """
-        parts, facets = [np.empty((0, dim), np.int64)], [np.empty(0, np.int64)]
+        parts = [np.empty((0, dim), np.int64)]
+        facets = [np.empty(0, np.int64)]
         for vtk, (ids, nodes) in cells.by_type.items():
             row = ELEMENTS[vtk]
             if row.dim != dim - 1:
@@ -56,7 +57,8 @@ class FacetSimplices:
             for first in range(1, row.n_nodes - dim + 2):
                 parts.append(nodes[:, [0, *range(first, first + dim - 1)]])
                 facets.append(ids)
-        found, facet = np.concatenate(parts), np.concatenate(facets)
+        found = np.concatenate(parts)
+        facet = np.concatenate(facets)
         order = np.argsort(facet, kind="stable")
         return cls(found[order], facet[order])
 
@@ -120,10 +122,8 @@ class BoxTree:
             along = np.take_along_axis(at, axis[:, None, None], axis=2)[..., 0]
             order = np.take_along_axis(block, along.argsort(axis=1, kind="stable"), axis=1).ravel()
         filler = (order < 0)[:, None]
-        lows, highs = (
-            [np.where(filler, np.inf, low[order])],
-            [np.where(filler, -np.inf, high[order])],
-        )
+        lows = [np.where(filler, np.inf, low[order])]
+        highs = [np.where(filler, -np.inf, high[order])]
         for size in [LEAF] + depth * [2]:
             lows.append(lows[-1].reshape(-1, size, d).min(axis=1))
             highs.append(highs[-1].reshape(-1, size, d).max(axis=1))
@@ -165,7 +165,8 @@ def _meets(query, q, below, above, box, margin):  # type: ignore[no-untyped-def]
     for axis in range(low.shape[1]):
         meets &= low[q, axis] <= above[box, axis] and high[q, axis] >= below[box, axis]
     for plane in range(axes.shape[1] if meets else 0):
-        offset, reach = 0.0, margin
+        offset = 0.0
+        reach = margin
         for axis in range(low.shape[1]):
             normal = axes[q, plane, axis]
             offset += normal * (0.5 * (above[box, axis] + below[box, axis]) - start[q, axis])
@@ -178,23 +179,28 @@ def _meets(query, q, below, above, box, margin):  # type: ignore[no-untyped-def]
 def _find_near(tree, query, margin, nodes, nodes_of_items):  # type: ignore[no-untyped-def]
     """Return the pairs (p,), (p,) of `BoxTree.near`, sorted by query only."""
     order, below, above = tree
-    first, queries = len(below) - len(order), len(query[0])  # the first item's box
-    pairs, count = np.empty((2, 4 * queries + 64), np.int64), 0
+    first = len(below) - len(order)  # the first item's box
+    queries = len(query[0])
+    pairs = np.empty((2, 4 * queries + 64), np.int64)
+    count = 0
     stack = np.empty(128, np.int64)
     for q in range(queries):
-        stack[0], top = 0, 1
+        stack[0] = 0
+        top = 1
         while top:
             top -= 1
             k = stack[top]
             if not _meets(query, q, below, above, k, margin):
                 continue
             if k < first // 2:
-                stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
+                stack[top] = 2 * k + 1
+                stack[top + 1] = 2 * k + 2
                 top += 2
                 continue
             begin = (k - first // 2) * LEAF
             for place in range(begin, begin + LEAF):
-                item, box = order[place], first + place
+                item = order[place]
+                box = first + place
                 if not _meets(query, q, below, above, box, margin):
                     continue
                 common = False
@@ -207,7 +213,8 @@ def _find_near(tree, query, margin, nodes, nodes_of_items):  # type: ignore[no-u
                     more = np.empty((2, 2 * count), np.int64)
                     more[:, :count] = pairs
                     pairs = more
-                pairs[0, count], pairs[1, count] = q, item
+                pairs[0, count] = q
+                pairs[1, count] = item
                 count += 1
     return pairs[0, :count], pairs[1, :count]
 
@@ -275,15 +282,19 @@ class Planes:
             depth >= -self.margin
         ).all(axis=1)
         inner = (depth > self.margin)[fan]
-        normal, inward = self.normals[near[fan]], self.inwards[near[fan]]
+        normal = self.normals[near[fan]]
+        inward = self.inwards[near[fan]]
         way = _unit(ends - x)
-        height, side = way @ normal.T, np.einsum("rd,fkd->rfk", way, inward)
+        height = way @ normal.T
+        side = np.einsum("rd,fkd->rfk", way, inward)
         along = (np.abs(height) <= ANGLE) & (inner | (side >= -ANGLE)).all(axis=2)
-        height, side = height[~along.any(axis=1)], side[~along.any(axis=1)]
+        height = height[~along.any(axis=1)]
+        side = side[~along.any(axis=1)]
         if len(height) < 2:
             return False
         via = _VIA[len(x)]
-        turn, swing = via @ normal.T, np.einsum("vd,fkd->vfk", via, inward)
+        turn = via @ normal.T
+        swing = np.einsum("vd,fkd->vfk", via, inward)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = height[:, None] / (height[:, None] - turn)
         at = side[:, None] + share[..., None] * (swing - side[:, None])

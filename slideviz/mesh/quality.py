@@ -85,12 +85,15 @@ def quality_totals(
     ``worst``: the number of worst cells wanted; with 0, they are not counted in fine intervals,
     either.
     """
-    least, inverted, unproven = np.inf, 0, 0
+    least = np.inf
+    inverted = 0
+    unproven = 0
     counts = np.zeros(FINE if worst else 0, np.int64)
 
     def add(piece: slice) -> None:
         nonlocal least, inverted, unproven
-        some, states = values[piece], status[piece]
+        some = values[piece]
+        states = status[piece]
         bad = states == INVERTED
         least = min(least, float(some.min(initial=np.inf)))
         inverted += int(np.count_nonzero(bad))
@@ -335,7 +338,8 @@ def cell_quality(
 
     ``sums`` (m,) are the sums of the corner Jacobians of the undeformed cells.
     """
-    table, status = CORNERS[vtk], np.empty(len(nodes), np.uint8)
+    table = CORNERS[vtk]
+    status = np.empty(len(nodes), np.uint8)
     alpha, spread = np.empty((2, len(table), len(nodes)))
     measure(vtk, points, nodes, table, signs, alpha, spread, status)
     open_ = np.flatnonzero(status == UNPROVEN)

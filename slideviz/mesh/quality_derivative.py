@@ -175,7 +175,8 @@ def _add_slopes(
         for vtk, (ids, nodes) in mesh.cells.by_type.items():
             for first in range(0, len(ids), batch):
                 going_on()
-                here, of_these = ids[first : first + batch], nodes[first : first + batch]
+                here = ids[first : first + batch]
+                of_these = nodes[first : first + batch]
                 slopes = _slopes(mesh, found, sums, vtk, here, of_these)
                 part = np.ascontiguousarray(weights[:, here])
                 add = partial(add_to_points, sealed(of_these), part, slopes)
@@ -186,7 +187,8 @@ def _slopes(
     mesh: Mesh, found: Quality, sums: FloatArray | None, vtk: int, ids: IntArray, nodes: IntArray
 ) -> FloatArray:
     """Return the derivatives (m, n, d) of ln f_ss of cells ``ids`` (m,) by their nodes (m, n)."""
-    table, powers = CORNERS[vtk], np.array(EXPONENTS[found.metric][vtk], float)
+    table = CORNERS[vtk]
+    powers = np.array(EXPONENTS[found.metric][vtk], float)
     turn = found.signs[ids]
     before = np.full(len(ids), np.inf) if sums is None else sums[ids]
     out = np.empty((*nodes.shape, mesh.dim))
@@ -309,7 +311,8 @@ def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
 
     Raises MeshError if an undeformed cell has no positive volume to compare with.
     """
-    out, blocks = np.empty(len(mesh.cells)), _blocks(mesh)
+    out = np.empty(len(mesh.cells))
+    blocks = _blocks(mesh)
     _, signs = reference_of(reference)
 
     def least_of(block: Block) -> FloatArray:
@@ -332,7 +335,8 @@ def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
     margins = cell_margins(mesh, reference)
     halo = np.zeros(len(margins), bool) if mesh.halo is None else mesh.halo.cells
     least = float(margins[~halo].min())
-    total, gradient = 0.0, np.zeros(mesh.points.shape)
+    total = 0.0
+    gradient = np.zeros(mesh.points.shape)
     power = p - 1 if least < 0 else 1
     if least > 0:
         power = p + 1
@@ -346,7 +350,8 @@ def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
         if least != 0:
             part = np.maximum(least / ratio if least > 0 else ratio / least, 0.0)
         some = np.flatnonzero(part.max(axis=0) ** power > NEGLIGIBLE)
-        part, used = part[:, some], nodes[some]
+        part = part[:, some]
+        used = nodes[some]
         # The derivatives of the minimum by the ratios, up to a factor that all have.
         weights = np.where(part > 0, part**power, 0.0) * factor[:, some]
         by_nodes = np.empty((*used.shape, mesh.dim))

@@ -49,7 +49,8 @@ def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  #
     """
     at = np.zeros((3, nodes.shape[1], LANES))
     lengths = np.empty((nodes.shape[1], nodes.shape[1], LANES))
-    angles, ends = np.empty((4, LANES)), np.empty((2, LANES))
+    angles = np.empty((4, LANES))
+    ends = np.empty((2, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
         here = slice(start, start + count)
@@ -68,7 +69,8 @@ def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  #
 @njit(**OPTIONS)
 def _lengths(at, edges, count, lengths, ends):  # type: ignore[no-untyped-def]
     """Write the lengths of edges, between any two nodes, and their ``ends`` (min, max)."""
-    ends[0], ends[1] = np.inf, 0.0
+    ends[0] = np.inf
+    ends[1] = 0.0
     for a, b in edges:
         for c in range(count):
             along = edge(at, a, b, c)
@@ -89,7 +91,8 @@ def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[
     for row in corners:
         o, i, j, h = row
         for c in range(count):
-            x, y = edge(at, o, i, c), edge(at, o, j, c)
+            x = edge(at, o, i, c)
+            y = edge(at, o, j, c)
             normal = cross3(x, y)
             if h < 0:
                 jacobian = normal[2]
@@ -98,11 +101,14 @@ def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[
                     scale = max(scale, lengths[i, j, c] * max(lengths[o, i, c], lengths[o, j, c]))
             else:
                 jacobian = dot3(normal, edge(at, o, h, c))
-                a, b, d = lengths[o, i, c], lengths[o, j, c], lengths[o, h, c]
+                a = lengths[o, i, c]
+                b = lengths[o, j, c]
+                d = lengths[o, h, c]
                 scale = a * b * d
                 if vtk == 10 or vtk == 14:
                     across = edge(at, i, j, c)
-                    p, q = lengths[i, h, c], lengths[j, h, c]
+                    p = lengths[i, h, c]
+                    q = lengths[j, h, c]
                     r = np.sqrt(dot3(across, across))
                     scale = max(scale, a * p * r, b * q * r, d * p * q)
             found[c] = min(found[c], jacobian / scale if scale > 0.0 else 0.0)
@@ -123,14 +129,16 @@ def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[
 def _scaled_in_the_middle(at, count, found):  # type: ignore[no-untyped-def]
     """Lower ``found`` (count,) to the scaled Jacobian in the middle of hexahedra, if smaller."""
     for c in range(count):
-        x, y, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        x = (0.0, 0.0, 0.0)
+        y = (0.0, 0.0, 0.0)
+        z = (0.0, 0.0, 0.0)
         for k in range(4):
-            e, f = (
-                edge(at, (0, 3, 4, 7)[k], (1, 2, 5, 6)[k], c),
-                edge(at, (0, 1, 4, 5)[k], (3, 2, 7, 6)[k], c),
-            )
+            e = edge(at, (0, 3, 4, 7)[k], (1, 2, 5, 6)[k], c)
+            f = edge(at, (0, 1, 4, 5)[k], (3, 2, 7, 6)[k], c)
             g = edge(at, k, k + 4, c)
-            x, y, z = add3(x, e), add3(y, f), add3(z, g)
+            x = add3(x, e)
+            y = add3(y, f)
+            z = add3(z, g)
         scale = np.sqrt(dot3(x, x) * dot3(y, y) * dot3(z, z))
         found[c] = min(found[c], dot3(cross3(x, y), z) / scale if scale > 0.0 else 0.0)
 
@@ -154,9 +162,12 @@ def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-de
                 )
         least, largest = (angles[2], angles[3]) if n == 4 else (angles[0], angles[1])
         for k in range(n):
-            o, i, j = row[k], row[(k + 1) % n], row[k - 1 if k else n - 1]
+            o = row[k]
+            i = row[(k + 1) % n]
+            j = row[k - 1 if k else n - 1]
             for c in range(count):
-                x, y = edge(at, o, i, c), edge(at, o, j, c)
+                x = edge(at, o, i, c)
+                y = edge(at, o, j, c)
                 scale = lengths[o, i, c] * lengths[o, j, c]
                 cosine = dot3(x, y) / scale if scale > 0.0 else 1.0
                 angle = min(max(1.0 - cosine, 0.0), 2.0)
@@ -179,6 +190,7 @@ def _equiangle_skew(angles, c):  # type: ignore[no-untyped-def]
     worst = 0.0
     for low, ideal in ((0, 60.0), (2, 90.0)):
         if angles[low, c] <= angles[low + 1, c]:
-            least, most = _degrees(angles[low, c]), _degrees(angles[low + 1, c])
+            least = _degrees(angles[low, c])
+            most = _degrees(angles[low + 1, c])
             worst = max(worst, (most - ideal) / (180.0 - ideal), (ideal - least) / ideal)
     return min(worst, 1.0)

@@ -44,7 +44,8 @@ def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntAr
     It is the point nearest to the mean of those in the same cube, among those where the mask
     ``first`` (n,) is true if the cube has any.
     """
-    low, size = points.min(axis=0), float(np.ptp(points, axis=0).max()) / cubes or 1.0
+    low = points.min(axis=0)
+    size = float(np.ptp(points, axis=0).max()) / cubes or 1.0
     at = ((points - low) / size).astype(np.int64)
     key = (at[:, 0] * (cubes + 1) + at[:, 1]) * (cubes + 1) + at[:, 2]
     _, cube, count = np.unique(key, return_inverse=True, return_counts=True)
@@ -148,8 +149,10 @@ def is_closed(surfaces: Sequence[Surface]) -> bool:
     if len(faces) != len(surfaces) or not faces:
         return False
     every = np.concatenate(faces)
-    start, end = every.ravel(), np.roll(every, -1, axis=1).ravel()
-    low, high = np.minimum(start, end), np.maximum(start, end)
+    start = every.ravel()
+    end = np.roll(every, -1, axis=1).ravel()
+    low = np.minimum(start, end)
+    high = np.maximum(start, end)
     keys = np.sort((low * (every.max() + 1) + high)[low != high])
     pairs = len(keys) % 2 == 0 and bool(np.all(keys[::2] == keys[1::2]))
     return pairs and bool(np.all(keys[1:-1:2] != keys[2::2]))

@@ -53,12 +53,14 @@ def find_boundary(mesh: Mesh) -> Boundary:
     """
     mesh, ids = without_halo(mesh)
     width = 2 if mesh.dim == 2 else 4
-    tables, owners = [np.empty((0, width), np.int64)], [np.empty(0, np.int64)]
+    tables = [np.empty((0, width), np.int64)]
+    owners = [np.empty(0, np.int64)]
     for index, marker in enumerate(mesh.markers):
         for _, nodes in marker.cells.by_type.values():
             tables.append(_padded(nodes, width))
             owners.append(np.full(len(nodes), index))
-    facets, marker_of = np.concatenate(tables), np.concatenate(owners)
+    facets = np.concatenate(tables)
+    marker_of = np.concatenate(owners)
     owner = _find_owners(mesh, facets, marker_of)
     facets = _turn_outward(mesh, facets, owner)
     joints, joint_nodes = find_joints(facets, mesh.dim)
@@ -102,7 +104,8 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     """
     on_boundary = np.zeros(len(mesh.points), bool)
     on_boundary[facets.ravel()] = True
-    sides, cells = [], []
+    sides = []
+    cells = []
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         some = np.flatnonzero(_touch(nodes, on_boundary, mesh.dim))
         table = nodes[some]
@@ -162,7 +165,8 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
 
     ``owner`` (f,) is the cell of each.
     """
-    inward, cells = np.empty(len(facets), bool), mesh.cells
+    inward = np.empty(len(facets), bool)
+    cells = mesh.cells
     _face_inward(mesh.points, facets, owner, cells.offsets, cells.connectivity, inward)
     turned = facets.copy()
     if mesh.dim == 2:
@@ -180,12 +184,17 @@ def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type:
 
     ``owner`` (f,) is the cell; ``offsets`` and ``connectivity`` are those of `Cells`.
     """
-    dim, width = points.shape[1], facets.shape[1]
-    out, along, across = np.zeros(3), np.zeros(3), np.zeros(3)
+    dim = points.shape[1]
+    width = facets.shape[1]
+    out = np.zeros(3)
+    along = np.zeros(3)
+    across = np.zeros(3)
     for f in range(len(facets)):
-        first, last = offsets[owner[f]], offsets[owner[f] + 1]
+        first = offsets[owner[f]]
+        last = offsets[owner[f] + 1]
         for axis in range(dim):
-            centre, middle = 0.0, 0.0
+            centre = 0.0
+            middle = 0.0
             for k in range(width):
                 centre += points[facets[f, k], axis]
             for k in range(first, last):
@@ -198,7 +207,8 @@ def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type:
         else:
             volume = 0.0
             for axis in range(3):
-                i, j = (axis + 1) % 3, (axis + 2) % 3
+                i = (axis + 1) % 3
+                j = (axis + 2) % 3
                 volume += (along[i] * across[j] - along[j] * across[i]) * out[axis]
             inward[f] = volume < 0
 
@@ -217,10 +227,12 @@ def corner_vectors(x: FloatArray) -> FloatArray:
     if x.shape[1] == 2:
         t = x[:, 1] - x[:, 0]
         return np.stack([t[:, 1], -t[:, 0]], axis=1)
-    a, b = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
+    a = x[:, 2] - x[:, 0]
+    b = x[:, 3] - x[:, 1]
     out = np.empty_like(a)
     for k in range(3):  # in half the time of np.cross
-        i, j = (k + 1) % 3, (k + 2) % 3
+        i = (k + 1) % 3
+        j = (k + 2) % 3
         out[:, k] = a[:, i] * b[:, j] - a[:, j] * b[:, i]
     return out
 
@@ -236,7 +248,8 @@ def vertex_normals(points: FloatArray, facets: IntArray) -> tuple[IntArray, Floa
         shares = np.repeat(0.5 * facet_vectors(points, facets)[:, None], 2, axis=1)
     else:
         triangle = facets[:, 2] == facets[:, 3]
-        before, after = np.roll(x, 1, axis=1), np.roll(x, -1, axis=1)
+        before = np.roll(x, 1, axis=1)
+        after = np.roll(x, -1, axis=1)
         after[triangle, 2] = x[triangle, 0]
         centre = np.where(triangle[:, None], x[:, :3].mean(axis=1), x.mean(axis=1))[:, None]
         shares = np.cross(centre - x, 0.25 * (before - after))  # diagonals of each part
@@ -260,14 +273,17 @@ def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
     non-manifold edge) are left out: there facets never join smoothly.
     """
     count, width = facets.shape
-    facet, above = np.repeat(np.arange(count), width), int(facets.max(initial=0)) + 1
+    facet = np.repeat(np.arange(count), width)
+    above = int(facets.max(initial=0)) + 1
     if dim == 2:
         keys = facets.ravel()
     else:
-        one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+        one = facets.ravel()
+        two = np.roll(facets, -1, axis=1).ravel()
         keys = np.minimum(one, two) * above + np.maximum(one, two)
         real = one != two
-        keys, facet = keys[real], facet[real]
+        keys = keys[real]
+        facet = facet[real]
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     starts = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]])

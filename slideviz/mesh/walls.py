@@ -90,8 +90,10 @@ class Columns:
         the length of a line, else the square root of the area); 0 where there are none.
         ``most``: layers that count at most; all by default.
         """
-        facets, width = self.boundary.facets, self.boundary.facets.shape[1]
-        thickness, flat = np.zeros(len(facets)), self.depth > 0
+        facets = self.boundary.facets
+        width = self.boundary.facets.shape[1]
+        thickness = np.zeros(len(facets))
+        flat = self.depth > 0
         for layer in range(self.nodes.shape[1] - 1 if most is None else most):
             some = np.flatnonzero(flat & (self.depth > layer))
             below = self.nodes[self.corner[some], layer]
@@ -113,13 +115,17 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
 
     Raises MeshError if a marker element is no side of any cell.
     """
-    boundary, cells = boundary_of(mesh), mesh.cells
-    facets, owner = boundary.facets, boundary.owner
+    boundary = boundary_of(mesh)
+    cells = mesh.cells
+    facets = boundary.facets
+    owner = boundary.owner
     use = np.ones(len(cells), bool) if mesh.halo is None else ~mesh.halo.cells
     near = cells_around(cells, len(mesh.points))
     chain = np.full((*facets.shape, layers + 1), -1)
-    off, depth = np.full((len(facets), 2), -1), np.zeros(len(facets), np.int64)
-    table, around = (cells.types, cells.offsets, cells.connectivity), (near.offsets, near.cells)
+    off = np.full((len(facets), 2), -1)
+    depth = np.zeros(len(facets), np.int64)
+    table = (cells.types, cells.offsets, cells.connectivity)
+    around = (near.offsets, near.cells)
 
     def climb(part: slice) -> None:
         written = chain[part], depth[part], off[part]
@@ -138,7 +144,8 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
     new = np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)][: len(edges)]
     number = np.empty(len(order), np.int64)
     number[order] = np.cumsum(new) - 1
-    nodes, bare = chains[order[new]], np.flatnonzero(~deep)
+    nodes = chains[order[new]]
+    bare = np.flatnonzero(~deep)
     corner = np.empty(facets.shape, np.int64)
     corner[deep] = number.reshape(-1, facets.shape[1])
     corner[bare] = len(nodes) + np.arange(len(bare))[:, None]
@@ -195,7 +202,8 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
         for e in range(len(edges)):
             if edges[e, 0] < 0:
                 break
-            one, two = nodes[edges[e, 0]], nodes[edges[e, 1]]
+            one = nodes[edges[e, 0]]
+            two = nodes[edges[e, 1]]
             other = -1
             if one == chain[i, layer]:
                 other = two
@@ -244,8 +252,10 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     Where there is no column only the first height is a number, and growth needs two layers: else
     they are nan.
     """
-    facets, nodes = columns.boundary.facets, columns.nodes
-    width, inward = _widths(facets), -unit(facet_vectors(points, facets))
+    facets = columns.boundary.facets
+    nodes = columns.nodes
+    width = _widths(facets)
+    inward = -unit(facet_vectors(points, facets))
     total = np.zeros((len(nodes) + len(columns.bare), points.shape[1]))
     for k in range(facets.shape[1]):  # a facet counts once in each of its columns
         some = k < width
@@ -319,7 +329,8 @@ class Walls:
         return {marker: self._summary(marker) for marker in self.markers}
 
     def _summary(self, marker: str) -> dict:
-        at, out = self.columns.places(marker), dict[str, object](layered=marker in self.layered)
+        at = self.columns.places(marker)
+        out = dict[str, object](layered=marker in self.layered)
         for name, (number, comparison, change) in _REPORTED.items():
             each = {"before": self.before[number]} if self.before is not None else {}
             each["after"] = self.values[number]
@@ -335,7 +346,8 @@ class Walls:
         highest growth and change, the ratio farthest from 1.
         """
         values = (self.before or {})[name] if before else self.values[name]
-        columns, out = self.columns, np.full(self.n_cells, np.nan)
+        columns = self.columns
+        out = np.full(self.n_cells, np.nan)
         names = columns.boundary.names
         chosen = np.isin(columns.boundary.marker, [names.index(m) for m in self.markers])
         corner = columns.corner[chosen]
@@ -377,7 +389,8 @@ def wall_words(row: dict) -> str:
         return (
             f"first heights {height['min']:.4g} to {height['max']:.4g}{growing}{layers}, {turned}"
         )
-    ratio, change = row["first_height"]["ratio"], row["angle"]["change"]
+    ratio = row["first_height"]["ratio"]
+    change = row["angle"]["change"]
     heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
     turned = f"by up to {turn:.2g}°" if (turn := change["max"]) >= 0.01 else "by less than 0.01°"
     before = row["growth"]["before"]["max"]
@@ -404,7 +417,9 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
     values = values[np.isfinite(values)]
     if not len(values):
         return {"min": None, "mean": None, "max": None}
-    low, mean, high = values.min(), values.mean(), values.max()
+    low = values.min()
+    mean = values.mean()
+    high = values.max()
     return {"min": float(low), "mean": float(mean), "max": float(high)}
 
 
@@ -412,7 +427,8 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
 def _columns_of(mesh: Mesh) -> tuple[Columns, frozenset[str]]:
     """Return the columns of a mesh, and the boundaries with layers."""
     columns = find_columns(mesh)
-    boundary, flat = columns.boundary, columns.stack_thickness(mesh.points, 1) > 0
+    boundary = columns.boundary
+    flat = columns.stack_thickness(mesh.points, 1) > 0
     names = (
         name
         for k, name in enumerate(boundary.names)
@@ -462,7 +478,8 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     )
     for name in markers or ():
         mesh.marker(name)
-    after, before = measure_walls(columns, mesh.points), None
+    after = measure_walls(columns, mesh.points)
+    before = None
     if reference is not None:
         before = measure_walls(columns, reference.points)
         with np.errstate(all="ignore"):

@@ -91,7 +91,8 @@ def zones_of(mesh: Mesh) -> tuple[Mesh, ...]:
         return (mesh,)
     out = []
     for part in mesh.zone_parts:
-        points, before = mesh.points[part.points], part.mesh.points
+        points = mesh.points[part.points]
+        before = part.mesh.points
         same = points.ctypes.data == before.ctypes.data
         out.append(part.mesh if same else replace(part.mesh, points=points))
     return tuple(out)

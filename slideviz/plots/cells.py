@@ -18,7 +18,9 @@ from slideviz.sections.polygons import Polygons, joined
 MANY = 200_000
 """Number of polygons above which they are pixels in SVG and PDF too, as viewers would fail."""
 
-THICKEST, _THINNEST, _PART = 0.45, 0.04, 0.06
+THICKEST = 0.45
+_THINNEST = 0.04
+_PART = 0.06
 """Width of mesh lines: largest and smallest in points; relative to the cell's thickness."""
 _HAIR = 0.15
 """Width in points of a line in the cell's own color, which hides gaps between neighbours."""
@@ -115,7 +117,8 @@ def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
 
 MOST_EDGED = 150_000
 """Number of cells above which they are drawn as pixels without visible edges, which is faster."""
-_EDGE, _FACE = "#c9d0d8", "#f3f5f7"  # colors of the faint cells' edges and faces
+_EDGE = "#c9d0d8"  # of faint cells
+_FACE = "#f3f5f7"
 _SECTION_LINE = 0.7  # width of the section's line in points
 
 
@@ -178,7 +181,8 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
 
 
 _OUTLINE = 0.6  # width of a bar's outline in points
-_THICK, BAR_GAP = 0.14, 0.12
+_THICK = 0.14
+BAR_GAP = 0.12
 """Thickness of a bar, and its distance from the axes beside it, in inches."""
 BAR_BELOW = 0.62
 """Distance in inches between axes that have numbers and a label, and a bar below them."""
@@ -237,7 +241,8 @@ def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
     from matplotlib.textpath import TextPath
     from matplotlib.ticker import FuncFormatter, Locator
 
-    upright, form = bar.orientation == "vertical", "%g"
+    upright = bar.orientation == "vertical"
+    form = "%g"
 
     class Ends(Locator):
         def __call__(self) -> Any:

@@ -30,7 +30,9 @@ RESULTS = {
 _MOST_LINES = 12
 """Most curves drawn as lines in different colors; if there are more, only points are drawn."""
 _MOST_WORDS = 12  # most texts along an axis whose column has no numbers
-_SIGN, _AXIS, _HIGHEST = 7, 0.6, 0.35
+_SIGN = 7
+_AXIS = 0.6
+_HIGHEST = 0.35
 """Width of a legend's sign and the gap beside it, in letters; width of the labels left of the axes,
 in inches; largest height of a legend above the axes, relative to the figure."""
 
@@ -87,7 +89,8 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
 
 def failed_designs(table: DesignTable, column: str) -> dict[int, float]:
     """Return the horizontal coordinate of each failed design, by its number."""
-    at, (place_of, _) = table.columns.index(column), _places(table, column)
+    at = table.columns.index(column)
+    (place_of, _) = _places(table, column)
     failed = (number for number, row in sorted(table.results.items()) if row.problem)
     return {number: place_of[table.rows[number - 1][at]] for number in failed}
 
@@ -190,7 +193,8 @@ def _draw_curve(
         hollow = line | {"markerfacecolor": style.scheme.background}
         axes.plot(curve.places, curve.mean, gid=f"mean:{curve.label}", **hollow)
     if curve.inverted.any():
-        places, values = curve.places[curve.inverted], curve.values[curve.inverted]
+        places = curve.places[curve.inverted]
+        values = curve.values[curve.inverted]
         cross: dict[str, Any] = {"color": style.alarm, "markersize": 6, "linestyle": ""}
         axes.plot(places, values, marker="x", clip_on=False, gid="inverted", **cross)
 

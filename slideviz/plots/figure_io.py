@@ -62,7 +62,8 @@ def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
     """
     from matplotlib.textpath import TextPath
 
-    points, wrapped = 72.0 * inches, []
+    points = 72.0 * inches
+    wrapped = []
     widths = {
         line: float(TextPath((0.0, 0.0), line, size=1.0).get_extents().width)
         for line in words.split("\n")

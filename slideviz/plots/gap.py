@@ -38,7 +38,8 @@ def draw_gaps(
         labels = f"{name} [{unit}]", "span [-]" if by_span else "part of the chord [-]"
         style_axes(axes, style, *(labels if by_span else labels[::-1]))
         for label, series, gap in shown:
-            look, values = style.series(series), (gap.distances, gap.places)
+            look = style.series(series)
+            values = (gap.distances, gap.places)
             dash = look.dash if gap.zone is None else ZONE_DASHES[(gap.zone - 1) % 4]
             words = label if gap.zone is None else f"{label}, zone {gap.zone}"
             looks = {"color": look.color, "linestyle": dash, "linewidth": style.width}

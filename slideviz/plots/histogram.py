@@ -18,7 +18,8 @@ from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BAND, _STEMS = 0.12, 0.62
+BAND = 0.12
+_STEMS = 0.62
 """Width of the strip of inverted cells, left of the values, relative to the range of values; and
 the part of the strip for the counts, beside its label."""
 _PALER = 0.45  # part of the background's color mixed into bars, so that lines over them stand out
@@ -71,14 +72,16 @@ def draw_distribution(
     if bars is not None:
         _fill(axes, bars, paler, foot, style)
     for outline in outlines:
-        counts, edges = outline.distribution.counts, outline.distribution.edges
+        counts = outline.distribution.counts
+        edges = outline.distribution.edges
         look = _look(outline, style)
         axes.stairs(counts, edges, baseline=None, label=outline.label, **look)
     every = [outline.distribution for outline in outlines]
     every += [bars.distribution] if bars is not None else []
     if not every:
         return
-    low, high = every[0].edges[0], every[0].edges[-1]
+    low = every[0].edges[0]
+    high = every[0].edges[-1]
     left = low
     if any(one.inverted for one in every):
         left = low - BAND * (high - low)
@@ -202,7 +205,8 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
     if bars is None:
         return {"handles": handles, "labels": labels}
     key = Patch(edgecolor=style.scheme.text)
-    colors, there = _colors(bars, paler, style), np.flatnonzero(bars.distribution.counts)
+    colors = _colors(bars, paler, style)
+    there = np.flatnonzero(bars.distribution.counts)
     first, last = (there[0], there[-1]) if len(there) else (0, len(colors) - 1)
     some = [colors[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
     return {

@@ -69,7 +69,8 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> tuple[MeridionalBins, ...]:
 
 
 def _zone_bins(mesh: Mesh, walls: SpanChannel, part: slice) -> MeridionalBins:
-    curves, cells = walls.curves, mesh.cells
+    curves = walls.curves
+    cells = mesh.cells
     plane = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))
     used = np.stack([np.clip(plane[:, 2], 0.0, 1.0), curves.length(plane)], axis=1)
     k = _bins_of(mesh, used[:, 0])
@@ -101,7 +102,8 @@ def _bins_of(mesh: Mesh, used: FloatArray) -> int:
     """Return the number of bins along a coordinate (u,) from 0 to 1 of the nodes of cells."""
     at = np.empty(len(mesh.points))
     at[mesh.cells.nodes] = used
-    corners, first = at[mesh.cells.connectivity], mesh.cells.offsets[:-1]
+    corners = at[mesh.cells.connectivity]
+    first = mesh.cells.offsets[:-1]
     size = np.maximum.reduceat(corners, first) - np.minimum.reduceat(corners, first)
     usual = float(np.percentile(size, LARGE))
     return int(np.clip(1.0 / max(usual, 1e-9) + 0.05, 1, MOST_BINS))

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 GAP = 1e-6
 """Gap between two cells, relative to the whole length, above which the curve is interrupted."""
-_FILLED, _FOLDED = 0.85, 0.3
+_FILLED = 0.85
+_FOLDED = 0.3
 """Opacity of the areas below a curve, and of the marks of inverted cells."""
 
 
@@ -124,7 +125,8 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
     """Return positions and values, (n,) each, of a polyline of steps; NaN where it breaks."""
     length = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
     breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * length) + 1
-    x, y = curve.ends.ravel(), np.repeat(curve.values, 2)
+    x = curve.ends.ravel()
+    y = np.repeat(curve.values, 2)
     return np.insert(x, 2 * breaks, np.nan), np.insert(y, 2 * breaks, np.nan)
 
 

@@ -46,7 +46,8 @@ class Paint:
 
     def up_to(self, cells: IntArray) -> Paint:
         """Return the paint with limits up to the largest finite value of cells (c,)."""
-        low, values = self.limits[0], self.values[cells]
+        low = self.limits[0]
+        values = self.values[cells]
         high = float(values[np.isfinite(values)].max(initial=low))
         return replace(self, limits=(low, high if high > low else low + 1.0))
 
@@ -79,7 +80,8 @@ class Paint:
 
     def summary(self, cells: IntArray) -> dict[str, float | int]:
         """Return number, min, mean, max, inverted and worst cell of cells (c,), c > 0."""
-        count, bad = len(cells), int(np.count_nonzero(self.inverted[cells]))
+        count = len(cells)
+        bad = int(np.count_nonzero(self.inverted[cells]))
         if self.label in WALL_VALUES and not np.isnan(self.values[cells]).all():
             cells = cells[~np.isnan(self.values[cells])]
         mine = self.values[cells]

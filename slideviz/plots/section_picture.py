@@ -33,20 +33,25 @@ from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
 from slideviz.terms import QUANTITIES, WALL_VALUES
 
-TITLE, LETTERS = 10.0, 9.0  # size in points of the title's letters, and of all others
+TITLE = 10.0  # size of the title's letters in points
+LETTERS = 9.0  # of all others
 _LETTER_WIDTH = 0.075  # width of a label's letter in inches
-SIDES, ENDS, BAR = 0.7, 1.0, 0.7
+SIDES = 0.7
+ENDS = 1.0
+BAR = 0.7
 """Approximate room in inches for numbers and labels beside the axes; for these and titles above and
 below the axes; and for the color bar. They decide the arrangement."""
 HIGHER = {True: 1.4, False: 2.0}
 """Largest height of a picture of two runs, relative to one of one run: side by side (True), or one
 above the other (False)."""
 _NARROWEST = 2.2  # least width in inches of each of two sections side by side, for their titles
-_THIN, _MARGIN = 25.0, 0.02
+_THIN = 25.0
+_MARGIN = 0.02
 """Largest ratio of length to height of the box that is shown; margin around all sections, relative
 to their length."""
 
-_ASIDE, _ABOVE = 0.55, 0.4
+_ASIDE = 0.55
+_ABOVE = 0.4
 """Offset of the camera from the straight view, to the side and up, relative to its distance."""
 
 
@@ -148,7 +153,8 @@ def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
         fits = len(label.full) * _LETTER_WIDTH <= inches
         axis.set_label_text(label.full if fits else label.short, fontsize=LETTERS)
         fewer = {"prune": "upper"} if inches < two / 3.0 else {}
-        most, least = int(np.clip(inches / step, 1 if fewer else 2, 9)), 2 if inches >= two else 1
+        most = int(np.clip(inches / step, 1 if fewer else 2, 9))
+        least = 2 if inches >= two else 1
         steps = [1, 2, 2.5, 5, 10]
         axis.set_major_locator(MaxNLocator(most, steps=steps, min_n_ticks=least, **fewer))
     axes.label_outer()
@@ -158,7 +164,8 @@ def draw_triad(figure: Any, piece: Polygons, section: Section) -> None:
     """Draw the directions of x, y and z as seen by `camera`, in the lower left corner."""
     from matplotlib.lines import Line2D
 
-    size, centre = figure.get_size_inches(), np.array([0.55, 0.5])
+    size = figure.get_size_inches()
+    centre = np.array([0.55, 0.5])
     for word, towards in zip("xyz", camera(piece, section)[:2].T, strict=True):
         ends = np.stack([centre, centre + 0.3 * towards]) / size
         figure.add_artist(Line2D(*ends.T, color=PAPER.text, linewidth=1.0))
@@ -371,7 +378,8 @@ def _laid_beside(
 ) -> tuple[list[Polygons], tuple[Label, Label] | None]:
     """Return the polygons of each run as laid on paper, in order of drawing, and axes' labels."""
     flats: list[Polygons] = []
-    labels, near = None, None
+    labels = None
+    near = None
     for one in shown:
         if not one.drawn:
             flats.append(next(iter(one.pieces.values())))

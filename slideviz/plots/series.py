@@ -38,7 +38,9 @@ class Distribution:
     def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
         """Return the distribution of values (m,) in equal intervals; NaN is an inverted cell."""
         right = values[np.isfinite(values)]
-        low, high, count = edges[0], edges[-1], len(edges) - 1
+        low = edges[0]
+        high = edges[-1]
+        count = len(edges) - 1
         places = np.clip((right - low) * (count / (high - low)), 0, count - 1).astype(np.int64)
         return cls(np.bincount(places, minlength=count), edges, len(values) - len(right))
 

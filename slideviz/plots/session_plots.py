@@ -79,7 +79,8 @@ def step_runs(session: Session) -> list[StepRun]:
 
 def greedy_run(session: Session) -> GreedyRun | None:
     """Return the convergence of the greedy selection in the shown step; None if it had none."""
-    frame, run = session.frame, session.run_shown
+    frame = session.frame
+    run = session.run_shown
     if frame is None or run is None or frame.step is None or not frame.step.history:
         return None
     cycles = frame.step.history
@@ -105,7 +106,8 @@ class Profiles:
         Raises SlidevizError if the mesh has no extent along the coordinate.
         """
         profiles = []
-        shown, run_shown = session.frame, session.run_shown
+        shown = session.frame
+        run_shown = session.run_shown
         if shown is not None and run_shown is not None and shown is not session.first:
             profiles.append(self._one(session, shown, coordinate, run_shown))
         others = [run for run in session.runs if run is not run_shown]
@@ -119,7 +121,8 @@ class Profiles:
     def _one(
         self, session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
     ) -> Profile:
-        case, mesh = session.case, session.mesh
+        case = session.case
+        mesh = session.mesh
         assert mesh is not None
         label = "undeformed" if run is None else run.label
         key = coordinate, case.axis, case.origin, case.span, label
@@ -158,7 +161,8 @@ def usual_coordinate(session: Session) -> Coordinate:
 
 def walls_in(session: Session) -> SpanWalls:
     """Return hub and shroud of a session; CaseError or MeshError if there are none."""
-    mesh, case = session.mesh, session.case
+    mesh = session.mesh
+    case = session.case
     assert mesh is not None
     return find_walls(mesh, case, find_periods(mesh, case, session.pairs))
 
@@ -172,13 +176,16 @@ def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None
 
     Raises CaseError or MeshError if there is no hub and shroud.
     """
-    frame, mesh, walls = session.frame, session.mesh, walls_in(session)
+    frame = session.frame
+    mesh = session.mesh
+    walls = walls_in(session)
     assert frame is not None
     assert mesh is not None
     bins = meridional_bins(mesh, walls)
     what = quantity_drawn(session)
     limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
-    values, color_map = frame.values(what, mesh), session.view.color_map
+    values = frame.values(what, mesh)
+    color_map = session.view.color_map
     label = f"mean {QUANTITIES[what].axis}"
     draw_meridional(figure, bins, values, label, limits, color_map=color_map, style=style)
 
@@ -188,7 +195,8 @@ def gaps_of(session: Session) -> list[Measured]:
 
     Raises CaseError or MeshError if they cannot be measured.
     """
-    case, run = session.case, session.run_shown
+    case = session.case
+    run = session.run_shown
     key = tuple(case.roles.items()), case.span, case.axis, case.origin, case.periodic_type
     measured: list[Measured] = []
     for frame in dict.fromkeys((session.first, session.frame)):
@@ -227,7 +235,8 @@ class CurveRows:
         return tuple(row for row in curves if row is not None)
 
     def _row(self, session: Session, cuts: Cuts, line: Section) -> CurveRow | None:
-        frame, run = session.frame, session.run_shown
+        frame = session.frame
+        run = session.run_shown
         assert frame is not None
         lines = cuts.of(frame.mesh, line)
         if not len(lines):
@@ -299,16 +308,15 @@ class FrameCounts:
             if what not in cache:
                 cache[what] = spread(frame, what, session.mesh)
         spreads = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
-        low, high = (
-            min((e[0] for e in spreads), default=0.0),
-            max((e[1] for e in spreads), default=1.0),
-        )
+        low = min((e[0] for e in spreads), default=0.0)
+        high = max((e[1] for e in spreads), default=1.0)
         if what in WALL_VALUES:
             return rounded_out(low, high)
         if what != "displacement":
             # A smaller range would enlarge meaningless differences.
             ends = whole_range(what) if full_range else (low, high)
-            low, high = min(low, ends[0]), max(high, ends[1]) if ends[1] < np.inf else high
+            low = min(low, ends[0])
+            high = max(high, ends[1]) if ends[1] < np.inf else high
             return rounded_out(min(low, high - LEAST_SPREAD), high)
         return rounded_out(0.0 if full_range else low, high)
 
@@ -344,7 +352,8 @@ def draw_histogram(
         return
     what = shown_measure(session)
     limits = counts.limits(session, full_range)
-    shown, run = counts.of(session, session.frame, limits), session.run_shown
+    shown = counts.of(session, session.frame, limits)
+    run = session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     term = QUANTITIES[what]
     metric = f"{term.label} quality [-]" if what in SIZE_SKEW else term.axis

@@ -100,10 +100,12 @@ def in_layers(
     if layers is not None and layers < 1:
         raise SlidevizError(f"{layers} layers; at least 1 is needed")
     used = height[cells.nodes]
-    low, high = float(used.min()), float(used.max())
+    low = float(used.min())
+    high = float(used.max())
     if not high > low:
         raise SlidevizError(f"{mesh.name} has no extent along {coordinate}; choose another")
-    at, first = height[cells.connectivity], cells.offsets[:-1]
+    at = height[cells.connectivity]
+    first = cells.offsets[:-1]
     middle = np.add.reduceat(at, first) / np.diff(cells.offsets)
     usual = np.median(np.maximum.reduceat(at, first) - np.minimum.reduceat(at, first))
     layers = layers or round(min(max((high - low) / max(usual, 1e-300), 1.0), MOST_LAYERS))

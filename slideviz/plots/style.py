@@ -94,7 +94,8 @@ ON_DARK = Style(DARK)
 
 def style_axes(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
     """Set labels, colors, letters and a faint grid of axes."""
-    text, size = style.scheme.text, max(style.size, SMALLEST)
+    text = style.scheme.text
+    size = max(style.size, SMALLEST)
     axes.set_facecolor(style.scheme.background)
     figure = axes.get_figure()
     if figure is not None:

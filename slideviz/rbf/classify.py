@@ -67,7 +67,8 @@ def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArr
     if not len(several):
         return np.stack([chosen, cluster], axis=1), np.empty(0, np.int64)
     size = size[size > 1]
-    group, local = np.repeat(np.arange(len(size)), size), chosen[several]
+    group = np.repeat(np.arange(len(size)), size)
+    local = chosen[several]
     label = _clusters(around, local, size)
     rank = _ranks(around.normals[local], group, label)
     # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
@@ -86,7 +87,8 @@ def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
     """
     image = around.fan_node[chosen] != around.node[chosen]
     chosen = chosen[np.lexsort([chosen, image, around.node[chosen]])]
-    node, own = around.node[chosen], around.fan_node[chosen]
+    node = around.node[chosen]
+    own = around.fan_node[chosen]
     first = np.searchsorted(node, node)
     rows = np.flatnonzero(own != node)
     drop = np.zeros(len(chosen), bool)
@@ -111,7 +113,8 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     """
     label = np.empty(len(local), np.int64)
     role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
-    normals, own = around.normals[local], around.fan_node[local]
+    normals = around.normals[local]
+    own = around.fan_node[local]
     _join(size, normals, role, own, around.smooth, around.merge, label)
     return label
 
@@ -122,7 +125,9 @@ def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-un
     start = 0
     for count in size:
         stop = start + count
-        roles, nodes, labels = role[start:stop], own[start:stop], label[start:stop]
+        roles = role[start:stop]
+        nodes = own[start:stop]
+        labels = label[start:stop]
         alike = _cosines(normals[start:stop])
         goes_on = _continuations(alike, roles, nodes, smooth)
         for i in range(count):
@@ -348,7 +353,8 @@ def _collect(
     node = np.repeat(slid, stop - start)
     rows = rows[ranges(start, stop - start)]
     order = np.lexsort((rows[:, 1], node))
-    rows, node = rows[order], node[order]
+    rows = rows[order]
+    node = node[order]
     new = np.ones(len(rows), bool)
     new[1:] = (node[1:] != node[:-1]) | (rows[1:, 1] != rows[:-1, 1])
     cluster_node = node[new]

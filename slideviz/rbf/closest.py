@@ -19,7 +19,8 @@ TIE = 1e-12  # squared distances with a smaller relative difference are equal bu
 ON = 1e-30
 """A point is on its guessed triangle when its squared distance from it is at most this part of its
 squared distance from the origin."""
-MOST, TURNS = 1e150, 2.0**30
+MOST = 1e150
+TURNS = 2.0**30
 """Largest coordinate with which periods are counted, and the largest number of them."""
 EDGE = 1e-9
 """A closest point is on the side of a triangle where the opposite corner has at most this part in
@@ -33,9 +34,12 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
 
     Quickselect (C. A. R. Hoare, Algorithm 65: Find, 1961): a sort that stops as soon as that holds.
     """
-    left, right = start, stop - 1
+    left = start
+    right = stop - 1
     while left < right:
-        pivot, i, j = keys[(left + right) // 2], left, right
+        pivot = keys[(left + right) // 2]
+        i = left
+        j = right
         while i <= j:
             while keys[i] < pivot:
                 i += 1
@@ -44,7 +48,8 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
             if i <= j:
                 keys[i], keys[j] = keys[j], keys[i]
                 items[i], items[j] = items[j], items[i]
-                i, j = i + 1, j - 1
+                i = i + 1
+                j = j - 1
         if half <= j:
             right = j
         elif half >= i:
@@ -76,22 +81,31 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
     starts = np.zeros(nodes, np.int64)
     stops = np.zeros(nodes, np.int64)
     stops[0] = len(order)
-    count, size = len(corners), np.empty(3)
-    middle, low, high = np.empty(len(order)), np.empty((count, 3)), np.empty((count, 3))
+    count = len(corners)
+    size = np.empty(3)
+    middle = np.empty(len(order))
+    low = np.empty((count, 3))
+    high = np.empty((count, 3))
     for i in range(count):
         for axis in range(3):
-            one, two, three = corners[i, 0, axis], corners[i, 1, axis], corners[i, 2, axis]
+            one = corners[i, 0, axis]
+            two = corners[i, 1, axis]
+            three = corners[i, 2, axis]
             low[i, axis], high[i, axis] = min(one, two, three), max(one, two, three)
     for k in range(nodes):
-        a, b = starts[k], stops[k]
+        a = starts[k]
+        b = stops[k]
         for axis in range(3):
-            lowest, highest = np.inf, -np.inf
+            lowest = np.inf
+            highest = -np.inf
             for i in range(a, b):
                 image = _image(order[i], count)
-                one, by = order[i] - image * count, shifts[image, axis]
+                one = order[i] - image * count
+                by = shifts[image, axis]
                 lowest = min(lowest, low[one, axis] + by)
                 highest = max(highest, high[one, axis] + by)
-            bounds[k, axis], bounds[k, 3 + axis] = lowest, highest
+            bounds[k, axis] = lowest
+            bounds[k, 3 + axis] = highest
             if bounds[k, axis] > lowest:  # rounded: no box is smaller than what is in it
                 bounds[k, axis] = np.nextafter(bounds[k, axis], np.float32(-np.inf))
             if bounds[k, 3 + axis] < highest:
@@ -102,12 +116,15 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
         longest = np.argmax(size)
         for i in range(a, b):
             image = _image(order[i], count)
-            one, by = order[i] - image * count, shifts[image, longest]
+            one = order[i] - image * count
+            by = shifts[image, longest]
             middle[i] = (low[one, longest] + by) + (high[one, longest] + by)
         half = a + (b - a + 1) // 2
         _part(middle, order, a, half, b)
-        starts[2 * k + 1], stops[2 * k + 1] = a, half
-        starts[2 * k + 2], stops[2 * k + 2] = half, b
+        starts[2 * k + 1] = a
+        stops[2 * k + 1] = half
+        starts[2 * k + 2] = half
+        stops[2 * k + 2] = b
 
 
 @njit(inline="always", **OPTIONS)
@@ -146,9 +163,15 @@ def _copy(point, out):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance."""
-    uu, uv, vv, wu, wv = 0.0, 0.0, 0.0, 0.0, 0.0
+    uu = 0.0
+    uv = 0.0
+    vv = 0.0
+    wu = 0.0
+    wv = 0.0
     for i in range(3):
-        u, v, w = b[i] - a[i], c[i] - a[i], x[i] - a[i]
+        u = b[i] - a[i]
+        v = c[i] - a[i]
+        w = x[i] - a[i]
         uu += u * u
         uv += u * v
         vv += v * v
@@ -156,7 +179,8 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
         wv += w * v
     area = uu * vv - uv * uv
     if area > 0.0:
-        s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+        s = (vv * wu - uv * wv) / area
+        t = (uu * wv - uv * wu) / area
         if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
             gap = 0.0
             for i in range(3):
@@ -216,8 +240,12 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
         stack = np.empty(64, np.int64)
         first = np.empty(64, np.int64)
         last = np.empty(64, np.int64)
-        point, trial, t = np.empty(3), np.empty(3), np.empty((3, 3))
-        best, held, top = np.inf, np.inf, 1
+        point = np.empty(3)
+        trial = np.empty(3)
+        t = np.empty((3, 3))
+        best = np.inf
+        held = np.inf
+        top = 1
         stack[0], first[0], last[0] = 0, 0, len(order)
         if len(guess):
             _load(guess[i], corners, shifts, t)
@@ -228,7 +256,9 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
                 continue
         while top > 0:
             top -= 1
-            k, a, b = stack[top], first[top], last[top]
+            k = stack[top]
+            a = first[top]
+            b = last[top]
             if best == 0.0 or _box_gap(bounds, k, x[i]) > best * (1.0 + TIE):
                 continue
             if k >= inner:
@@ -242,19 +272,29 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
                         else:
                             nearer = _before(point, out[i])
                     if nearer:
-                        held, which[i] = gap, order[j]
+                        held = gap
+                        which[i] = order[j]
                         _copy(point, out[i])
                     best = min(best, gap)
                 continue
             half = a + (b - a + 1) // 2
-            left, right = 2 * k + 1, 2 * k + 2
+            left = 2 * k + 1
+            right = 2 * k + 2
             # The nearer child is put on top, to be looked at first.
             if _box_gap(bounds, left, x[i]) < _box_gap(bounds, right, x[i]):
-                stack[top], first[top], last[top] = right, half, b
-                stack[top + 1], first[top + 1], last[top + 1] = left, a, half
+                stack[top] = right
+                first[top] = half
+                last[top] = b
+                stack[top + 1] = left
+                first[top + 1] = a
+                last[top + 1] = half
             else:
-                stack[top], first[top], last[top] = left, a, half
-                stack[top + 1], first[top + 1], last[top + 1] = right, half, b
+                stack[top] = left
+                first[top] = a
+                last[top] = half
+                stack[top + 1] = right
+                first[top + 1] = half
+                last[top + 1] = b
             top += 2
 
 
@@ -289,7 +329,9 @@ class ClosestPoints:
         items = n
         self._along: FloatArray | None = None
         if shift is not None:
-            items, self._shifts[1, :dim], self._shifts[2, :dim] = 3 * n, -shift, shift
+            items = 3 * n
+            self._shifts[1, :dim] = -shift
+            self._shifts[2, :dim] = shift
             self._along = shift / (shift @ shift)
             places = corners.reshape(-1, dim) @ self._along
             self._middle = (places.min() + places.max()) / 2.0
@@ -331,19 +373,22 @@ class ClosestPoints:
         its guessed simplex, that one is taken, even if x is on others too.
         """
         begin = np.empty(0, np.int64) if guess is None else guess % len(self._order)
-        dim, turns = x.shape[1], self._periods(x)
+        dim = x.shape[1]
+        turns = self._periods(x)
         targets = np.zeros((len(x), 3))
         targets[:, :dim] = x
         far = np.flatnonzero(turns)
         by = turns[far, None] * self._shifts[2]
         targets[far] -= by
-        out, which = np.empty_like(targets), np.zeros(len(x), np.int64)
+        out = np.empty_like(targets)
+        which = np.zeros(len(x), np.int64)
         with one_at_a_time(50 * len(x)):
             _query(
                 targets, self._corners, self._shifts, self._order, self._bounds, begin, out, which
             )
         out[far] += by
-        at, which = out[:, :dim], which + turns * len(self._order)
+        at = out[:, :dim]
+        which = which + turns * len(self._order)
         if self._rim is not None:
             self._go_on(x, at, which)
         return at, which
@@ -353,7 +398,8 @@ class ClosestPoints:
         assert self._rim is not None
         on_rim = self._rim[which % len(self.corners)]
         rows = np.flatnonzero(on_rim.any(axis=1))
-        corners, on_rim = self.simplices(which[rows]), on_rim[rows]
+        corners = self.simplices(which[rows])
+        on_rim = on_rim[rows]
         sides = corners[:, 1:] - corners[:, :1]
         to_parts = np.linalg.pinv(sides).transpose(0, 2, 1)  # of corners 1 and 2 in a point
 
@@ -362,7 +408,8 @@ class ClosestPoints:
 
         there = parts(at)
         absent = np.column_stack([1.0 - there.sum(axis=1), there]) <= EDGE
-        lacks, count = absent.sum(axis=1), corners.shape[1]
+        lacks = absent.sum(axis=1)
+        count = corners.shape[1]
         beyond = (lacks == count - 1) & (on_rim[:, :count] & ~absent).any(axis=1)
         if count == 3:
             beyond |= (lacks == 1) & (on_rim[:, count:] & absent).any(axis=1)

@@ -72,35 +72,62 @@ def sum_three(x, c, w, scale, out):  # type: ignore[no-untyped-def]
 
     From controls c (3, n) and weights w (3, n); ``scale`` is 1 / R, here and below.
     """
-    c0, c1, c2 = c[0], c[1], c[2]
-    w0, w1, w2 = w[0], w[1], w[2]
+    c0 = c[0]
+    c1 = c[1]
+    c2 = c[2]
+    w0 = w[0]
+    w1 = w[1]
+    w2 = w[2]
     for i in prange(x.shape[1]):
-        x0, x1, x2 = x[0, i], x[1, i], x[2, i]
-        s0, s1, s2 = 0.0, 0.0, 0.0
+        x0 = x[0, i]
+        x1 = x[1, i]
+        x2 = x[2, i]
+        s0 = 0.0
+        s1 = 0.0
+        s2 = 0.0
         for j in range(c.shape[1]):
-            d0, d1, d2 = x0 - c0[j], x1 - c1[j], x2 - c2[j]
+            d0 = x0 - c0[j]
+            d1 = x1 - c1[j]
+            d2 = x2 - c2[j]
             p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2, scale)
             s0 += w0[j] * p
             s1 += w1[j] * p
             s2 += w2[j] * p
-        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+        out[0, i] = s0
+        out[1, i] = s1
+        out[2, i] = s2
 
 
 @njit(parallel=True, **OPTIONS)
 def sum_four(x, c, w, scale, out):  # type: ignore[no-untyped-def]
     """Write s as ``sum_three`` does, for four features (translational period in 3D)."""
-    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
-    w0, w1, w2 = w[0], w[1], w[2]
+    c0 = c[0]
+    c1 = c[1]
+    c2 = c[2]
+    c3 = c[3]
+    w0 = w[0]
+    w1 = w[1]
+    w2 = w[2]
     for i in prange(x.shape[1]):
-        x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
-        s0, s1, s2 = 0.0, 0.0, 0.0
+        x0 = x[0, i]
+        x1 = x[1, i]
+        x2 = x[2, i]
+        x3 = x[3, i]
+        s0 = 0.0
+        s1 = 0.0
+        s2 = 0.0
         for j in range(c.shape[1]):
-            d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
+            d0 = x0 - c0[j]
+            d1 = x1 - c1[j]
+            d2 = x2 - c2[j]
+            d3 = x3 - c3[j]
             p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3, scale)
             s0 += w0[j] * p
             s1 += w1[j] * p
             s2 += w2[j] * p
-        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+        out[0, i] = s0
+        out[1, i] = s1
+        out[2, i] = s2
 
 
 @njit(parallel=True, **OPTIONS)
@@ -109,13 +136,24 @@ def sum_rotational(x, c, w, period_over_pi, scale, out):  # type: ignore[no-unty
 
     ``period_over_pi`` is theta_p / pi. The distance is that of ``distances``.
     """
-    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
-    w0, w1, w2 = w[0], w[1], w[2]
+    c0 = c[0]
+    c1 = c[1]
+    c2 = c[2]
+    c3 = c[3]
+    w0 = w[0]
+    w1 = w[1]
+    w2 = w[2]
     for i in prange(x.shape[1]):
-        r, sine, cosine, z = x[0, i], x[1, i], x[2, i], x[3, i]
-        s0, s1, s2 = 0.0, 0.0, 0.0
+        r = x[0, i]
+        sine = x[1, i]
+        cosine = x[2, i]
+        z = x[3, i]
+        s0 = 0.0
+        s1 = 0.0
+        s2 = 0.0
         for j in range(c.shape[1]):
-            dr, dz = r - c0[j], z - c3[j]
+            dr = r - c0[j]
+            dz = z - c3[j]
             chord = (
                 2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
             )
@@ -123,7 +161,9 @@ def sum_rotational(x, c, w, period_over_pi, scale, out):  # type: ignore[no-unty
             s0 += w0[j] * p
             s1 += w1[j] * p
             s2 += w2[j] * p
-        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+        out[0, i] = s0
+        out[1, i] = s1
+        out[2, i] = s2
 
 
 @njit(parallel=True, **OPTIONS)
@@ -173,7 +213,9 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
     elif kind <= 7:
         for j in range(count):
             x = min(max(q[j], 1e-300), 1.0)
-            a, b, log = x * x, x * x * x, np.log(x)
+            a = x * x
+            b = x * x * x
+            log = np.log(x)
             if x >= 1.0:
                 q[j] = 0.0  # exactly, where the formulas leave rounding
             elif kind == 5:
@@ -212,17 +254,26 @@ def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-
     the addition theorem. The same formula is in ``sum_rotational``, ``double_double._distances``,
     ``slopes`` and ``idw._squares``.
     """
-    c0, c1 = c[0, start : start + count], c[1, start : start + count]
-    c2, c3 = c[2, start : start + count], c[3, start : start + count]
-    x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
+    c0 = c[0, start : start + count]
+    c1 = c[1, start : start + count]
+    c2 = c[2, start : start + count]
+    c3 = c[3, start : start + count]
+    x0 = x[0]
+    x1 = x[1]
+    x2 = x[2]
+    x3 = x[3]
     if period_over_pi > 0.0:
         for j in range(count):
-            d0, d3 = x0 - c0[j], x3 - c3[j]
+            d0 = x0 - c0[j]
+            d3 = x3 - c3[j]
             chord = 2.0 * x0 * c0[j] * one_minus_cos(period_over_pi * (x1 * c2[j] - x2 * c1[j]))
             q[j] = np.sqrt(d0 * d0 + chord + d3 * d3) * scale
     else:
         for j in range(count):
-            d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
+            d0 = x0 - c0[j]
+            d1 = x1 - c1[j]
+            d2 = x2 - c2[j]
+            d3 = x3 - c3[j]
             q[j] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3) * scale
 
 
@@ -239,7 +290,9 @@ def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyp
         q = np.empty(BLOCK)
         first = task * TARGETS_PER_TASK
         for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            s0, s1, s2 = 0.0, 0.0, 0.0
+            s0 = 0.0
+            s1 = 0.0
+            s2 = 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
@@ -248,7 +301,9 @@ def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyp
                     s0 += w[0, start + j] * q[j]
                     s1 += w[1, start + j] * q[j]
                     s2 += w[2, start + j] * q[j]
-            out[0, i], out[1, i], out[2, i] = s0, s1, s2
+            out[0, i] = s0
+            out[1, i] = s1
+            out[2, i] = s2
 
 
 @njit(parallel=True, **OPTIONS)
@@ -259,7 +314,8 @@ def fill_matrix(x, c, across, along, period_over_pi, scale, kind, out):  # type:
     and ``along`` (d, n) its unit direction; d = 0 leaves the dot product out. ``kind`` is the
     kernel's code; ``period_over_pi`` is 0 for Euclidean features.
     """
-    d, n = across.shape[0], c.shape[1]
+    d = across.shape[0]
+    n = c.shape[1]
     for a in prange(x.shape[1]):
         row = out[a]
         distances(x[:, a], c, 0, n, period_over_pi, scale, row)

@@ -85,14 +85,17 @@ def full_rows(problem: Problem, nodes: IntArray, values: Array) -> ConstraintRow
 
 def sliding_rows(problem: Problem) -> ConstraintRows:
     """Return the rows of direct sliding: axes of known nodes, normals of sliding ones, merged."""
-    known, d = problem.known, value(problem.values).shape[-1]
+    known = problem.known
+    d = value(problem.values).shape[-1]
     nodes = np.concatenate([np.repeat(known, d), problem.normal_nodes])
     normals = join(np.tile(np.eye(d), (len(known), 1)), problem.normals)
     values = problem.values + problem.carried_error(known)
     across = dot(problem.carried_error(problem.normal_nodes), problem.normals)
     right = join(reshape(values, len(known) * d, 1), across)
     order = np.argsort(problem.same_as[nodes], kind="stable")
-    nodes, normals, right = nodes[order], take(normals, order), take(right, order)
+    nodes = nodes[order]
+    normals = take(normals, order)
+    right = take(right, order)
     representative = problem.same_as[nodes]
     starts = np.flatnonzero(np.r_[True, representative[1:] != representative[:-1]])
     count = np.diff(np.r_[starts, len(nodes)])
@@ -138,7 +141,8 @@ def _orthonormalised(
     ``keep`` (r,) bool: set to False where a constraint follows from others of its group.
     """
     for k, row in enumerate(rows.T):
-        n, b = take(normals, row), take(right, row)
+        n = take(normals, row)
+        b = take(right, row)
         for other in rows.T[:k]:
             share = multiply(dot(n, take(normals, other)), keep[other, None].astype(float))
             n = n - multiply(take(normals, other), share)
@@ -154,7 +158,8 @@ def _orthonormalised(
         mask = new[:, None].astype(float)
         scale = multiply(size, mask) + (1.0 - mask)
         keep[row] = new
-        normals, right = put(normals, row, divide(n, scale)), put(right, row, divide(b, scale))
+        normals = put(normals, row, divide(n, scale))
+        right = put(right, row, divide(b, scale))
     return normals, right
 
 

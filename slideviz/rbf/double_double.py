@@ -34,7 +34,8 @@ from the constant on. The same functions are in `kernels` and `compiled`."""
 
 PAIRS = 1_000_000  # pairs between two calls of ``tick``: some tens of milliseconds
 
-ROWS, STRIP = 16, 256  # rows and columns of a factor that a thread computes at once
+ROWS = 16  # of a factor that a thread computes at once
+STRIP = 256  # columns of it
 
 KEPT = 2000  # rows of the largest system whose matrix is kept for further residuals: 64 MB
 
@@ -50,9 +51,12 @@ def _sum(a, b):  # type: ignore[no-untyped-def]
 @njit(inline="always", **OPTIONS)
 def _product(a, b):  # type: ignore[no-untyped-def]
     """Return a b, rounded, and its rounding error."""
-    t, u = 134217729.0 * a, 134217729.0 * b
-    a1, b1 = t - (t - a), u - (u - b)
-    a2, b2 = a - a1, b - b1
+    t = 134217729.0 * a
+    u = 134217729.0 * b
+    a1 = t - (t - a)
+    b1 = u - (u - b)
+    a2 = a - a1
+    b2 = b - b1
     p = a * b
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
@@ -90,7 +94,8 @@ def _root(a, al):  # type: ignore[no-untyped-def]
 def _one_minus_cos(g, gl):  # type: ignore[no-untyped-def]
     """Return 1 - cos g by the terms of ``compiled.one_minus_cos``."""
     t, tl = _times(g, gl, g, gl)
-    p, pl = _K[8], 0.0
+    p = _K[8]
+    pl = 0.0
     for k in range(7, -1, -1):
         p, pl = _times(p, pl, t, tl)
         p, pl = _plus(p, pl, _K[k], 0.0)
@@ -107,8 +112,14 @@ def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-def]
     """Write xi from node i to all nodes x (4, n) to q + ql, as ``compiled.distances`` does."""
-    c0, c1, c2, c3 = x[0], x[1], x[2], x[3]
-    x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
+    c0 = x[0]
+    c1 = x[1]
+    c2 = x[2]
+    c3 = x[3]
+    x0 = x[0, i]
+    x1 = x[1, i]
+    x2 = x[2, i]
+    x3 = x[3, i]
     for j in range(x.shape[1]):
         s, sl = _plus_square(0.0, 0.0, x0, c0[j])
         s, sl = _plus_square(s, sl, x3, c3[j])
@@ -132,7 +143,8 @@ def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-d
 def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
     """Write the radial function of xi = q + ql (n,) to v + vl (n,); overwrites q and ql."""
     n = len(q)
-    v[:], vl[:] = terms[-1], 0.0
+    v[:] = terms[-1]
+    vl[:] = 0.0
     for k in range(len(terms) - 2, -1, -1):
         for j in range(n):
             p, pl = _times(v[j], vl[j], q[j], ql[j])
@@ -140,7 +152,8 @@ def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
     for j in range(n):
         u, ul = _plus(1.0, 0.0, -q[j], -ql[j])
         inside = 1.0 if u > 0.0 else 0.0
-        q[j], ql[j] = inside * u, inside * ul
+        q[j] = inside * u
+        ql[j] = inside * ul
     for _ in range(power):
         for j in range(n):
             v[j], vl[j] = _times(v[j], vl[j], q[j], ql[j])
@@ -150,7 +163,8 @@ def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
 def _turn(across, i, v, vl):  # type: ignore[no-untyped-def]
     """Multiply v + vl with the scalar products of direction i and all directions (d, n)."""
     for j in range(len(v)):
-        dot, lost = 0.0, 0.0
+        dot = 0.0
+        lost = 0.0
         for k in range(across.shape[0]):
             p, pl = _product(across[k, i], across[k, j])
             dot, lost = _plus(dot, lost, p, pl)
@@ -162,7 +176,8 @@ def _fill(x, across, first, period_over_pi, scale, power, terms, v, vl):  # type
     """Write rows of G from row ``first`` on to v + vl (p, n), of features x and directions."""
     n = x.shape[1]
     for row in prange(len(v)):
-        q, ql = np.empty(n), np.empty(n)
+        q = np.empty(n)
+        ql = np.empty(n)
         _distances(x, first + row, period_over_pi, scale, q, ql)
         _apply(power, terms, q, ql, v[row], vl[row])
         if across.shape[0] > 0:
@@ -174,7 +189,8 @@ def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
     """Write ``right - (v + vl) (weights + low)`` to out (p, m); weights and low are (m, n)."""
     for i in prange(len(v)):
         for k in range(len(weights)):
-            total, lost = right[i, k], 0.0
+            total = right[i, k]
+            lost = 0.0
             for j in range(v.shape[1]):
                 p, e = _product(v[i, j], -weights[k, j])
                 total, f = _sum(total, p)
@@ -193,8 +209,12 @@ def _over(a, al, b, bl):  # type: ignore[no-untyped-def]
 @njit(inline="always", **OPTIONS)
 def _less_product(u, ul, k, j, first, last):  # type: ignore[no-untyped-def]
     """Subtract from row j of u + ul what row k makes of it, from column ``first`` to ``last``."""
-    a, al, b, bl = u[k, j], ul[k, j], u[k, first:last], ul[k, first:last]
-    s, lost = u[j, first:last], ul[j, first:last]
+    a = u[k, j]
+    al = ul[k, j]
+    b = u[k, first:last]
+    bl = ul[k, first:last]
+    s = u[j, first:last]
+    lost = ul[j, first:last]
     for i in range(last - first):
         p, e = _product(-a, b[i])
         s[i], f = _sum(s[i], p)
@@ -209,9 +229,11 @@ def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
     those of U already. Columns are processed in strips that fit into the cache. Returns False if
     there is no such U.
     """
-    n, end = len(u), min(len(u), top + ROWS)
+    n = len(u)
+    end = min(len(u), top + ROWS)
     for part in prange((n - top + STRIP - 1) // STRIP):
-        first, last = top + part * STRIP, min(n, top + (part + 1) * STRIP)
+        first = top + part * STRIP
+        last = min(n, top + (part + 1) * STRIP)
         for k in range(top):
             for j in range(top, min(end, last)):
                 _less_product(u, ul, k, j, max(j, first), last)
@@ -222,7 +244,8 @@ def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
         if not s > 0.0:
             return False
         d, dl = _root(s, sl)
-        u[j, j], ul[j, j] = d, dl
+        u[j, j] = d
+        ul[j, j] = dl
         for i in range(j + 1, n):
             s, sl = _sum(u[j, i], ul[j, i])
             u[j, i], ul[j, i] = _over(s, sl, d, dl)
@@ -236,12 +259,14 @@ def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
     for c in prange(len(x)):
         for i in range(n):
             d, dl = _over(x[c, i], xl[c, i], u[i, i], ul[i, i])
-            x[c, i], xl[c, i] = d, dl
+            x[c, i] = d
+            xl[c, i] = dl
             for k in range(i + 1, n):
                 p, pl = _times(u[i, k], ul[i, k], -d, -dl)
                 x[c, k], xl[c, k] = _plus(x[c, k], xl[c, k], p, pl)
         for i in range(n - 1, -1, -1):
-            s, sl = x[c, i], xl[c, i]
+            s = x[c, i]
+            sl = xl[c, i]
             for k in range(i + 1, n):
                 p, pl = _times(u[i, k], ul[i, k], -x[c, k], -xl[c, k])
                 s, sl = _plus(s, sl, p, pl)
@@ -265,8 +290,10 @@ class Residuals:
         ``right``, ``weights``, ``low`` (n, m): ``low`` is the rest of weights beyond the digits of
         a float64.
         """
-        out, n = np.empty_like(right), len(right)
-        w, wl = np.ascontiguousarray(weights.T), np.ascontiguousarray(low.T)
+        out = np.empty_like(right)
+        n = len(right)
+        w = np.ascontiguousarray(weights.T)
+        wl = np.ascontiguousarray(low.T)
         size = max(1, PAIRS // max(1, n))
         for first in range(0, n, size):
             part = slice(first, min(n, first + size))
@@ -297,7 +324,8 @@ class Residuals:
         across = np.zeros((0, n)) if normals is None else np.ascontiguousarray(normals.T)
         power, terms = FUNCTIONS[self.basis.kernel]
         found, rest = np.empty((2, part.stop - part.start, n))
-        scale, period_over_pi = 1.0 / self.basis.radius, self.basis.period_over_pi
+        scale = 1.0 / self.basis.radius
+        period_over_pi = self.basis.period_over_pi
         with one_at_a_time(100 * found.size):
             _fill(x, across, part.start, period_over_pi, scale, power, np.array(terms), found, rest)
         if n <= KEPT:

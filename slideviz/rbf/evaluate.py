@@ -69,10 +69,13 @@ def evaluate(
         if len(near):
             out[near] = evaluate(basis, targets[:, near], controls, weights, tick)
         return out
-    rotational, kind = basis.period > 0, KERNELS[basis.kernel].code
+    rotational = basis.period > 0
+    kind = KERNELS[basis.kernel].code
     rows = 4 if rotational or kind or len(targets) == 4 else 3
-    c, w = padded_rows(controls, rows), padded_rows(weights.T, 3)
-    total, scale = targets.shape[1], 1.0 / basis.radius
+    c = padded_rows(controls, rows)
+    w = padded_rows(weights.T, 3)
+    total = targets.shape[1]
+    scale = 1.0 / basis.radius
     out = np.empty((total, weights.shape[1]))
     size = max(1, CHUNK // max(1, c.shape[1]))
     for start in range(0, total, size):
@@ -109,7 +112,8 @@ def reached(
     The sums at all others are exactly zero. Parameters as of `evaluate`, weights (..., n, d).
     """
     heavy = np.any(weights != 0.0, axis=(*range(weights.ndim - 2), weights.ndim - 1))
-    x, c = _plain(basis, targets), _plain(basis, controls)
+    x = _plain(basis, targets)
+    c = _plain(basis, controls)
     wide = x.shape[1] >= WIDER * c.shape[1]
     if not (KERNELS[basis.kernel].compact and wide and heavy.any()):
         return None
@@ -154,7 +158,8 @@ def connected(basis: Basis, features: FloatArray) -> IntArray:
         return box
     from scipy.spatial import cKDTree  # takes long to load
 
-    middle, reach = ((low + high) / 2).T, SLACK * basis.radius
+    middle = ((low + high) / 2).T
+    reach = SLACK * basis.radius
     a, b = cKDTree(middle).query_pairs(2.0 * reach, output_type="ndarray").T
     gap = np.maximum(np.maximum(low[:, a] - high[:, b], low[:, b] - high[:, a]), 0.0)
     near = np.linalg.norm(gap, axis=0) <= reach
@@ -172,11 +177,13 @@ def matrix(
     ``rows`` and ``columns``: features (k, N) of the node of each constraint, and its unit direction
     (N, d), or None to leave the dot product out. ``columns`` None: the same as the rows.
     """
-    x, across = padded_rows(rows[0], 4), _directions(*rows)
+    x = padded_rows(rows[0], 4)
+    across = _directions(*rows)
     c, along = (
         (x, across) if columns is None else (padded_rows(columns[0], 4), _directions(*columns))
     )
-    total, n = x.shape[1], c.shape[1]
+    total = x.shape[1]
+    n = c.shape[1]
     out = np.empty((total, n))
     size = max(1, CHUNK // max(1, n))
     for start in range(0, total, size):

@@ -41,7 +41,8 @@ class ExactFit:
 
     def __init__(self, problem: Problem, timer: PhaseTimer) -> None:
         d = problem.dim
-        self._problem, self._timer = problem, timer
+        self._problem = problem
+        self._timer = timer
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
@@ -54,7 +55,8 @@ class ExactFit:
 
     def add(self, rows: ConstraintRows) -> None:
         """Add rows, solve with all rows added so far, and set ``interpolant``."""
-        problem, rows = self._problem, rows.by_position(self._problem.coords)
+        problem = self._problem
+        rows = rows.by_position(self._problem.coords)
         if self._rows is not None:
             rows = self._rows.followed_by(rows)
         self._rows = rows
@@ -69,7 +71,8 @@ class ExactFit:
                 return
             weights = np.zeros_like(rows.data)
             label, moves = problem.reach
-            active, names = moves[label[rows.nodes]], row_keys(rows)
+            active = moves[label[rows.nodes]]
+            names = row_keys(rows)
             solved = [
                 part[label[rows.nodes[part]] == each]
                 for part in parts(rows)
@@ -78,7 +81,8 @@ class ExactFit:
                 if moves[each] or problem.lasting
             ]
             work = [self._extend(rows, part, tick) for part in solved]
-            tail, rest = None, rows.data
+            tail = None
+            rest = rows.data
             if problem.basis.polynomial:
                 terms = row_terms(problem, rows)
                 tail = self._polynomial(terms, rest, solved)
@@ -117,7 +121,8 @@ class ExactFit:
         self, terms: FloatArray, right: FloatArray, solved: list[IntArray]
     ) -> FloatArray:
         """Return the polynomial's coefficients (q, m) for terms (r, q) and data (r, m) of rows."""
-        kept, forward = [np.empty(0, np.int64)], [np.empty((0, terms.shape[1] + right.shape[1]))]
+        kept = [np.empty(0, np.int64)]
+        forward = [np.empty((0, terms.shape[1] + right.shape[1]))]
         for part in solved:
             factor = self._factors[int(part[0])]
             kept.append(part[factor.retained])

@@ -68,11 +68,13 @@ def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> Fl
     """
     width = len(nodes)
     size = 3 if width == 4 and nodes[2] == nodes[3] else width
-    x, touching = x[:size], touching[:size]
+    x = x[:size]
+    touching = touching[:size]
     around = [(i - 1) % size for i in range(size)], [(i + 1) % size for i in range(size)]
     if size == 3 and touching.sum() == 1:
         i = touching.tolist().index(True)
-        before, after = x[around[0][i]], x[around[1][i]]
+        before = x[around[0][i]]
+        after = x[around[1][i]]
         ends = np.stack([x[i], x[i]])
         ends[:, 1] = before[1], after[1]
         return np.stack([before, *ends, after])
@@ -122,7 +124,8 @@ def coords_slopes(frame: Frame, points: FloatArray) -> FloatArray:
     r = np.hypot(local[:, 0], local[:, 1])
     off = r > ON_AXIS * frame.radius
     inverse = np.divide(1.0, r, out=np.zeros_like(r), where=off)
-    cos, sin = local[:, 0] * inverse, local[:, 1] * inverse
+    cos = local[:, 0] * inverse
+    sin = local[:, 1] * inverse
     out = np.empty((n, 3, 3))
     out[:, 0] = cos[:, None] * basis[0] + sin[:, None] * basis[1]
     around = cos[:, None] * basis[1] - sin[:, None] * basis[0]
@@ -141,7 +144,8 @@ def points_slopes(frame: Frame, coords: FloatArray) -> FloatArray:
 
     def fill(part: slice) -> None:
         angle = coords[part, 1] / frame.radius + frame.theta0
-        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        cos = np.cos(angle)[:, None]
+        sin = np.sin(angle)[:, None]
         out[part, :, 0] = cos * basis[0] + sin * basis[1]
         out[part, :, 1] = coords[part, :1] / frame.radius * (cos * basis[1] - sin * basis[0])
         out[part, :, 2] = basis[2]
@@ -256,7 +260,8 @@ class Frame:
             return np.array(vectors, float)
         local = in_axis_frame(vectors, self.axis)
         angle = coords[:, 1] / self.radius + self.theta0
-        cos, sin = np.cos(angle), np.sin(angle)
+        cos = np.cos(angle)
+        sin = np.sin(angle)
         radial = cos * local[:, 0] + sin * local[:, 1]
         local[:, 1] = cos * local[:, 1] - sin * local[:, 0]
         local[:, 0] = radial
@@ -358,17 +363,21 @@ def _middle_angle(radii: FloatArray, angles: FloatArray) -> float:
     sectors suffice, for the largest gap is between two of these unless it is narrower than two
     sectors.
     """
-    least, parts = 1e-9 * radii.max(), -(-len(radii) // PART)
-    lows, highs = np.full((parts, SECTORS), np.inf), np.full((parts, SECTORS), -np.inf)
+    least = 1e-9 * radii.max()
+    parts = -(-len(radii) // PART)
+    lows = np.full((parts, SECTORS), np.inf)
+    highs = np.full((parts, SECTORS), -np.inf)
 
     def look(part: slice) -> None:
-        some, row = angles[part][radii[part] > least], part.start // PART
+        some = angles[part][radii[part] > least]
+        row = part.start // PART
         sector = np.clip((some + np.pi) * (SECTORS / (2 * np.pi)), 0, SECTORS - 1).astype(np.intp)
         np.minimum.at(lows[row], sector, some)
         np.maximum.at(highs[row], sector, some)
 
     in_parts(look, len(radii))
-    low, high = lows.min(axis=0), highs.max(axis=0)
+    low = lows.min(axis=0)
+    high = highs.max(axis=0)
     ordered = np.stack([low, high], axis=1)[low <= high].ravel()
     gaps = _gaps(ordered)
     if gaps.max() <= 4 * np.pi / SECTORS:

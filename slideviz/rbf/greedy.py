@@ -64,7 +64,8 @@ class GreedyFit:
         assert problem.reduction is not None
         self._problem, self._timer, self._settings = problem, timer, problem.reduction
         d = problem.dim
-        self.history, self.short = history, ""
+        self.history = history
+        self.short = ""
         self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         """The chosen nodes, in the order of their choice, and their coefficients, summed over the
         levels (Eq. 2.38)."""
@@ -115,7 +116,8 @@ class GreedyFit:
             residual, errors = self._misfit(target)
             goal = self._level_goal(errors)
         rule = LevelLimit(errors.max(initial=0.0), len(self._among.rows.nodes))
-        given_up, best = False, (errors, self.interpolant)
+        given_up = False
+        best = (errors, self.interpolant)
         while True:
             self._record(errors)
             enough = errors.max(initial=0.0) <= settings.tolerance
@@ -125,7 +127,8 @@ class GreedyFit:
                 given_up = rule.ends(float(errors.max()), len(self._level.chosen))
                 self._new_level()
                 self._number += 1
-                target, goal = self._level.targets(), self._level_goal(errors)
+                target = self._level.targets()
+                goal = self._level_goal(errors)
                 residual = target
             if not self._grow(target, residual, errors):
                 break
@@ -181,7 +184,8 @@ class GreedyFit:
 
     def _fraction(self, errors: FloatArray) -> float:
         """Return the logarithmic progress, 0 to 1, of the error from the first to the tolerance."""
-        first, now = self.history[0].error, float(errors.max(initial=0.0))
+        first = self.history[0].error
+        now = float(errors.max(initial=0.0))
         span = np.log(max(first, 1e-300) / max(self._settings.tolerance, 1e-300))
         return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))
 
@@ -197,7 +201,8 @@ class GreedyFit:
 
     def _note_dropped(self, errors: FloatArray) -> None:
         """Set ``dropped``: nodes the guard left out although their error is above the tolerance."""
-        level, among = self._level, self._among
+        level = self._level
+        among = self._among
         chosen = np.zeros(len(level.excluded), bool)
         chosen[level.chosen] = True
         excluded = (among.has_row(level.excluded) & ~among.has_row(chosen)) | level.singular
@@ -210,9 +215,11 @@ class GreedyFit:
         ``target`` and ``residual`` (r, m): what the level has to meet, and what it still lacks.
         ``errors`` (c,): error of each candidate.
         """
-        level, among = self._level, self._among
+        level = self._level
+        among = self._among
         open_ = among.has_row(~level.excluded)
-        weighted, largest = errors * among.tie_breaker, float(errors.max())
+        weighted = errors * among.tie_breaker
+        largest = float(errors.max())
         floor = 0.0 if self._settings.selection != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
         while True:
@@ -235,8 +242,10 @@ class GreedyFit:
         ``errors`` (c,) are multiplied with the candidates' ``tie_breaker``, and negative where one
         cannot be picked; ``residual`` (r, m).
         """
-        among, d = self._among, self._problem.dim
-        normals, vectors = among.rows.directions, residual
+        among = self._among
+        d = self._problem.dim
+        normals = among.rows.directions
+        vectors = residual
         if normals is not None:
             vectors = np.zeros((len(errors), d))
             np.add.at(vectors, among.candidate, residual * normals)

@@ -145,8 +145,10 @@ class WallNodes:
         """
         now = points(self.frame, take(goal, self.known))
         dim = self.start.shape[1]
-        moved, turned = now - self.start, self._rotations(now) - self._undeformed
-        moved, turned = take(moved, self.origin), take(turned, self.origin)
+        moved = now - self.start
+        turned = self._rotations(now) - self._undeformed
+        moved = take(moved, self.origin)
+        turned = take(turned, self.origin)
         if self.turn is not None:
             both = np.einsum("sac,sbd->sabcd", self.turn, self.turn)
             moved = transform(self.turn, moved)
@@ -155,11 +157,15 @@ class WallNodes:
 
     def _rotations(self, now: Array) -> Array:
         """Return the transposed rotations (..., w, d d) of wall nodes ``now`` (..., w, d)."""
-        facets, start, dim = self.facets, self.start, self.start.shape[1]
-        count, once = len(start), np.ones(facets.shape)
+        facets = self.facets
+        start = self.start
+        dim = self.start.shape[1]
+        count = len(start)
+        once = np.ones(facets.shape)
         if dim == 3:  # a triangle repeats its last node, but counts once there
             once[facets[:, 2] == facets[:, 3], 3] = 0.0
-        corner, at = np.arange(facets.size) // facets.shape[1], facets.reshape(-1)
+        corner = np.arange(facets.size) // facets.shape[1]
+        at = facets.reshape(-1)
         total = np.bincount(at, once.reshape(-1), count)[:, None]
         still = total == 0.0
         spread = _outer(value(_directions(start, facets)), _directions(now, facets))
@@ -189,7 +195,8 @@ class WallNodes:
         """
         from scipy.sparse import csr_array  # takes long to load
 
-        outside, weight = np.ones(len(targets)), np.zeros(len(targets))
+        outside = np.ones(len(targets))
+        weight = np.zeros(len(targets))
         parts = _shared([self._reached(k, targets) for k in range(len(self.walls))])
         for some, _, share, each in parts:
             outside[some] *= 1.0 - share
@@ -200,7 +207,8 @@ class WallNodes:
         found = []
         for k, part in enumerate(parts):
             left = outside[part[0]] < 1.0  # where two walls are as near, none may have a share
-            some, each = part[0][left], part[3][left]
+            some = part[0][left]
+            each = part[3][left]
             row, source, carrier = self._carriers(k, targets[some])
             carrier *= (each * (1.0 - outside[some]) / weight[some])[row]
             found.append((place[some[row]], source, carrier))
@@ -218,9 +226,12 @@ class WallNodes:
 
     def _reached(self, k: int, targets: FloatArray) -> Reached:
         """Return the points (m, d) in the zone of wall k; weights without shares."""
-        wall, (tree, closest) = self.walls[k][0], self._trees[k]
-        images, count = tree.n // len(wall.first), min(ALIKE, tree.n)
-        heights, height = np.append(np.tile(wall.first, images), 0.0), np.full(len(targets), -1.0)
+        wall = self.walls[k][0]
+        (tree, closest) = self._trees[k]
+        images = tree.n // len(wall.first)
+        count = min(ALIKE, tree.n)
+        heights = np.append(np.tile(wall.first, images), 0.0)
+        height = np.full(len(targets), -1.0)
         size = np.linalg.norm(np.ptp(closest.corners, axis=1), axis=1).max(initial=0.0)
         reach = float(np.hypot(heights.max() + wall.thickness, CORNER * size))
 
@@ -236,7 +247,8 @@ class WallNodes:
         some = np.flatnonzero(height >= 0.0)
         gap = np.linalg.norm(closest.query(targets[some]) - targets[some], axis=1)
         inside = gap < height[some] + wall.thickness
-        some, gap = some[inside], gap[inside]
+        some = some[inside]
+        gap = gap[inside]
         share = 1.0 - smooth((gap - height[some]) / wall.thickness)
         limit = height[some] + wall.thickness
         gap = np.maximum(gap, np.maximum(1e-9 * limit, TINY))
@@ -244,8 +256,10 @@ class WallNodes:
 
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Return which points (m, d) which sources of wall k carry, and their weights, all (c,)."""
-        tree, begins = self._trees[k][0], self.walls[k][1]
-        count, facets = min(CANDIDATES, tree.n), self.offsets[begins]
+        tree = self._trees[k][0]
+        begins = self.walls[k][1]
+        count = min(CANDIDATES, tree.n)
+        facets = self.offsets[begins]
         nearest = np.empty((len(targets), count), np.int64)
         weight = np.empty((len(targets), count))
 
@@ -263,8 +277,10 @@ class WallNodes:
         point, column = np.nonzero(weight)
         node = nearest[point, column]
         sides = begins[node + 1] - begins[node]
-        source, carrier = ranges(begins[node], sides), np.repeat(weight[point, column], sides)
-        point, edge = np.repeat(point, sides), np.flatnonzero(np.repeat(sides > 1, sides))
+        source = ranges(begins[node], sides)
+        carrier = np.repeat(weight[point, column], sides)
+        point = np.repeat(point, sides)
+        edge = np.flatnonzero(np.repeat(sides > 1, sides))
         # Of the sides of an edge, those that see the point carry it.
         own = source[edge, None]
         seen = self._seen(targets[point[edge]], own, (self.offsets[own], self.offsets[own + 1]))
@@ -296,7 +312,9 @@ def _largest_cosines(targets, places, source, begin, end, normals, out):  # type
     """
     for m in range(len(source)):
         for c in range(source.shape[1]):
-            s, largest, squared = source[m, c], -np.inf, 0.0
+            s = source[m, c]
+            largest = -np.inf
+            squared = 0.0
             for d in range(targets.shape[1]):
                 squared += (targets[m, d] - places[s, d]) ** 2
             for k in range(begin[m, c], end[m, c]):
@@ -311,10 +329,12 @@ def _shared(parts: list[Reached]) -> list[Reached]:
     """Return the parts of the walls with less share where another wall is as near, or nearer."""
     size = [len(part[0]) for part in parts]
     point, gap, share, each = map(np.concatenate, zip(*parts, strict=True))
-    order, left = np.argsort(point, kind="stable"), np.ones(len(point))
+    order = np.argsort(point, kind="stable")
+    left = np.ones(len(point))
     apart = 1
     while len(at := np.flatnonzero(point[order[apart:]] == point[order[: len(order) - apart]])):
-        one, two = order[at], order[at + apart]
+        one = order[at]
+        two = order[at + apart]
         middle = gap[one] + gap[two]
         left[one] *= 1.0 - share[two] * smooth(2.0 * gap[one] / middle)
         left[two] *= 1.0 - share[one] * smooth(2.0 * gap[two] / middle)
@@ -370,12 +390,17 @@ def wall_nodes(
     place = np.full(len(coords), -1)
     place[known] = np.arange(len(known))
     shifts = [0, -1, 1] if np.any(frame.shift()) else [0]
-    nodes, facets, rows, parts, corners = [], [], [], [], []
+    nodes = []
+    facets = []
+    rows = []
+    parts = []
+    corners = []
     first = begin = 0
     for wall in walls:
         most = int(wall.sides.max()) + 1
         keys, local = np.unique(wall.facets * most + wall.sides, return_inverse=True)
-        some, local = keys // most, local.reshape(wall.facets.shape)
+        some = keys // most
+        local = local.reshape(wall.facets.shape)
         heads = np.flatnonzero(np.r_[True, some[1:] != some[:-1]])
         if wall.moves:
             facets.append(first + local)
@@ -386,8 +411,10 @@ def wall_nodes(
         rows.append(np.tile(first + np.arange(len(some)), len(shifts)))
         corners.append(np.repeat(shifts, len(some)))
         nodes.append(some)
-        first, begin = first + len(some), begin + size
-    which, by = np.concatenate(nodes), np.concatenate(corners)
+        first = first + len(some)
+        begin = begin + size
+    which = np.concatenate(nodes)
+    by = np.concatenate(corners)
     origin = np.concatenate(rows)
     at = coords[which[origin]] + by[:, None] * frame.shift()
     sources = frame.points(at)
@@ -412,11 +439,13 @@ def wall_nodes(
 def _turns(frame: Frame, periods: IntArray) -> FloatArray:
     """Return the rotations (s, d, d) about the axis of a frame by whole periods (s,)."""
     assert frame.axis is not None
-    basis, angle = axis_basis(frame.axis), periods * frame.period
+    basis = axis_basis(frame.axis)
+    angle = periods * frame.period
     local = np.zeros((len(periods), 3, 3))
     local[:, 0, 0] = local[:, 1, 1] = np.cos(angle)
     local[:, 1, 0] = np.sin(angle)
-    local[:, 0, 1], local[:, 2, 2] = -local[:, 1, 0], 1.0
+    local[:, 0, 1] = -local[:, 1, 0]
+    local[:, 2, 2] = 1.0
     turns = np.einsum("ka,skl,lb->sab", basis, local, basis)
     turns[periods == 0] = np.eye(3)
     return turns[:, : frame.dim, : frame.dim]

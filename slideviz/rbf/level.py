@@ -94,7 +94,8 @@ def newton(
                 continue
             b = block[row]
             here = slice(stops[b] - len(schur[b]), stops[b])
-            k, local = used[b], row - here.start
+            k = used[b]
+            local = row - here.start
             # The matrix is symmetric, and a row of it lies together.
             v = schur[b][local] - basis[b][:, :k] @ basis[b][local, :k]
             v /= np.sqrt(pivot[row])
@@ -117,7 +118,8 @@ def tie_breaker(coords: FloatArray) -> FloatArray:
     if not len(coords):
         return np.empty(0)
     along = coords @ np.array([1.0, 0.6180339887, 0.4142135624])[: coords.shape[1]]
-    low, high = along.min(), along.max()
+    low = along.min()
+    high = along.max()
     return 1.0 + TIE * (along - low) / max(high - low, 1e-300)
 
 
@@ -183,7 +185,9 @@ class LevelLimit:
 
     def __init__(self, error: float, budget: float) -> None:
         self.budget = budget  # how many rows all levels together may choose
-        self._lowest, self._losses, self._spent = error, 0, 0.0
+        self._lowest = error
+        self._losses = 0
+        self._spent = 0.0
 
     def ends(self, error: float, cost: float) -> bool:
         """Tell, after one more level, whether the next one should be the last.
@@ -260,7 +264,8 @@ class GrowingFactor:
         self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
     ) -> None:
         """Append p rows to the factor: L21 is ``beside`` (p, k), L22 is ``corner`` (p, p)."""
-        n, more = len(self.rows), len(rows)
+        n = len(self.rows)
+        more = len(rows)
         if n + more > len(self._store):
             # Room for twice as much: copying the factor in every cycle would cost as much as
             # computing it.
@@ -300,10 +305,13 @@ class GreedyLevel:
         self, problem: Problem, candidates: Candidates, previous_levels: Interpolant
     ) -> None:
         """Begin without rows, after levels whose sum is ``previous_levels``."""
-        self._problem, self._among, self.previous_levels = problem, candidates, previous_levels
+        self._problem = problem
+        self._among = candidates
+        self.previous_levels = previous_levels
         # Only positive definite functions have pivots. For the others the default one tells
         # which nodes add most, and the weights come from the system with the polynomial.
-        self._saddle, self.singular = problem.basis.saddle, False
+        self._saddle = problem.basis.saddle
+        self.singular = False
         self._basis = replace(problem.basis, kernel=PLAIN) if self._saddle else problem.basis
         self._terms = self._terms_of(candidates)
         self.increment = Interpolant(np.empty(0, np.int64), np.empty((0, problem.dim)))
@@ -356,7 +364,8 @@ class GreedyLevel:
 
     def _rows(self, target: FloatArray) -> ConstraintRows:
         """Return the chosen rows, with their data from the target (r, m)."""
-        all_, chosen = self._among.rows, self.chosen
+        all_ = self._among.rows
+        chosen = self.chosen
         normals = None if all_.directions is None else all_.directions[chosen]
         return ConstraintRows(all_.nodes[chosen], normals, target[chosen])
 
@@ -366,7 +375,8 @@ class GreedyLevel:
         if self._saddle:
             found, self.singular = saddle_fit(self._problem, rows)
         else:
-            weights, tail = np.empty_like(rows.data), None
+            weights = np.empty_like(rows.data)
+            tail = None
             if self._terms.size:
                 forward = np.concatenate([factor.forward for factor in self._grown])
                 chosen = np.concatenate([factor.rows for factor in self._grown])
@@ -391,9 +401,11 @@ class GreedyLevel:
         """
         among = self._among
         order = np.argsort(among.block[rows], kind="stable")
-        rows, residual = rows[order], residual[order]
+        rows = rows[order]
+        residual = residual[order]
         parts = [rows[among.block[rows] == b] for b in range(len(self._grown))]
-        left, schur = [], []
+        left = []
+        schur = []
         for factor, part in zip(self._grown, parts, strict=True):
             beside, rest = self._remaining(factor, part)
             left.append(beside)
@@ -409,7 +421,8 @@ class GreedyLevel:
         )
         diagonal = np.concatenate([np.diag(s) for s in schur])
         self.excluded[rows[diagonal <= PIVOT_GUARD]] = True
-        turn, start = len(self.chosen) + np.arange(len(picked)), 0
+        turn = len(self.chosen) + np.arange(len(picked))
+        start = 0
         for k, factor in enumerate(self._grown):
             mine = (picked >= start) & (picked < start + len(parts[k]))
             at = picked[mine] - start
@@ -441,7 +454,8 @@ class GreedyLevel:
 
     def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return L^-1 G of p rows of the factor's block, (k, p), and their Schur complement."""
-        nodes, normals = self._among.rows.nodes, self._among.rows.directions
+        nodes = self._among.rows.nodes
+        normals = self._among.rows.directions
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
             features = self._problem.place(nodes[index])

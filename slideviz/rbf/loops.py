@@ -28,7 +28,8 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
         for k in range(by.shape[0]):
             for i in range(task * BLOCK, min(n, (task + 1) * BLOCK)):
                 for j in range(by.shape[2]):
-                    u, x = by[k, i, j], start[i, j]
+                    u = by[k, i, j]
+                    x = start[i, j]
                     # Adding zero would turn -0.0 into 0.0.
                     by[k, i, j] = x if u == 0.0 else x + u
 
@@ -116,25 +117,33 @@ def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[n
     """Do what ``to_points`` does, for k designs; ``rate`` is 1 / ``frame.radius``."""
     n, d = coords.shape[1:]
     for task in prange((n + BLOCK - 1) // BLOCK):
-        first, last = task * BLOCK, min(n, (task + 1) * BLOCK)
-        cos, sin = np.empty(BLOCK), np.empty(BLOCK)
+        first = task * BLOCK
+        last = min(n, (task + 1) * BLOCK)
+        cos = np.empty(BLOCK)
+        sin = np.empty(BLOCK)
         for i in range(first, last):
             angle = start[i, 1] * rate + theta0
             cos[i - first], sin[i - first] = np.cos(angle), np.sin(angle)
         for k in range(coords.shape[0]):
             for i in range(first, last):
-                x0, x1, x2 = coords[k, i, 0], coords[k, i, 1], 0.0
+                x0 = coords[k, i, 0]
+                x1 = coords[k, i, 1]
+                x2 = 0.0
                 if d == 3:
                     x2 = coords[k, i, 2]
                 if x0 == start[i, 0] and x1 == start[i, 1] and (d == 2 or x2 == start[i, 2]):
                     coords[k, i] = before[i]
                     continue
-                by, c, s = (x1 - start[i, 1]) * rate, cos[i - first], sin[i - first]
+                by = (x1 - start[i, 1]) * rate
+                c = cos[i - first]
+                s = sin[i - first]
                 if abs(by) <= NEAR:
                     c, s = c * _cosine(by) - s * _sine(by), s * _cosine(by) + c * _sine(by)
                 else:
-                    c, s = np.cos(x1 * rate + theta0), np.sin(x1 * rate + theta0)
-                a, b = x0 * c, x0 * s
+                    c = np.cos(x1 * rate + theta0)
+                    s = np.sin(x1 * rate + theta0)
+                a = x0 * c
+                b = x0 * s
                 for j in range(d):
                     coords[k, i, j] = (
                         a * basis[0, j] + b * basis[1, j] + x2 * basis[2, j] + origin[j]

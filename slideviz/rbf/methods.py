@@ -85,13 +85,15 @@ def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
     """
     fit = _fit(problem, timer)
     fit.add(full_rows(problem, problem.known, problem.values))
-    nodes, values = problem.known, problem.values
+    nodes = problem.known
+    values = problem.values
     for level in (problem.edge, problem.surface):
         if len(level):
             slid = _slide(problem, timer, fit, level)
             # A node that coincides with one of an earlier level is in the system already.
             new = np.flatnonzero(~np.isin(problem.same_as[level], problem.same_as[nodes]))
-            nodes, values = np.concatenate([nodes, level]), join(values, slid)
+            nodes = np.concatenate([nodes, level])
+            values = join(values, slid)
             merge(problem, nodes, values)
             fit.add(full_rows(problem, level[new], take(slid, new)))
     return _finish(problem, timer, fit, nodes, values)
@@ -139,7 +141,8 @@ def within(problem: Problem, nodes: IntArray, free: Array) -> Array:
     row = np.full(len(problem.same_as), -1)
     row[nodes] = np.arange(len(nodes))
     at = row[problem.normal_nodes]
-    normals, at = take(problem.normals, np.flatnonzero(at >= 0)), at[at >= 0]
+    normals = take(problem.normals, np.flatnonzero(at >= 0))
+    at = at[at >= 0]
     return add_at(free, at, -multiply(normals, dot(take(free, at), normals)))
 
 
@@ -196,7 +199,8 @@ def _finish(
     """Return the solution, exact at ``nodes`` (b,) by ``values``; elsewhere errors are spread."""
     displacement = _at(problem, timer, fit, slice(None))
     errors = values - take(displacement, nodes)
-    total, carried = problem.carried_error(nodes) + errors, None
+    total = problem.carried_error(nodes) + errors
+    carried = None
     if problem.reduction is not None:
         order = np.argsort(nodes)
         carried = CarriedError(nodes[order], take(total, order))
@@ -256,10 +260,12 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     # Nodes that coincide, or are images of each other, count once.
     once = np.unique(problem.same_as[nodes], return_index=True)[1]
     at = value(problem.coords)[nodes[once]]
-    sources, lacking = problem.cartesian(at), errors[once]
+    sources = problem.cartesian(at)
+    lacking = errors[once]
     if np.any(problem.shift):
         images = [problem.cartesian(at + s * problem.shift) for s in IMAGES[1:]]
-        sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
+        sources = np.concatenate([sources, *images])
+        lacking = np.tile(lacking, (3, 1))
     from scipy.spatial import cKDTree  # takes long to load
 
     return Correction(cKDTree(sources), lacking, radius)

@@ -82,7 +82,8 @@ def _converted(
 
 def add_displacement(start: Array, by: Array, *, overwrite: bool = False) -> Array:
     """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
-    x, u = value(start), value(by)
+    x = value(start)
+    u = value(by)
     out = shift(x, u if overwrite else u.copy())
     return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
@@ -101,11 +102,13 @@ def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
     """Return what ``difference`` does, where ``start`` may be a variable, too."""
     if not frame.cylindrical:
         return vectors
-    x, v = value(start), value(vectors)
+    x = value(start)
+    v = value(vectors)
     out = frame.difference(flat(np.broadcast_to(x, v.shape)), flat(v)).reshape(v.shape)
     if not any(isinstance(part, Variable) for part in (start, vectors)):
         return out
-    here, there = coords_slopes(frame, x), coords_slopes(frame, x + v)
+    here = coords_slopes(frame, x)
+    there = coords_slopes(frame, x + v)
     return recorded(out, _by_rows(start, there - here), _by_rows(vectors, there))
 
 
@@ -139,7 +142,9 @@ def radial_sum(
     ``weights`` (..., n, d).
     ``out`` (..., N, d): where the sums of several designs are written.
     """
-    x, c, w = value(targets), value(controls), value(weights)
+    x = value(targets)
+    c = value(controls)
+    w = value(weights)
 
     def turned(g: FloatArray) -> FloatArray:
         return many(basis, c, x, g)
@@ -178,7 +183,8 @@ def many(
     """Return the values of `radial_sum`; each radial function is computed once for all weights."""
     if weights.ndim == 2:
         return evaluate(basis, targets, controls, weights, tick)
-    ahead, (n, d) = weights.shape[:-2], weights.shape[-2:]
+    ahead = weights.shape[:-2]
+    (n, d) = weights.shape[-2:]
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d)) if out is None else out

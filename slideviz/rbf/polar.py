@@ -42,7 +42,8 @@ def nearest_rotations(matrices: Array, d: int) -> Array:
 
 def rotations(matrices: FloatArray) -> FloatArray:
     """Return the rotations nearest to matrices (m, d, d)."""
-    m, out = sealed(np.ascontiguousarray(matrices)), np.empty(matrices.shape)
+    m = sealed(np.ascontiguousarray(matrices))
+    out = np.empty(matrices.shape)
     in_parts(lambda part: _rotate_all(m[part], out[part]), len(m))
     return out
 
@@ -62,7 +63,8 @@ def rotation_slopes(matrices: FloatArray, turned: FloatArray, directions: FloatA
 
 @njit(**OPTIONS)
 def _rotate_all(m, out):  # type: ignore[no-untyped-def]
-    work, vectors = np.empty((4, 4)), np.empty((4, 4))
+    work = np.empty((4, 4))
+    vectors = np.empty((4, 4))
     for e in range(len(m)):
         rotation(m[e], out[e], work, vectors)
 
@@ -70,7 +72,9 @@ def _rotate_all(m, out):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _change_all(m, r, t, out):  # type: ignore[no-untyped-def]
     d = m.shape[1]
-    s, a, omega = np.empty((d, d)), np.empty(3), np.empty(3)
+    s = np.empty((d, d))
+    a = np.empty(3)
+    omega = np.empty(3)
     for e in range(len(m)):
         stretch(m[e], r[e], s)
         for k in range(3):
@@ -113,11 +117,18 @@ def spin(s, a, omega):  # type: ignore[no-untyped-def]
         if trace > 0.0:
             omega[2] = a[2] / trace
         return
-    b00, b11, b22 = s[1, 1] + s[2, 2], s[0, 0] + s[2, 2], s[0, 0] + s[1, 1]
-    b01, b02 = -0.5 * (s[0, 1] + s[1, 0]), -0.5 * (s[0, 2] + s[2, 0])
+    b00 = s[1, 1] + s[2, 2]
+    b11 = s[0, 0] + s[2, 2]
+    b22 = s[0, 0] + s[1, 1]
+    b01 = -0.5 * (s[0, 1] + s[1, 0])
+    b02 = -0.5 * (s[0, 2] + s[2, 0])
     b12 = -0.5 * (s[1, 2] + s[2, 1])
-    c00, c01, c02 = b11 * b22 - b12 * b12, b02 * b12 - b01 * b22, b01 * b12 - b02 * b11
-    c11, c12, c22 = b00 * b22 - b02 * b02, b01 * b02 - b00 * b12, b00 * b11 - b01 * b01
+    c00 = b11 * b22 - b12 * b12
+    c01 = b02 * b12 - b01 * b22
+    c02 = b01 * b12 - b02 * b11
+    c11 = b00 * b22 - b02 * b02
+    c12 = b01 * b02 - b00 * b12
+    c22 = b00 * b11 - b01 * b01
     det = b00 * c00 + b01 * c01 + b02 * c02
     size = b00 + b11 + b22
     if det > UNIQUE * size * size * size:
@@ -130,10 +141,14 @@ def spin(s, a, omega):  # type: ignore[no-untyped-def]
 def rotation(m, r, work, vectors):  # type: ignore[no-untyped-def]
     """Write the rotation nearest to m (d, d) to r; ``work`` and ``vectors`` (4, 4) are scratch."""
     if len(m) == 2:
-        c, s = m[0, 0] + m[1, 1], m[1, 0] - m[0, 1]
+        c = m[0, 0] + m[1, 1]
+        s = m[1, 0] - m[0, 1]
         size = np.hypot(c, s)
         c, s = (c / size, s / size) if size > 0.0 else (1.0, 0.0)
-        r[0, 0], r[0, 1], r[1, 0], r[1, 1] = c, -s, s, c
+        r[0, 0] = c
+        r[0, 1] = -s
+        r[1, 0] = s
+        r[1, 1] = c
         return
     work[0, 0] = m[0, 0] + m[1, 1] + m[2, 2]
     work[1, 1] = m[0, 0] - m[1, 1] - m[2, 2]
@@ -147,14 +162,24 @@ def rotation(m, r, work, vectors):  # type: ignore[no-untyped-def]
     for k in range(1, 4):
         if work[k, k] > work[best, best]:
             best = k
-    w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
+    w = vectors[0, best]
+    x = vectors[1, best]
+    y = vectors[2, best]
+    z = vectors[3, best]
     size = np.sqrt(w * w + x * x + y * y + z * z)
-    w, x, y, z = w / size, x / size, y / size, z / size
-    r[0, 0], r[1, 1] = 1.0 - 2.0 * (y * y + z * z), 1.0 - 2.0 * (x * x + z * z)
+    w = w / size
+    x = x / size
+    y = y / size
+    z = z / size
+    r[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    r[1, 1] = 1.0 - 2.0 * (x * x + z * z)
     r[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-    r[0, 1], r[1, 0] = 2.0 * (x * y - w * z), 2.0 * (x * y + w * z)
-    r[0, 2], r[2, 0] = 2.0 * (x * z + w * y), 2.0 * (x * z - w * y)
-    r[1, 2], r[2, 1] = 2.0 * (y * z - w * x), 2.0 * (y * z + w * x)
+    r[0, 1] = 2.0 * (x * y - w * z)
+    r[1, 0] = 2.0 * (x * y + w * z)
+    r[0, 2] = 2.0 * (x * z + w * y)
+    r[2, 0] = 2.0 * (x * z - w * y)
+    r[1, 2] = 2.0 * (y * z - w * x)
+    r[2, 1] = 2.0 * (y * z + w * x)
 
 
 @njit(**OPTIONS)
@@ -189,7 +214,11 @@ def _eigenvectors(a, v):  # type: ignore[no-untyped-def]
                     if k != p and k != q:
                         i, j = (k, p) if k < p else (p, k)
                         n, m = (k, q) if k < q else (q, k)
-                        one, two = a[i, j], a[n, m]
-                        a[i, j], a[n, m] = c * one - s * two, s * one + c * two
-                    one, two = v[k, p], v[k, q]
-                    v[k, p], v[k, q] = c * one - s * two, s * one + c * two
+                        one = a[i, j]
+                        two = a[n, m]
+                        a[i, j] = c * one - s * two
+                        a[n, m] = s * one + c * two
+                    one = v[k, p]
+                    two = v[k, q]
+                    v[k, p] = c * one - s * two
+                    v[k, q] = s * one + c * two

@@ -162,7 +162,8 @@ class Problem:
         They are those of the previous step. The array is empty if the selection has several levels,
         or if the previous step has ``max_nodes`` control nodes, so that none could be added.
         """
-        settings, before = self.reduction, self.before
+        settings = self.reduction
+        before = self.before
         if settings is None or before is None or settings.multilevel:
             return np.empty(0, np.int64)
         full = settings.max_nodes is not None and len(before.control) >= settings.max_nodes
@@ -179,7 +180,8 @@ class CarriedError:
     def at(self, nodes: IntArray) -> Array:
         """Return the errors (..., m, d) at nodes (m,); zero at nodes that are not in ``nodes``."""
         row = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
-        errors, outside = take(self.values, row), np.flatnonzero(self.nodes[row] != nodes)
+        errors = take(self.values, row)
+        outside = np.flatnonzero(self.nodes[row] != nodes)
         nothing = np.zeros((len(outside), value(errors).shape[-1]))
         return put(errors, outside, nothing) if len(outside) else errors
 

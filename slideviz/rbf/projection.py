@@ -48,7 +48,8 @@ def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray)
     m, count, d = corners.shape
     size = np.ptp(corners, axis=1).max(axis=1)
     near = CLOSE * np.linalg.norm(x - closest, axis=1) + ROUNDING * size
-    out, done = np.zeros((m, d, d)), np.zeros(m, bool)
+    out = np.zeros((m, d, d))
+    done = np.zeros(m, bool)
     if count == 3:
         out, done = _facets(corners, x, closest, near)
     sides = [(0, 1)] if count == 2 else [(0, 1), (1, 2), (2, 0)]
@@ -73,7 +74,8 @@ def _facets(
     They apply where the foot on the plane is within ``near`` (m,) of the closest point; elsewhere
     the matrix is zero.
     """
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    one = corners[:, 1] - corners[:, 0]
+    two = corners[:, 2] - corners[:, 0]
     normal = np.cross(one, two)
     area = np.linalg.norm(normal, axis=1)
     flat = area > 0
@@ -195,7 +197,8 @@ def across_period(
     glued[representative[representative != np.arange(len(representative))]] = True
     across = glued[representative[boundary.facets]].any(axis=1)
     across &= _role_numbers(boundary, roles) != ROLE_NUMBER["periodic"]
-    facets, count = np.flatnonzero(across), len(across)
+    facets = np.flatnonzero(across)
+    count = len(across)
     pairs, nodes = find_joints(representative[boundary.facets[facets]], boundary.dim)
     pairs = np.sort(facets[pairs[glued[nodes].all(axis=1)]], axis=1)
     beside = boundary.joints[across[boundary.joints].all(axis=1)]
@@ -233,12 +236,14 @@ def surface_labels(
         along > np.cos(np.radians(angle_deg)),
         (role[a] == role[b]) & (along > np.cos(np.radians(angle_deg * MERGE_FRACTION))),
     )
-    a, b = a[smooth], b[smooth]
+    a = a[smooth]
+    b = b[smooth]
     if across is not None:
         one, two = across.T
         along = np.einsum("jd,jd->j", normal[one], normal[two])
         smooth = (role[one] == role[two]) & (along > np.cos(np.radians(angle_deg)))
-        a, b = np.concatenate([a, one[smooth]]), np.concatenate([b, two[smooth]])
+        a = np.concatenate([a, one[smooth]])
+        b = np.concatenate([b, two[smooth]])
     return components(len(boundary.facets), a, b)
 
 
@@ -256,7 +261,8 @@ def _by_surfaces(
     rows = np.isin(row_node, wanted)
     pairs = np.unique(np.stack([row_node[rows], row_label[rows]], axis=1), axis=0)
     several = np.bincount(pairs[:, 0], minlength=1)[pairs[:, 0]] > 1
-    single, more = pairs[~several], pairs[several]
+    single = pairs[~several]
+    more = pairs[several]
     groups = {(int(label),): single[single[:, 1] == label, 0] for label in np.unique(single[:, 1])}
     together: dict[tuple[int, ...], list[int]] = {}
     for node in np.unique(more[:, 0]):
@@ -305,7 +311,8 @@ def _edge_chains(
     is_edge[classes.edge] = True
     order = np.flatnonzero(is_edge[fans.node])
     key = fans.facet[order] * len(is_edge) + fans.node[order]
-    order, key = order[np.argsort(key)], np.sort(key)
+    order = order[np.argsort(key)]
+    key = np.sort(key)
     keep = np.zeros(len(boundary.joints), bool)
     for column in range(boundary.joint_nodes.shape[1]):
         near = np.flatnonzero(is_edge[boundary.joint_nodes[:, column]])

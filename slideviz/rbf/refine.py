@@ -32,7 +32,8 @@ the solution is refined, and where refinement does not help the user is warned."
 
 NOTED = 1e-3  # up to this part the warning is a note
 
-SETTLED, VERIFIED = 1e-4 * TRUSTED, 1e-3 * TRUSTED
+SETTLED = 1e-4 * TRUSTED
+VERIFIED = 1e-3 * TRUSTED
 """Conjugate gradients end when a step changes the field by less than the first part of the largest
 displacement; refinement ends when the field's error is below the second."""
 
@@ -48,7 +49,8 @@ DENSE = 4000  # rows of the largest system that is factorised with twice the dig
 SLOW = 0.3
 """Refinement ends after a round whose error is above this part of the error of the round before."""
 
-ROUNDS, STEPS = 4, 40
+ROUNDS = 4
+STEPS = 40
 """Most rounds of a refinement, each with a new residual, and most conjugate gradient steps of a
 round."""
 
@@ -125,7 +127,8 @@ class System:
         where the field does not show errors in the weights of nodes that nearly coincide. The doubt
         is then the largest change of a weight in the last round, as a part of the largest weight.
         """
-        weights, low = start.copy(), np.zeros_like(start)
+        weights = start.copy()
+        low = np.zeros_like(start)
         residuals = self._residuals()
         size = np.where(largest > 0.0, largest, 1.0)
         error_estimate = np.full(len(size), np.inf)
@@ -181,9 +184,13 @@ class System:
         if (factor := self._double_factor(tick)) is not None:
             exact = factor.solve(lacking)
             return exact, self._field(exact)
-        full_factor, residuals, r = self._full_factor(), self._residuals(), lacking.copy()
-        total, z = np.zeros_like(r), full_factor.solve(r)
-        p, rz = z.copy(), (r * z).sum(axis=0)
+        full_factor = self._full_factor()
+        residuals = self._residuals()
+        r = lacking.copy()
+        total = np.zeros_like(r)
+        z = full_factor.solve(r)
+        p = z.copy()
+        rz = (r * z).sum(axis=0)
         field_error = self._field(z)
         on = np.flatnonzero(((field_error > VERIFIED * size) | of_weights) & (rz > 0.0))
         for _ in range(STEPS):
@@ -192,7 +199,9 @@ class System:
             nothing = np.zeros_like(p[:, on])
             q = residuals(nothing, -p[:, on], nothing, tick)
             curved = (p[:, on] * q).sum(axis=0)
-            on, q, curved = on[curved > 0.0], q[:, curved > 0.0], curved[curved > 0.0]
+            on = on[curved > 0.0]
+            q = q[:, curved > 0.0]
+            curved = curved[curved > 0.0]
             change = p[:, on] * (rz[on] / curved)
             total[:, on] += change
             r[:, on] -= q * (rz[on] / curved)
@@ -249,16 +258,19 @@ def with_dropped_rows(
 
     Ten times `SHIFT`, and so on, where the rows are not positive definite with that.
     """
-    kept, dropped = factor.retained, factor.dropped
+    kept = factor.retained
+    dropped = factor.dropped
     features, normals = place
     outside = features[:, dropped], None if normals is None else normals[dropped]
     rows = matrix(basis, outside, place)
-    k, n = len(kept), len(kept) + len(dropped)
+    k = len(kept)
+    n = len(kept) + len(dropped)
     with enough_threads(2.0 * k * k * len(dropped)):
         beside = solve_lower(factor.lower, rows[:, kept].T).T
         rest = rows[:, dropped] - beside @ beside.T
         lower = np.zeros((n, n), order="F")
-        lower[:k, :k], lower[k:, :k] = factor.lower, beside
+        lower[:k, :k] = factor.lower
+        lower[k:, :k] = beside
         shift = SHIFT
         while True:
             try:

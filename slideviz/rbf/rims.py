@@ -146,7 +146,8 @@ class Bodies:
         from scipy.sparse import coo_array, diags_array
         from scipy.sparse.linalg import splu
 
-        count, (one, two) = len(self.share), self.edges.T
+        count = len(self.share)
+        (one, two) = self.edges.T
         links = coo_array((self.weights, (one, two)), (count, count)).tocsr()
         links = links + links.T
         rows = (diags_array(links.sum(axis=1)) - links).tocsr()[self.inner]
@@ -169,7 +170,8 @@ class Bodies:
 
     def spread(self, of_rim: FloatArray) -> FloatArray:
         """Return the correction (..., b, d) of all places, of that of the rim (..., r, d)."""
-        ahead, dim = of_rim.shape[:-2], of_rim.shape[-1]
+        ahead = of_rim.shape[:-2]
+        dim = of_rim.shape[-1]
         out = np.zeros((*ahead, len(self.share), dim))
         out[..., self.rim, :] = of_rim
         if len(self.inner) and of_rim.any():
@@ -180,7 +182,8 @@ class Bodies:
 
     def gathered(self, adjoint: FloatArray) -> FloatArray:
         """Return the transpose of `spread`, (..., r, d), of an adjoint (..., b, d)."""
-        ahead, dim = adjoint.shape[:-2], adjoint.shape[-1]
+        ahead = adjoint.shape[:-2]
+        dim = adjoint.shape[-1]
         out = adjoint[..., self.rim, :]
         if len(self.inner):
             solve, columns = self._harmonic
@@ -228,7 +231,8 @@ class Rims:
         Of those that are on other walls, too, from the plane of the wall: where they leave
         another, this one ends.
         """
-        at, corner = self.frame.coords(points), self.walls_of[wall.rows] > 1
+        at = self.frame.coords(points)
+        corner = self.walls_of[wall.rows] > 1
         there = np.where(corner[:, None], wall.across(at), wall.closest(at)[0])
         return np.asarray(np.linalg.norm(self.frame.points(there) - points, axis=1))
 
@@ -260,13 +264,16 @@ class Rims:
         else:
             off = exact
         more = self._spread(self.bodies, off)
-        x, by = value(at), value(more)
+        x = value(at)
+        by = value(more)
         # Adding zero would turn -0.0 into 0.0.
         return recorded(np.where(by == 0.0, x, x + by), (at, _same, _same), (more, _same, _same))
 
     def _spread(self, bodies: Bodies, of_rim: Array) -> Array:
         there = np.flatnonzero(self.place >= 0)
-        place, count, size = self.place[there], len(self.place), len(bodies.share)
+        place = self.place[there]
+        count = len(self.place)
+        size = len(bodies.share)
 
         def spread(x: FloatArray) -> FloatArray:
             out = np.zeros((*x.shape[:-2], count, x.shape[-1]))
@@ -287,14 +294,17 @@ class Rims:
         a point that is on all of them: each time to the closest one of their tangent planes.
         """
         count, dim = at.shape
-        closest, slopes = at.copy(), np.zeros((count, dim, dim))
+        closest = at.copy()
+        slopes = np.zeros((count, dim, dim))
         for wall in self.walls:
             rows = wall.rows[self.walls_of[wall.rows] == 1]
             closest[rows], slopes[rows] = wall.closest(at[rows])
-        corners, enough = np.flatnonzero(self.walls_of > 1), ENOUGH * largest_coordinate(self.start)
+        corners = np.flatnonzero(self.walls_of > 1)
+        enough = ENOUGH * largest_coordinate(self.start)
         for _ in range(ROUNDS if len(corners) else 0):
             across, ways = self._across(closest)
-            across, ways = across[corners], ways[corners]
+            across = across[corners]
+            ways = ways[corners]
             inverse = np.linalg.pinv(across, rcond=PARALLEL)
             step = np.einsum("cdq,cq->cd", inverse, ways)
             closest[corners] += step
@@ -310,7 +320,8 @@ class Rims:
         """
         count, dim = at.shape
         across = np.zeros((count, int(self.walls_of.max()), dim, dim))
-        ways, filled = np.zeros(across.shape[:3]), np.zeros(count, np.int64)
+        ways = np.zeros(across.shape[:3])
+        filled = np.zeros(count, np.int64)
         for wall in self.walls:
             rows = wall.rows[self.walls_of[wall.rows] > 1]
             closest, slopes = wall.closest(at[rows])
@@ -332,7 +343,8 @@ class Rims:
         at = self.start + shift[self.representative]
         now = value(self.projected(at))
         rows = rows[(now != at)[place[rows]].any(axis=1)]
-        out, change = vectors.copy(), place[rows]
+        out = vectors.copy()
+        change = place[rows]
         out[rows] += self.frame.points(now[change]) - self.frame.points(at[change])
         return out
 
@@ -344,7 +356,8 @@ def _same(x: FloatArray) -> FloatArray:
 def bulge_of(coords: FloatArray, facets: IntArray) -> float:
     """Return how far a smooth surface through nodes (n, d) may be off its facets (f, k)."""
     nodes, normals = vertex_normals(coords, facets)
-    one, two = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    one = facets.ravel()
+    two = np.roll(facets, -1, axis=1).ravel()
     ends = (unit(normals)[np.searchsorted(nodes, end)] for end in (one, two))
     first, second = ends
     off = np.einsum("ed,ed->e", coords[two] - coords[one], second - first)
@@ -366,10 +379,12 @@ def side_weights(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatA
     halves = [np.roll(facets[quads], -k, axis=1)[:, :3] for k in range(4)]
     triangles = np.concatenate([facets[~quads, :3], *halves])
     parts = np.where(np.arange(len(triangles)) < np.count_nonzero(~quads), 0.5, 0.25)
-    edges, weights = [], []
+    edges = []
+    weights = []
     for k in range(3):
         tip, one, two = np.roll(triangles, -k, axis=1).T
-        a, b = points[one] - points[tip], points[two] - points[tip]
+        a = points[one] - points[tip]
+        b = points[two] - points[tip]
         sine = np.maximum(np.linalg.norm(np.cross(a, b), axis=1), TINY)
         cotangent = np.einsum("td,td->t", a, b) / sine
         edges.append(np.stack([one, two], axis=1))

@@ -69,7 +69,9 @@ def _slope(kind, q, count):  # type: ignore[no-untyped-def]
 @njit(inline="always", **OPTIONS)
 def _sine(g):  # type: ignore[no-untyped-def]
     """Return sin g for |g| <= 2, to 1e-15."""
-    t, term, total = g * g, g, g
+    t = g * g
+    term = g
+    total = g
     for k in range(1, 12):
         term *= -t / ((2.0 * k) * (2.0 * k + 1.0))
         total += term
@@ -88,9 +90,17 @@ def _reverse(x, c, wx, wc, period_over_pi, scale, kind, out):  # type: ignore[no
         q = np.empty(BLOCK)
         first = task * TARGETS_PER_TASK
         for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
-            a0, a1, a2 = wx[0, i], wx[1, i], wx[2, i]
-            s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+            x0 = x[0, i]
+            x1 = x[1, i]
+            x2 = x[2, i]
+            x3 = x[3, i]
+            a0 = wx[0, i]
+            a1 = wx[1, i]
+            a2 = wx[2, i]
+            s0 = 0.0
+            s1 = 0.0
+            s2 = 0.0
+            s3 = 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
@@ -108,7 +118,9 @@ def _reverse(x, c, wx, wc, period_over_pi, scale, kind, out):  # type: ignore[no
                         s1 += p * (x1 - c[1, j])
                         s2 += p * (x2 - c[2, j])
                     s3 += p * (x3 - c[3, j])
-            out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
+            out[0, i] = twice * s0
+            out[1, i] = twice * s1
+            out[2, i] = twice * s2
             out[3, i] = twice * s3
 
 
@@ -121,9 +133,17 @@ def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, out):  # type: ignore
         q = np.empty(BLOCK)
         first = task * TARGETS_PER_TASK
         for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
-            d0, d1, d2, d3 = dx[0, i], dx[1, i], dx[2, i], dx[3, i]
-            s0, s1, s2 = 0.0, 0.0, 0.0
+            x0 = x[0, i]
+            x1 = x[1, i]
+            x2 = x[2, i]
+            x3 = x[3, i]
+            d0 = dx[0, i]
+            d1 = dx[1, i]
+            d2 = dx[2, i]
+            d3 = dx[3, i]
+            s0 = 0.0
+            s1 = 0.0
+            s2 = 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
@@ -142,7 +162,9 @@ def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, out):  # type: ignore
                     s0 += w[0, j] * p
                     s1 += w[1, j] * p
                     s2 += w[2, j] * p
-            out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
+            out[0, i] = twice * s0
+            out[1, i] = twice * s1
+            out[2, i] = twice * s2
 
 
 def pull_positions(
@@ -159,10 +181,12 @@ def pull_positions(
     ``targets`` (k, N), ``controls`` (k, n): features, as ``Frame.features`` gives them.
     ``adjoint`` (N, d), ``weights`` (n, d).
     """
-    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
+    x = padded_rows(targets, 4)
+    c = padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        wx, wc = padded_rows(adjoint.T, 3), padded_rows(weights.T, 3)
+        wx = padded_rows(adjoint.T, 3)
+        wc = padded_rows(weights.T, 3)
         _reverse(x, c, wx, wc, *_settings(basis), out)
     return out[: len(targets)]
 
@@ -180,7 +204,8 @@ def push_positions(
 
     ``moved`` and ``moved_controls`` (k, N), (k, n), optional: the changes; None: zero.
     """
-    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
+    x = padded_rows(targets, 4)
+    c = padded_rows(controls, 4)
     dx = np.zeros_like(x) if moved is None else padded_rows(moved, 4)
     dc = np.zeros_like(c) if moved_controls is None else padded_rows(moved_controls, 4)
     out = np.empty((3, x.shape[1]))

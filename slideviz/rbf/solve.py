@@ -98,7 +98,8 @@ def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:
 def saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return ``[[G, P], [P^T, 0]]`` with P the independent columns of terms, and their indices."""
     use = independent(terms)
-    n, q = len(matrix), len(use)
+    n = len(matrix)
+    q = len(use)
     system = np.zeros((n + q, n + q))
     system[:n, :n] = matrix
     system[:n, n:] = terms[:, use]
@@ -232,13 +233,18 @@ def _norm(apply: Callable[[FloatArray], FloatArray], n: int) -> float:
     equal runs would report different numbers. The result is that of SciPy's ``onenormest``, which
     takes long to load.
     """
-    x, signs, norm, at = np.full((n, 1), 1.0) / n, np.zeros((n, 1)), 0.0, -1
+    x = np.full((n, 1), 1.0) / n
+    signs = np.zeros((n, 1))
+    norm = 0.0
+    at = -1
     for cycle in range(NORM_CYCLES + 1):
         y = apply(x)
         found = float(np.abs(y).sum(axis=0)[0])
         if cycle and found <= norm:
             break
-        norm, before, signs = found, signs, np.where(y == 0, 1.0, np.sign(y))
+        norm = found
+        before = signs
+        signs = np.where(y == 0, 1.0, np.sign(y))
         if cycle == NORM_CYCLES or signs[:, 0] @ before[:, 0] == n:
             break
         slope = np.abs(apply(signs))[:, 0]
@@ -264,16 +270,19 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
     ``rows`` (m, n + m): the last m rows of the symmetric matrix; ``before`` is of the first n.
     """
     require_finite(rows)
-    done, more = len(before.lower), len(rows)
+    done = len(before.lower)
+    more = len(rows)
     old = rows.shape[1] - more
-    corner, dropped = rows[:, old:], np.zeros(more, bool)
+    corner = rows[:, old:]
+    dropped = np.zeros(more, bool)
     lower = np.zeros((done + more, done + more), order="F")
     lower[:done, :done] = before.lower
     if done:
         lower[done:, :done] = solve_lower(before.lower, rows[:, before.retained].T).T
     for start in range(0, more, BLOCK):
         stop = min(more, start + BLOCK)
-        here, below = slice(done + start, done + stop), slice(done + stop, None)
+        here = slice(done + start, done + stop)
+        below = slice(done + stop, None)
         panel = corner[start:, start:stop] - (
             lower[done + start :, : here.start] @ lower[here, : here.start].T
         )

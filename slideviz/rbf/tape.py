@@ -128,7 +128,8 @@ def _fitted(adjoint: FloatArray, like: FloatArray) -> FloatArray:
 
 def add(a: Array, b: Array) -> Array:
     """Return a + b; one of them may have a single column."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
     return recorded(
         x + y,
         (a, lambda t: _stretched(t, y), lambda g: _fitted(g, x)),
@@ -138,7 +139,8 @@ def add(a: Array, b: Array) -> Array:
 
 def multiply(a: Array, b: Array) -> Array:
     """Return a * b, element by element; one of them may have a single column."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
     return recorded(
         x * y,
         (a, lambda t: t * y, lambda g: _fitted(g * y, x)),
@@ -148,7 +150,8 @@ def multiply(a: Array, b: Array) -> Array:
 
 def divide(a: Array, b: Array) -> Array:
     """Return a / b, element by element; b may have a single column."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
     out = x / y
     return recorded(
         out,
@@ -170,7 +173,8 @@ def inverse(x: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Return the scalar product of each row of a with the same row of b, (..., n, 1)."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
 
     def along(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.einsum("...d,...d->...", u, v)[..., None]
@@ -205,7 +209,8 @@ def unit(x: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Return the cross product of each row of a with the same row of b, (..., n, 3)."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
     return recorded(
         np.cross(x, y),
         (a, lambda t: np.cross(t, y), lambda g: np.cross(y, g)),
@@ -225,7 +230,8 @@ def transform(matrices: FloatArray, x: Array) -> Array:
 
 def product(a: Array, b: Array) -> Array:
     """Return the matrix product of a (n, q) and b (..., q, c)."""
-    x, y = value(a), value(b)
+    x = value(a)
+    y = value(b)
     return recorded(
         x @ y,
         (a, lambda t: t @ y, lambda g: g @ np.swapaxes(y, -1, -2)),
@@ -281,7 +287,8 @@ def gather(x: Array, rows: IntArray, count: int) -> Array:
 
 def add_at(x: Array, rows: IntArray, more: Array) -> Array:
     """Return x (..., n, c) with ``more`` (..., m, c) added to rows (m,), which may repeat."""
-    v, w = value(x), value(more)
+    v = value(x)
+    w = value(more)
     out = np.array(
         np.broadcast_to(v, (*np.broadcast_shapes(v.shape[:-2], w.shape[:-2]), *v.shape[-2:]))
     )
@@ -314,7 +321,8 @@ def put(x: Array, rows: IntArray, new: Array, *, overwrite: bool = False) -> Arr
 
     ``overwrite``: whether nothing else needs the values of x, so that they may be overwritten.
     """
-    v, w = value(x), value(new)
+    v = value(x)
+    w = value(new)
     ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
     fits = overwrite and v.shape[:-2] == ahead
     out = v if fits else np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))

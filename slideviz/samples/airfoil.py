@@ -16,12 +16,14 @@ from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
 LEAST = 16  # fewest cells around the airfoil
 
-CENTRE, RADIUS = -0.06, 1.12
+CENTRE = -0.06
+RADIUS = 1.12
 """The circle: the airfoil is 12 % thick. One of radius 1.06 has a cusp for a trailing edge."""
 
 FAR = 50.0  # radius of the far field over the chord
 
-THIN, GROWTH = 1e-3, 1.25
+THIN = 1e-3
+GROWTH = 1.25
 """Height over length of the first cells of a layer, and the ratio of the heights of neighbours."""
 
 
@@ -42,7 +44,8 @@ def airfoil_mesh(size: int, variant: str) -> Mesh:
     zeta = CENTRE + RADIUS * out[:, None] * circle
     z = (zeta + 1.0 / zeta - front) / (end - front)
     number = np.arange(z.size).reshape(z.shape)
-    here, next_ = number[:-1], np.roll(number, -1, axis=1)[:-1]
+    here = number[:-1]
+    next_ = np.roll(number, -1, axis=1)[:-1]
     quads = np.stack([here, number[1:], np.roll(number, -1, axis=1)[1:], next_], axis=-1)
     sides = {"airfoil": number[0], "farfield": number[-1]}
     markers = [

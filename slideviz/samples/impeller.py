@@ -29,11 +29,14 @@ from slideviz.samples.thesis import mesh_of
 
 SIZES = (3_000, 1_000_000)  # least and largest number of cells
 BLADES = 13
-HUB, SHROUD = (0.80, 0.30, 1.0), (0.64, 0.60, 1.0)
+HUB = (0.80, 0.30, 1.0)
+SHROUD = (0.64, 0.60, 1.0)
 """Length along the axis, and radius at inflow and exit, in exit radii."""
 EDGES = (0.35, 1.35)  # place of leading and trailing edge, as `_meridional` counts, in radians
-ENDS, HOLE = (-0.5, 1.35), (-0.12, 1.1, 0.11)  # as of `BladeSection`, in chords
-ANGLES_DEG, THICKNESS = (-45.0, -30.0), (0.06, 0.05, 1.4)  # in the plane of m' and theta
+ENDS = (-0.5, 1.35)  # as of `BladeSection`, in chords
+HOLE = (-0.12, 1.1, 0.11)  # as well
+ANGLES_DEG = (-45.0, -30.0)  # in the plane of m' and theta
+THICKNESS = (0.06, 0.05, 1.4)
 SHARES = Shares(ahead=16, along=56, behind=18, beside=16, layers=12, nose=0.5, tail=0.5)
 FINE = 4001  # points with which m' is integrated
 

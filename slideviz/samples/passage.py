@@ -58,7 +58,8 @@ def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
     """Return y of the camber line at x, continued by its tangents below 0 and above 1."""
     first, last = np.tan(np.radians(section.angles_deg))
     inside = np.clip(x, 0.0, 1.0)
-    ahead, behind = np.minimum(x, 0.0), np.maximum(x - 1.0, 0.0)
+    ahead = np.minimum(x, 0.0)
+    behind = np.maximum(x - 1.0, 0.0)
     return first * (inside + ahead) + (last - first) / 2 * inside**2 + last * behind
 
 
@@ -145,7 +146,8 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     beside = round(size * shares.beside / 36)
     layers = round(size * shares.layers / 36)
     below = (size - beside) // 2
-    nose, tail = round(beside * shares.nose), round(beside * shares.tail)
+    nose = round(beside * shares.nose)
+    tail = round(beside * shares.tail)
     above = size - beside - below
     return GridCounts(ahead, along, behind, below, beside, above, layers, nose, tail)
 
@@ -180,7 +182,8 @@ def _pieces(places: tuple[float, ...], cells: tuple[int, ...]) -> FloatArray:
 
 
 WALL = 0.05  # height of the O-grid's cells at the blade, divided by that of its outermost ones
-LINE, QUADRILATERAL = 3, 9  # VTK identifiers
+LINE = 3  # VTK identifiers
+QUADRILATERAL = 9
 
 # For edges e = (ax, ay, bx, by): a x b = e S e / 2 with this matrix S.
 _CROSS = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], float)
@@ -342,7 +345,8 @@ def smooth(
             length /= 2
             if length < 1e-6:
                 return points
-        points, energy = points + length * shift, lower
+        points = points + length * shift
+        energy = lower
         if length * np.abs(shift).max() < tolerance:
             break
     return points
@@ -362,7 +366,8 @@ def _energy(xyz: FloatArray, ratio: FloatArray) -> float:
 
 def _stretch(edges: FloatArray, ratio: FloatArray) -> FloatArray:
     """Return the functional's numerator (k,) for edges (k, 4): rho |a|^2 + |b|^2 / rho."""
-    a, b = edges[:, :2], edges[:, 2:]
+    a = edges[:, :2]
+    b = edges[:, 2:]
     return ratio * np.einsum("ki,ki->k", a, a) + np.einsum("ki,ki->k", b, b) / ratio
 
 
@@ -373,7 +378,8 @@ def _newton_step(xyz: FloatArray, ratio: FloatArray, unknown: IntArray, n: int) 
     """
     edges = xyz.reshape(-1, 6) @ _EDGES.T
     scale = np.column_stack([ratio, ratio, 1 / ratio, 1 / ratio])
-    num, num1 = _stretch(edges, ratio), 2 * scale * edges
+    num = _stretch(edges, ratio)
+    num1 = 2 * scale * edges
     det1 = edges @ _CROSS
     det = np.einsum("ki,ki->k", edges, det1) / 2
     gradient = num1 / (2 * det)[:, None] - det1 * (num / (2 * det**2))[:, None]

@@ -43,8 +43,10 @@ from slideviz.samples.thesis import FILE, LARGEST, QUADRILATERAL, mesh_of, zone_
 TWIST_DEG = -8.0  # rotation about the stacking line at the shroud; 0 at the hub
 LEAN_DEG = -3.0
 """Shift in theta at the shroud, which moves the blade out of its old passage; 0 at the hub."""
-BUMPS, SEED = 40, 41  # number of bumps, and seed of their random places, widths and heights
-HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
+BUMPS = 40  # their number
+SEED = 41  # of their random places, widths and heights
+HEIGHT = 6e-4
+WIDTH = (3e-3, 9e-3)
 """Greatest height of a bump, and its least and greatest radius, in the mesh's length unit."""
 
 
@@ -54,8 +56,10 @@ def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> 
     ``points`` (k, 3): nodes of the blade; the axis is z. ``radii`` (float, float): radii of hub and
     shroud. ``stack_z``: z of the stacking line, which has theta = 0.
     """
-    r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
-    z, arc = points[:, 2], r * theta
+    r = np.hypot(points[:, 0], points[:, 1])
+    theta = np.arctan2(points[:, 1], points[:, 0])
+    z = points[:, 2]
+    arc = r * theta
     span = (r - radii[0]) / (radii[1] - radii[0])
     twist = np.radians(TWIST_DEG) * span**2
     away = z - stack_z
@@ -69,11 +73,13 @@ def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> 
 def _bumps(points: FloatArray) -> FloatArray:
     """Return the sum (k,) at points (k, 3) of Gaussian bumps along theta, placed randomly."""
     random = np.random.default_rng(SEED)
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     total = np.zeros(len(points))
     for _ in range(BUMPS):
         centre = random.uniform(low, high)
-        width, height = random.uniform(*WIDTH), random.uniform(-HEIGHT, HEIGHT)
+        width = random.uniform(*WIDTH)
+        height = random.uniform(-HEIGHT, HEIGHT)
         near = np.sum((points - centre) ** 2, axis=1) / width**2
         total += height * np.exp(-near)
     return total
@@ -118,7 +124,8 @@ def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     y = np.linspace(0, 1, block.shape[1])
     new_x = np.linspace(0, 1, shape[0])
     new_y = np.linspace(0, 1, shape[1])
-    kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)
+    kx = min(3, len(x) - 1)
+    ky = min(3, len(y) - 1)
     columns = [
         RectBivariateSpline(x, y, block[..., k], kx=kx, ky=ky)(new_x, new_y) for k in range(2)
     ]
@@ -129,7 +136,8 @@ SIZES = (5_000, 5_000_000)  # least and largest number of cells of a mesh in mem
 BLADES = 41  # number of blades on the circumference (thesis Table 4.13)
 RADII = (0.25, 0.275, 0.3)  # radii of hub, middle and shroud (thesis Table 4.13)
 DEPTH = 0.1143  # extent of the mesh in z (thesis Table 4.13)
-LEADING_EDGE, CHORD = 0.035, 0.045  # z of the leading edge, and extent of the blade in z
+LEADING_EDGE = 0.035  # its z
+CHORD = 0.045  # extent of the blade in z
 STACK = 0.4
 """Place of the stacking line, which all sections have at theta = 0, as a part of the chord."""
 ANGLES_DEG = ((4.0, -47.0), (7.0, -50.0), (10.0, -53.0))

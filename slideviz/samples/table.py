@@ -199,7 +199,9 @@ def write_sample(
     else:
         made = sample(name, size, variant)
     folder = Path(folder)
-    mesh, table, case = folder / f"mesh.{file_format}", folder / FILE, folder / f"{name}.cfg"
+    mesh = folder / f"mesh.{file_format}"
+    table = folder / FILE
+    case = folder / f"{name}.cfg"
     paths = [mesh, *([table] if made.displacement else []), case]
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
@@ -216,7 +218,8 @@ def write_sample(
     else:
         write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
-        nodes, vectors = made.displacement.nodes.tolist(), made.displacement.vectors.tolist()
+        nodes = made.displacement.nodes.tolist()
+        vectors = made.displacement.vectors.tolist()
         with atomic_write(table, CaseError, table if overwrite else None) as file:
             for node, vector in zip(nodes, vectors, strict=True):
                 file.write(("\t".join([str(node), *map(repr, vector)]) + "\n").encode())
@@ -227,5 +230,6 @@ def write_sample(
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
     """Return the case of the sample ``name``, with files in a folder, meshes of ``ending``."""
-    mesh, out = folder / f"mesh.{ending}", folder / f"{name}_deformed.{ending}"
+    mesh = folder / f"mesh.{ending}"
+    out = folder / f"{name}_deformed.{ending}"
     return with_paths(case, folder.joinpath).change(mesh_file=mesh, mesh_out=out)

@@ -26,7 +26,9 @@ from slideviz.formats.table import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.terms import Role
 
-LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12  # VTK identifiers
+LINE = 3  # VTK identifiers
+QUADRILATERAL = 9
+HEXAHEDRON = 12
 LARGEST = 200_000_000  # most cells of a mesh that is written block by block
 
 
@@ -98,7 +100,8 @@ TRANSLATION = (-0.35, -0.43)
 """Translation of the block in the test of robustness, in five steps (Figure 4.4)."""
 FILE = Path("displacement.txt")  # name of the displacement file of a sample
 
-BLOCK_LENGTH, BLOCK_HEIGHT = 0.2, 0.04
+BLOCK_LENGTH = 0.2
+BLOCK_HEIGHT = 0.04
 """Size of the block, as parts of the domain's (thesis Tables 4.1 and 4.9)."""
 SIDES = ("LEFT", "RIGHT", "LOWER", "UPPER", "FRONT", "BACK")
 """Markers of the sides: first and last along each axis."""
@@ -161,7 +164,8 @@ def _motions(dim: int, variant: str) -> tuple[Motion, ...]:
 def _polar_shift(points: FloatArray) -> FloatArray:
     """Return the shift (k, d) by 0.2 in r, -10 degrees, 0.2 in z, which no motions describe."""
     x, y = points[:, :2].T
-    radius, angle = np.hypot(x, y) + 0.2, np.arctan2(y, x) - np.radians(10.0)
+    radius = np.hypot(x, y) + 0.2
+    angle = np.arctan2(y, x) - np.radians(10.0)
     moved = [radius * np.cos(angle) - x, radius * np.sin(angle) - y]
     return np.column_stack([*moved, np.full((len(x), points.shape[1] - 2), 0.2)])
 
@@ -239,7 +243,8 @@ class Layout:
         parts = _places(self._nodes.linear(nodes), self.n + 1, self.dim) / self.n
         if not self.polar:
             return parts
-        radius, angle = 0.2 + 0.8 * parts[:, 0], np.radians(30.0) * parts[:, 1]
+        radius = 0.2 + 0.8 * parts[:, 0]
+        angle = np.radians(30.0) * parts[:, 1]
         flat = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
         return np.column_stack([flat, 0.8 * parts[:, 2:]])
 

@@ -28,7 +28,8 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.samples.vane import AHEAD, CHORD, LENGTH, camber, camber_line, pitch, vane_layers
 from slideviz.system.jit_cache import njit
 
-ROUNDS, SWEEPS = 8, 6  # number of triangulations in `relax`, and of moves of all points with each
+ROUNDS = 8  # triangulations in `relax`
+SWEEPS = 6  # moves of all points with each
 
 SLOPE = 350.0  # k in the formula, per unit of length: the slope of h / h0 at D = 0
 WAKE = 0.3  # d on the wake, divided by the way from the trailing edge
@@ -119,7 +120,8 @@ def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
     """
     shortest = float(np.mean(np.hypot(*(np.roll(rim, -1, axis=0) - rim).T)))
     x = np.linspace(-AHEAD, LENGTH - AHEAD, SHAPE[0])
-    below, above = camber(x).min() - pitch() / 2, camber(x).max() + pitch() / 2
+    below = camber(x).min() - pitch() / 2
+    above = camber(x).max() + pitch() / 2
     y = np.linspace(below, above, SHAPE[1])
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
     far = _distance(grid.reshape(-1, 2), rim).reshape(SHAPE)
@@ -129,7 +131,8 @@ def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
     free = channel & ~around.reshape(SHAPE)
     area = pitch() * LENGTH * np.count_nonzero(free) / np.count_nonzero(channel)
     # The least m has the most triangles, and 0.3 leaves room for coarse meshes with few layers.
-    low, high = 0.3, 60.0
+    low = 0.3
+    high = 60.0
     for _ in range(50):
         middle = (low + high) / 2
         h = shortest * _growth(far[free], middle)
@@ -154,7 +157,8 @@ def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
     wake = s > CHORD
     way = s[wake] - CHORD
     spine = np.column_stack([values[wake] for values in line[:2]])
-    tree, wake_tree = cKDTree(rim), cKDTree(spine)
+    tree = cKDTree(rim)
+    wake_tree = cKDTree(spine)
     nearest = np.round((points[:, 1] - camber(points[:, 0])) / pitch())
     for k in (-1, 0, 1):
         here = np.column_stack([points[:, 0], points[:, 1] - (nearest + k) * pitch()])
@@ -163,18 +167,28 @@ def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
     return best
 
 
-LINE, TRIANGLE, QUADRILATERAL, HEXAHEDRON, PRISM = 3, 5, 9, 12, 13  # VTK identifiers
-CELLS, AROUND, LAYERS = 224_180, 1315, 25
+LINE = 3  # VTK identifiers
+TRIANGLE = 5
+QUADRILATERAL = 9
+HEXAHEDRON = 12
+PRISM = 13
+CELLS = 224_180
+AROUND = 1315
+LAYERS = 25
 """Cells of the mesh, nodes around the vane, and layers of quadrilaterals at the default size.
 
 The first two are those of thesis Tables 4.7 and 4.8; the third follows by Euler's formula.
 """
 SIZES = (5_000, 5_000_000)  # least and largest number of cells
-SPAN, TWIST_DEG = CHORD, 10.0
+SPAN = CHORD
+TWIST_DEG = 10.0
 """Length of the vane from hub to shroud in 3D, and by how much its case turns the shroud's end."""
-VANE_BOX, VANE_AXIS = ((-0.002, -0.034), (0.03, 0.006)), (0.016, -0.012)
+VANE_BOX = ((-0.002, -0.034), (0.03, 0.006))
+VANE_AXIS = (0.016, -0.012)
 """Corners of a rectangle around the vane; where the axis of the twist meets it."""
-SIZES_3D, LEVELS, TYPICAL = (10_000, 5_000_000), 4, 25_000
+SIZES_3D = (10_000, 5_000_000)
+LEVELS = 4
+TYPICAL = 25_000
 """Least and largest number of cells in 3D, and the cells along the span of a mesh of that many."""
 CALIBRATION = 1.035
 """Number of equilateral triangles to ask for, divided by that which the front then makes."""
@@ -194,7 +208,8 @@ def row_mesh(size: int) -> Mesh:
     if not SIZES[0] <= size <= SIZES[1]:
         raise CaseError(f"size {size} is out of range; a turbine row has {SIZES[0]} to {SIZES[1]}")
     scale = float(np.sqrt(size / CELLS))
-    around, layers = round(AROUND * scale), round(LAYERS * scale)
+    around = round(AROUND * scale)
+    layers = round(LAYERS * scale)
     rings = vane_layers(around, layers)
     wanted = CALIBRATION * (size - around * layers)
     sizing = find_sizing(rings[-1], wanted)
@@ -245,7 +260,8 @@ def extruded_row(size: int) -> Mesh:
         raise CaseError(f"size {size} is out of range; a turbine row in 3D has {low} to {high}")
     levels = min(round(LEVELS * (size / TYPICAL) ** (1 / 3)), size // SIZES[0])
     flat = row_mesh(size // levels)
-    count, z = len(flat.points), np.linspace(0.0, SPAN, levels + 1)
+    count = len(flat.points)
+    z = np.linspace(0.0, SPAN, levels + 1)
     points = np.column_stack([np.tile(flat.points, (levels + 1, 1)), np.repeat(z, count)])
     shift = count * np.arange(levels)[:, None, None]
 
@@ -341,7 +357,8 @@ def front_points(
     ``sizing``: the edge length, tabulated over a rectangle that contains the domain.
     ``triangles``: about how many equilateral triangles of these edge lengths fill the domain.
     """
-    first, second = fixed[edges[:, 0]], fixed[edges[:, 1]]
+    first = fixed[edges[:, 0]]
+    second = fixed[edges[:, 1]]
     along = second - first
     inward = np.column_stack([-along[:, 1], along[:, 0]])
     apexes = (first + second) / 2 + np.sqrt(3) / 2 * inward
@@ -356,11 +373,14 @@ def front_points(
 @njit(nogil=True, cache=True, error_model="numpy")
 def _size_at(x, y, low, step, table):  # type: ignore[no-untyped-def]
     """Return the edge length at (x, y), bilinear in the table of a `Sizing`; -1 outside of it."""
-    px, py = (x - low[0]) / step[0], (y - low[1]) / step[1]
+    px = (x - low[0]) / step[0]
+    py = (y - low[1]) / step[1]
     if px < 0 or py < 0 or px > table.shape[0] - 1 or py > table.shape[1] - 1:
         return -1.0
-    i, j = min(int(px), table.shape[0] - 2), min(int(py), table.shape[1] - 2)
-    u, v = px - i, py - j
+    i = min(int(px), table.shape[0] - 2)
+    j = min(int(py), table.shape[1] - 2)
+    u = px - i
+    v = py - j
     left = (1 - v) * table[i, j] + v * table[i, j + 1]
     right = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
     return (1 - u) * left + u * right
@@ -374,8 +394,10 @@ def _is_free(x, y, reach, points, buckets):  # type: ignore[no-untyped-def]
     more), the grid's lowest corner, and the width of a square.
     """
     heads, following, low, width = buckets
-    i0, i1 = int((x - reach - low[0]) / width), int((x + reach - low[0]) / width)
-    j0, j1 = int((y - reach - low[1]) / width), int((y + reach - low[1]) / width)
+    i0 = int((x - reach - low[0]) / width)
+    i1 = int((x + reach - low[0]) / width)
+    j0 = int((y - reach - low[1]) / width)
+    j1 = int((y + reach - low[1]) / width)
     for i in range(max(i0, 0), min(i1, heads.shape[0] - 1) + 1):
         for j in range(max(j0, 0), min(j1, heads.shape[1] - 1) + 1):
             k = heads[i, j]
@@ -391,9 +413,12 @@ def _fill(fixed, starts, sizing, most, turns):  # type: ignore[no-untyped-def]
     """Return the accepted points (k, 2), in the order of acceptance."""
     low, step, table, width = sizing
     n = len(fixed)
-    points, angles = np.empty((n + most, 2)), np.empty(n + most)
-    nx, ny = int(table.shape[0] * step[0] / width) + 1, int(table.shape[1] * step[1] / width) + 1
-    heads, following = np.full((nx, ny), -1), np.full(n + most, -1)
+    points = np.empty((n + most, 2))
+    angles = np.empty(n + most)
+    nx = int(table.shape[0] * step[0] / width) + 1
+    ny = int(table.shape[1] * step[1] / width) + 1
+    heads = np.full((nx, ny), -1)
+    following = np.full(n + most, -1)
     buckets = (heads, following, low, width)
     count = 0
     for k in range(n + len(starts)):
@@ -410,7 +435,8 @@ def _fill(fixed, starts, sizing, most, turns):  # type: ignore[no-untyped-def]
         reach = _size_at(points[at, 0], points[at, 1], low, step, table)
         for turn in turns:
             angle = angles[at] + turn
-            x, y = points[at, 0] + reach * np.cos(angle), points[at, 1] + reach * np.sin(angle)
+            x = points[at, 0] + reach * np.cos(angle)
+            y = points[at, 1] + reach * np.sin(angle)
             size = _size_at(x, y, low, step, table)
             if size > 0 and _is_free(x, y, NEAREST * size, points, buckets) and count < n + most:
                 angles[count] = angle
@@ -424,6 +450,8 @@ def _add(x, y, points, count, buckets):  # type: ignore[no-untyped-def]
     heads, following, low, width = buckets
     i = min(max(int((x - low[0]) / width), 0), heads.shape[0] - 1)
     j = min(max(int((y - low[1]) / width), 0), heads.shape[1] - 1)
-    points[count, 0], points[count, 1] = x, y
-    following[count], heads[i, j] = heads[i, j], count
+    points[count, 0] = x
+    points[count, 1] = y
+    following[count] = heads[i, j]
+    heads[i, j] = count
     return count + 1

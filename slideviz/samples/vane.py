@@ -14,7 +14,8 @@ from scipy.interpolate import CubicSpline
 
 from slideviz.mesh.model import FloatArray
 
-LENGTH, HEIGHT = 0.058275, 0.097982  # extents of the whole mesh in x and y (thesis Table 4.7)
+LENGTH = 0.058275  # extent of the whole mesh in x (thesis Table 4.7)
+HEIGHT = 0.097982  # in y
 AHEAD = 0.0135  # axial distance from the inflow to the leading edge, which is the origin
 CHORD = 0.0465  # length of the camber line in the vane
 ANGLES_DEG = (0.0, -68.0, -57.0)
@@ -26,7 +27,8 @@ THICKNESS = (0.06, 0.2, 1.3)
 
 The root rounds both ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind, times CHORD.
 """
-GROWTH, RATIO = 1.2, 30.0
+GROWTH = 1.2
+RATIO = 30.0
 """Largest ratio of heights in the layer, of neighbouring quadrilaterals and of last to first."""
 TOP = 0.85
 """Height of the layer's last quadrilaterals, divided by their width: about that of a triangle."""
@@ -35,7 +37,8 @@ TOP = 0.85
 @cache
 def camber_line() -> FloatArray:
     """Return arc length from the leading edge, x, y and angle of the camber line: (4, m)."""
-    ahead, behind = -1.5 * AHEAD / CHORD, 3.0
+    ahead = -1.5 * AHEAD / CHORD
+    behind = 3.0
     u = np.arange(ahead, behind, 2e-4)
     u -= u[np.argmin(np.abs(u))]
     first, last, out = np.radians(ANGLES_DEG)

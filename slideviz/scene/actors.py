@@ -14,7 +14,8 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
 VALUES = "values"  # name of the cell data by which shapes are colored
-CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
+CELL = "vtkOriginalCellIds"
+POINT = "vtkOriginalPointIds"
 """Names of cell and point data with the indices of cells and nodes in the mesh."""
 
 LIFT = 1e-4  # height at which lines of a 2D mesh are drawn above its cells, relative to its extent
@@ -87,7 +88,8 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
     point data `POINT` those of the nodes.
     """
     part = mesh.cells.take(cells)
-    nodes, place = part.nodes, np.empty(len(mesh.points), np.int64)
+    nodes = part.nodes
+    place = np.empty(len(mesh.points), np.int64)
     place[nodes] = np.arange(len(nodes))
     points = lifted(mesh.points[nodes], 0.0)
     table = pv.CellArray.from_arrays(part.offsets, place[part.connectivity])  # type: ignore[arg-type]
@@ -95,7 +97,8 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
         shape = pv.PolyData()
         shape.points = points
         shape.SetPolys(table)
-        shape.point_data[POINT], shape.cell_data[CELL] = nodes, cells
+        shape.point_data[POINT] = nodes
+        shape.cell_data[CELL] = cells
         return shape
     grid = pv.UnstructuredGrid()
     grid.points = points

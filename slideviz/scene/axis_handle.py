@@ -47,11 +47,14 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
     margin = _MARGIN * float(np.hypot(*size))
-    low, high = patch.along[0] - margin, patch.along[1] + margin
-    first, last = patch.angles[0] - margin / girth, patch.angles[1] + margin / girth
+    low = patch.along[0] - margin
+    high = patch.along[1] + margin
+    first = patch.angles[0] - margin / girth
+    last = patch.angles[1] + margin / girth
     closed = patch.is_full_ring or last - first > TURN
     if closed:
-        first, last = patch.angles[0], patch.angles[0] + TURN
+        first = patch.angles[0]
+        last = patch.angles[0] + TURN
     angle = np.linspace(first, last, int(np.ceil((last - first) / _CHORD)) + 2)
     arcs = [np.column_stack([angle, np.full(len(angle), at)]) for at in (low, high)]
     along = np.linspace(low, high, 2 if isinstance(shape, Quadric) else _SIDE)
@@ -68,7 +71,8 @@ def pixel_and_slope(
     Then whether it is steep: nearly along the line of sight, so that the place would hardly move on
     the screen. The derivative points upwards then, as a replacement.
     """
-    shape, lever = axis_shape(section), axis_shape(section).lever(section, place[1])
+    shape = axis_shape(section)
+    lever = axis_shape(section).lever(section, place[1])
     # Outwards, around and along the section: one of the three is hardly foreshortened.
     directions = shape.ways(section.sized(size), place[0])
     (here,) = shape.surface(section, np.array([place]), size)

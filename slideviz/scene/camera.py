@@ -117,7 +117,8 @@ class Camera:
         # Not concatenated: for large meshes a copy would take most of the time.
         along = (axes @ points.T for points in clouds)
         ends = np.array([(one.min(axis=1), one.max(axis=1)) for one in along])
-        low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+        low = ends[:, 0].min(axis=0)
+        high = ends[:, 1].max(axis=0)
         extent = high - low
         half = max(camera._half(extent) for camera in self._cameras())
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
@@ -136,7 +137,8 @@ class Camera:
         if len(view) < 11 or not shapes:
             return False
         along = np.concatenate([np.asarray(shape.points) @ self._axes().T for shape in shapes])
-        low, high = along.min(axis=0), along.max(axis=0)
+        low = along.min(axis=0)
+        high = along.max(axis=0)
         half = self._half(high - low, view[10])
         off = (self._axes() @ np.array(view[3:6]) - (low + high) / 2.0)[:2]
         return bool(abs(view[9] - half) < SAME * half and np.abs(off).max() < SAME * half)
@@ -189,7 +191,8 @@ class Camera:
 
         Pixels are counted from the lower left corner.
         """
-        camera, renderer = self._camera, self.stage.plotter.renderer
+        camera = self._camera
+        renderer = self.stage.plotter.renderer
         if not camera.parallel_projection:
             camera.Dolly(factor)
             renderer.ResetCameraClippingRange()
@@ -208,7 +211,8 @@ class Camera:
 
     def copy_from(self, other: Camera) -> None:
         """Copy another camera's position and projection, but not its shift beside a legend."""
-        camera, theirs = self._camera, other._camera
+        camera = self._camera
+        theirs = other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
         camera.up, camera.view_angle = theirs.up, theirs.view_angle
         camera.parallel_projection = theirs.parallel_projection
@@ -265,7 +269,8 @@ class Camera:
 
     def looks_like(self, other: Camera) -> bool:
         """Return whether another camera has the same position and projection."""
-        camera, theirs = self._camera, other._camera
+        camera = self._camera
+        theirs = other._camera
         return (
             self.place == other.place
             and camera.parallel_projection == theirs.parallel_projection

@@ -35,7 +35,8 @@ class LegendPlate:
         self.plotter = plotter
         self._scheme = scheme
         self._shape = pv.PolyData(np.zeros((4, 3)), faces=[4, 0, 1, 2, 3])
-        mapper, actor = vtkPolyDataMapper2D(), vtkActor2D()
+        mapper = vtkPolyDataMapper2D()
+        actor = vtkActor2D()
         mapper.SetInputData(self._shape)
         mapper.SetScalarModeToUsePointData()
         actor.SetMapper(mapper)
@@ -67,11 +68,16 @@ STRIP = 104
 
 _VTK_FONT_FILE = 4
 _AIR = 12.0  # margin in pixels between the color bar and the edge of its plate
-_BAR, _LONG = 20.0, 11
+_BAR = 20.0
+_LONG = 11
 """Width of the color bar in pixels; number of letters from which a title needs the whole strip."""
-_LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
+_LABEL = 14.0
+_GAP = 4.0
+_HEAD = 30.0
 """Height of a number beside the bar, distance between both, height of the title, in pixels."""
-_BOTTOM, _NAN, _INDENT = 0.16, 13.0, 4.0
+_BOTTOM = 0.16
+_NAN = 13.0
+_INDENT = 4.0
 """Lower end of the bar relative to the view's height; height in pixels of the field of inverted
 cells there; distance in pixels from the field to its text."""
 
@@ -95,7 +101,9 @@ def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
     text.SetShadow(False)
 
 
-ROLE, NODES, RING = "\u25a0", "\u25cf", "\u25cb"
+ROLE = "\u25a0"
+NODES = "\u25cf"
+RING = "\u25cb"
 """The signs at the begin of the legend's lines: of roles, of nodes, of what is marked by rings."""
 _SIGNS = {
     ROLE: ("legend:", STRIP - 28, 14),
@@ -170,7 +178,9 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
 
     ``inverted``: with a field for inverted cells at its lower end.
     """
-    scheme, font_scale, title = stage.scheme, stage.font_scale, what.label
+    scheme = stage.scheme
+    font_scale = stage.font_scale
+    title = what.label
     name, _, program = title.partition(" (")  # beside the name there is no place for the program
     words = (f"({program}" if program else "", what.unit)
     below = " ".join(filter(None, words)) if len(program) < _LONG else "\n".join(words).strip()
@@ -199,7 +209,8 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     bar.SetNanAnnotation("")
     bar.SetDrawAboveRangeSwatch(False)
     if inverted:  # VTK's own annotation would be to the bar's left, over the mesh
-        word, right = pv.Text("inverted"), STRIP - 14 - _BAR - _GAP - _INDENT
+        word = pv.Text("inverted")
+        right = STRIP - 14 - _BAR - _GAP - _INDENT
         word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))
         word.GetPositionCoordinate().SetCoordinateSystemToViewport()
         word.GetPositionCoordinate().SetValue(-right * scale, _NAN / 2.0 * scale)
@@ -217,7 +228,8 @@ def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
     about points may be. Return the rectangle of the bar and its letters, with a margin.
     """
     width, height = np.maximum(plotter.window_size, 1).tolist()
-    bar, bottom = plotter.scalar_bars[title], _BOTTOM
+    bar = plotter.scalar_bars[title]
+    bottom = _BOTTOM
     bar.SetPosition(1.0 - (STRIP - 14) * scale / width, bottom)
     # The title is centred on this width: a short one keeps away from the edge of the view.
     wide = STRIP - 20 if len(title) >= _LONG else 66

@@ -70,10 +70,12 @@ class FlatScene:
         """Draw another state of the session, or another section."""
         session = with_drawable_colors(session)
         assert session.frame is not None
-        self.session, self.section = session, section
+        self.session = session
+        self.section = section
         self.stage.set_colors(session)
         by_value = session.view.color_by != "role"
-        cut, only = self.cuts.of(session.frame.mesh, section), self.stage.in_threshold(session)
+        cut = self.cuts.of(session.frame.mesh, section)
+        only = self.stage.in_threshold(session)
         frame = cut_frame(session.frame, section)
         key = (cut, only, section, frame if by_value else None)
         if key != self._made_of:
@@ -91,7 +93,8 @@ class FlatScene:
     ) -> None:
         """Lay the polygons flat and draw those within the threshold."""
         assert session.frame is not None
-        shape, ahead = section.shape, self._ahead(section, session)
+        shape = section.shape
+        ahead = self._ahead(section, session)
         flat = shape.flatten(section, cut, ahead, ahead) if len(cut) else cut
         # Where the section lies stays, whatever cells of it are shown.
         self._all = flat
@@ -142,11 +145,13 @@ class FlatScene:
 
     def _draw_undeformed(self, section: Section) -> None:
         """Draw the outline of the section of the undeformed mesh, if it is shown."""
-        session, mesh = self.session, self.session.mesh
+        session = self.session
+        mesh = self.session.mesh
         shown = "undeformed" in session.view.drawn and session.view.frame > 0
         key = (mesh, section) if shown and not session.in_file else ()
         if key != self._undeformed_of:
-            self._undeformed_of, lines = key, NO_POLYGONS
+            self._undeformed_of = key
+            lines = NO_POLYGONS
             if key and mesh is not None:
                 ahead = self._ahead(section, session)
                 # Not `Cuts.of`, which caches those of the shown step.
@@ -157,7 +162,9 @@ class FlatScene:
 
     def _style_lines(self) -> None:
         prop = self._mark.actor.prop
-        prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOR, 4.0
+        prop.style = "wireframe"
+        prop.color = SELECTED_COLOR
+        prop.line_width = 4.0
         self._undeformed.actor.prop.line_width = 2.0
         for one in (self._mark, self._undeformed):
             draw_in_front(one.mapper)
@@ -184,10 +191,12 @@ class FlatScene:
             )
             return READING if awaited else "it cuts no cell"
         only = self.stage.in_threshold(self.session)
-        cells, every = self.polygons.cell_ids, len(self._all.cell_ids)
+        cells = self.polygons.cell_ids
+        every = len(self._all.cell_ids)
         if only is not None and not len(cells):
             return f"none of {every:,} cells cut is shown: {only.words}"
-        frame, mesh = self.session.frame, self.session.mesh
+        frame = self.session.frame
+        mesh = self.session.mesh
         assert frame is not None
         assert self.section is not None
         frame = cut_frame(frame, self.section)

@@ -24,13 +24,17 @@ from slideviz.session.motions import support_case, support_key, support_of
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
-BASE, MOVED, BEHIND, LABELS = "boxes:undeformed", "boxes:moved", "boxes:behind", "boxes:-labels"
+BASE = "boxes:undeformed"
+MOVED = "boxes:moved"
+BEHIND = "boxes:behind"
+LABELS = "boxes:-labels"
 """Names of actors: undeformed boxes, moved ones, parts behind the mesh, labels."""
 
 ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
 """Indices of a box's first control point, and of those at the ends of its edges in i, j and k."""
 
-FAINT, CLEAR = 0.3, 0.75
+FAINT = 0.3
+CLEAR = 0.75
 """Opacity of parts that the mesh hides: of undeformed boxes, and of their moved parts."""
 
 
@@ -46,7 +50,8 @@ class BoxLayer(KeyedLayer):
     def key(self, session: Session) -> tuple[object, ...]:
         if session.mesh is None or "ffd" not in session.view.drawn:
             return ()
-        case, style = session.case, (self.stage.scheme, self.stage.pixel_scale)
+        case = session.case
+        style = (self.stage.scheme, self.stage.pixel_scale)
         return session.mesh, box_motions(case), box_definition(case), style
 
     def draw(self, session: Session) -> None:
@@ -79,12 +84,14 @@ class BoxLayer(KeyedLayer):
         actor = self.stage.add(shape, name, lighting=False, pickable=False)
         scale = self.stage.pixel_scale
         actor.prop.color = color
-        actor.prop.line_width, actor.prop.point_size = 2.0 * scale, 8.0 * scale
+        actor.prop.line_width = 2.0 * scale
+        actor.prop.point_size = 8.0 * scale
         actor.prop.render_points_as_spheres = True
         return actor
 
     def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
-        at, words = [], []
+        at = []
+        words = []
         for name, box in boxes.items():
             at += [box.points[end] for end in ENDS[: dim + 1]]
             words += [f"\u2002{word}" for word in (name, *"ijk")[: dim + 1]]
@@ -127,12 +134,16 @@ def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: fl
     ``boxes``: the control points of each box, and which of them are drawn; lines have one of these
     at least. ``dim``: in 2D only the layer k = 0 is drawn. ``lift``: height above z = 0 in 2D.
     """
-    points, lines, wanted, start = [], [], [], 0
+    points = []
+    lines = []
+    wanted = []
+    start = 0
     for box, drawn in boxes:
         flat, on = (box[:, :, :1], drawn[:, :, :1]) if dim == 2 else (box, drawn)
         ids = start + np.arange(on.size).reshape(on.shape)
         for axis in range(3):
-            along, seen = np.moveaxis(ids, axis, 0), np.moveaxis(on, axis, 0)
+            along = np.moveaxis(ids, axis, 0)
+            seen = np.moveaxis(on, axis, 0)
             pairs = np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1)
             lines.append(pairs[(seen[:-1] | seen[1:]).ravel()])
         points.append(flat.reshape(-1, 3))
@@ -146,7 +157,8 @@ def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: fl
     )
 
 
-RIM, WIRE = "\nrim", "\nwire"
+RIM = "\nrim"
+WIRE = "\nwire"
 """Suffixes of the names of actors that draw the rim of a ghost, and the edges of its faces; no
 boundary's name has them."""
 STILL = 1e-9  # displacement of a boundary, relative to its extent, that counts as a rounding error
@@ -228,8 +240,11 @@ class GhostLayer(Layer):
         wanted = wanted and shape.n_cells <= MOST_WIRE
         if wanted or f"{key}{WIRE}" in self._actors:
             wire, _ = self._part(f"{key}{WIRE}", lambda *_: shape)
-            wire.prop.style, wire.prop.color, wire.prop.opacity = "wireframe", color, 0.5
-            wire.prop.line_width, wire.visibility = 1.0, wanted
+            wire.prop.style = "wireframe"
+            wire.prop.color = color
+            wire.prop.opacity = 0.5
+            wire.prop.line_width = 1.0
+            wire.visibility = wanted
             _shift_depth(wire, -ON_TOP)
 
     def _rim_color(self, color: str) -> tuple[float, float, float]:
@@ -281,7 +296,8 @@ class GhostLayer(Layer):
             lit = mesh.dim == 3 and not key.endswith((RIM, WIRE))
             actor = self.stage.add(shape, key, lighting=lit, pickable=False)
             actor.prop.line_width = 2.5
-            self._actors[key], self._shapes[key] = actor, shape
+            self._actors[key] = actor
+            self._shapes[key] = shape
         return self._actors[key], self._shapes[key]
 
 
@@ -340,7 +356,8 @@ def _motion(case: Case) -> tuple[object, ...]:
     return frozenset(case.markers_with("moving")), tuple(case.motions)
 
 
-NAME, HALO = "support:circles", "support:halo"
+NAME = "support:circles"
+HALO = "support:halo"
 PIECES = 180  # straight pieces of a circle
 
 
@@ -383,7 +400,8 @@ def circles(middles: FloatArray, radius: float) -> FloatArray:
     In 3D there are three about each, in the planes of the axes.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, PIECES + 1)
-    dim, rings = middles.shape[1], []
+    dim = middles.shape[1]
+    rings = []
     for one in range(dim):
         for other in range(one + 1, dim):
             round_ = np.zeros((PIECES + 1, dim))

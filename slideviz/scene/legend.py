@@ -48,7 +48,9 @@ class LegendLayer(KeyedLayer):
     def draw(self, session: Session) -> None:
         clear_legend(self.stage.plotter)
         self._bar = self._plate = None
-        stage, mesh, what = self.stage, session.mesh, session.view.color_by
+        stage = self.stage
+        mesh = session.mesh
+        what = session.view.color_by
         if mesh is None or not ("legend" in session.view.drawn and stage.has_legend):
             return
         self._placed = ()
@@ -63,7 +65,8 @@ class LegendLayer(KeyedLayer):
         term = COLOR_BY[what]
         add_color_bar(stage, self._mapper, term, has_inverted(session))
         end = add_point_legend(stage, 4.0)
-        self._bar, self._end = (term.label, end + (34 if self._has_lines else 0)), end
+        self._bar = (term.label, end + (34 if self._has_lines else 0))
+        self._end = end
 
     @property
     def _has_lines(self) -> bool:
@@ -71,7 +74,8 @@ class LegendLayer(KeyedLayer):
 
     def _place(self) -> None:
         """Place color bar and plate, if the view's size or pixel scale has changed."""
-        plotter, scale = self.stage.plotter, self.stage.pixel_scale
+        plotter = self.stage.plotter
+        scale = self.stage.pixel_scale
         size = (*plotter.window_size, scale)
         if size == self._placed or not self._key:
             return
@@ -84,7 +88,8 @@ class LegendLayer(KeyedLayer):
             self._plate.place(rect)
 
     def key(self, session: Session) -> tuple[object, ...]:
-        mesh, view = session.mesh, session.view
+        mesh = session.mesh
+        view = session.view
         names = mesh.marker_names if mesh is not None and view.color_by == "role" else ()
         content = frozenset(session.role(name) for name in names) or has_inverted(session)
         colors = (view.color_by, view.color_map, session.color_range)

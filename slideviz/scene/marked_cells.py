@@ -23,7 +23,9 @@ from slideviz.scene.stage import KeyedLayer, Layer, Stage
 from slideviz.session.inspect import cell_centers, nodes_of
 from slideviz.session.state import Session, StepFrame
 
-OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"  # names of the actors
+OUTLINE = "mark:outline"  # names of the actors
+FACES = "mark:faces"
+DOT = "mark:dot"
 
 
 class MarkLayer(Layer):
@@ -40,7 +42,8 @@ class MarkLayer(Layer):
         self._shapes: dict[str, Any] = {}
 
     def update(self, old: Session | None, new: Session) -> None:
-        cell, frame = new.view.marked_cell, new.frame
+        cell = new.view.marked_cell
+        frame = new.frame
         if cell is None or frame is None or not frame.has(cell):
             for name in self._drawn:
                 self.stage.remove(name)
@@ -76,12 +79,14 @@ class MarkLayer(Layer):
             if name == FACES:
                 continue
             actor.prop.color = SELECTED_COLOR
-            actor.prop.line_width, actor.prop.point_size = 4.0, 9.0
+            actor.prop.line_width = 4.0
+            actor.prop.point_size = 9.0
             actor.prop.render_points_as_spheres = name == DOT
             draw_in_front(actor.mapper)
 
     def _place(self, mesh: Mesh, cell: int) -> None:
-        at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
+        at = mesh.points[nodes_of(mesh, cell)]
+        lift = 3.0 * self.stage.lift(mesh)
         actors.place(self._shapes[OUTLINE], at, lift)
         actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)
         if FACES in self._shapes:
@@ -123,7 +128,8 @@ class InvertedLayer(Layer):
         same = len(cut) == len(self._cut) and all(map(operator.is_, cut, self._cut))
         if key == self._key and same:
             return
-        self._key, self._cut = key, cut
+        self._key = key
+        self._cut = cut
         self.stage.remove(NAME)
         self.stage.ring_words = ()
         if _wanted(new):
@@ -141,12 +147,17 @@ class InvertedLayer(Layer):
 
         They are the cells that fail a ``limit``, else the inverted ones.
         """
-        in_memory, count = frame.extra or frame, frame.quality.inverted
-        cells, word, color = in_memory.quality.inverted_cells(), "inv.", INVERTED_COLOR
+        in_memory = frame.extra or frame
+        count = frame.quality.inverted
+        cells = in_memory.quality.inverted_cells()
+        word = "inv."
+        color = INVERTED_COLOR
         if limit is not None:
             first = len(frame.mesh.cells) if frame.extra is not None else 0
             cells = np.sort(limit.cells[limit.cells >= first]) - first
-            count, word, color = len(limit.cells), "fail", SELECTED_COLOR
+            count = len(limit.cells)
+            word = "fail"
+            color = SELECTED_COLOR
         if cut:
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
@@ -174,7 +185,8 @@ def _wanted(session: Session) -> bool:
 
     Or a limit is chosen that cells fail.
     """
-    view, frame = session.view, session.frame
+    view = session.view
+    frame = session.frame
     if frame is not None and session.limit_chosen is not None:
         return len(session.limit_chosen.cells) > 0
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
@@ -182,7 +194,8 @@ def _wanted(session: Session) -> bool:
     return view.threshold is None or view.threshold[0] <= 0.0
 
 
-CELLS_BEFORE, MOVED_NODES = "repair:cells", "repair:nodes"
+CELLS_BEFORE = "repair:cells"
+MOVED_NODES = "repair:nodes"
 
 
 class RepairLayer(KeyedLayer):
@@ -207,8 +220,10 @@ class RepairLayer(KeyedLayer):
         assert done is not None
         if not len(done.nodes):
             return
-        mesh, before = done.mesh, np.array(done.mesh.points)
-        nodes, cells = done.nodes, done.cells
+        mesh = done.mesh
+        before = np.array(done.mesh.points)
+        nodes = done.nodes
+        cells = done.cells
         if mesh.part is not None:
             nodes = np.searchsorted(mesh.part.points, nodes)
             cells = np.searchsorted(mesh.part.cells, cells)

@@ -70,7 +70,8 @@ class CellLayer(Layer):
         self.actor.prop.line_width = 1.0
         if mesh.dim == 3:
             # A sum above 1 would give brighter colors than the color bar has.
-            self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
+            self.actor.prop.ambient = 0.6
+            self.actor.prop.diffuse = 0.4
         elif mesh.halo is not None:
             veil = actors.part_shape(mesh, np.flatnonzero(mesh.halo.cells))
             self._veil = veil, self.stage.add(veil, "halo", lighting=False, pickable=False)
@@ -113,7 +114,8 @@ class CellLayer(Layer):
         self.actor.prop.color = self.stage.scheme.cell
         if self._veil is not None:
             veil, actor = self._veil
-            points, lift = new.frame.mesh.points, self.stage.lift(new.mesh)
+            points = new.frame.mesh.points
+            lift = self.stage.lift(new.mesh)
             actors.place(veil, points[veil.point_data[POINT]], 0.5 * lift)
             actor.prop.color = self.stage.scheme.background
         inside = looks_inside(new)
@@ -152,7 +154,8 @@ class BoundaryLayer(Layer):
         shape = actors.surface_shape(surface, points, 2 * self._lift)
         actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not surface.flat)
         if not surface.flat:
-            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
+            actor.prop.ambient = 0.6
+            actor.prop.diffuse = 0.4
         return DrawnBoundary(surface, shape, actor)
 
     def _add_band(self, surface: Surface, points: FloatArray) -> Band:
@@ -196,7 +199,9 @@ class BoundaryLayer(Layer):
 
     def _hides_mark(self, session: Session) -> bool:
         """Return whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
-        cell, mesh, hidden = session.view.marked_cell, session.mesh, session.view.hidden
+        cell = session.view.marked_cell
+        mesh = session.mesh
+        hidden = session.view.hidden
         if mesh is None or mesh.dim == 2 or session.frame is None or not session.frame.has(cell):
             return False
         shown = (one for name, one in self.drawn.items() if name not in hidden)
@@ -224,7 +229,8 @@ class BoundaryLayer(Layer):
             one.actor.prop.line_width = 4.5 if view.color_by == "role" or by_value else 3.0
         else:
             self.stage.edges(one.actor.prop, "edges" in view.drawn)
-            inside, glass = looks_inside(session), name in self.glass
+            inside = looks_inside(session)
+            glass = name in self.glass
             opacity = SEE_THROUGH if self._buried else 1.0
             if inside:
                 opacity = 0.12
@@ -319,10 +325,12 @@ class ThresholdLayer(Layer):
             actor.prop.show_edges = False
 
     def _draw(self, session: Session) -> None:
-        frame, threshold = session.frame, session.view.threshold
+        frame = session.frame
+        threshold = session.view.threshold
         assert frame is not None
         assert threshold is not None
-        mesh, values = frame.mesh, self.stage.values(session)
+        mesh = frame.mesh
+        values = self.stage.values(session)
         cells = cells_in_range(values, threshold)
         if mesh.dim == 2:
             cells = cells[np.argsort(np.isnan(values[cells]), kind="stable")]  # see `CellLayer`
@@ -337,7 +345,8 @@ class ThresholdLayer(Layer):
         elif len(cells):  # an empty shape cannot be added
             self.actor = self.stage.add(self.shape, NAME, lighting=mesh.dim == 3)
             self.actor.prop.line_width = 1.0
-            self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
+            self.actor.prop.ambient = 0.6
+            self.actor.prop.diffuse = 0.4
 
 
 class CoarseLayer(Layer):
@@ -351,7 +360,8 @@ class CoarseLayer(Layer):
 
     def __init__(self, stage: Stage, boundaries: BoundaryLayer, sections: SectionLayer) -> None:
         super().__init__(stage)
-        self._sections, self._boundaries = sections, boundaries
+        self._sections = sections
+        self._boundaries = boundaries
 
     def clear(self) -> None:
         self.on = False  # whether they are drawn
@@ -388,7 +398,8 @@ class CoarseLayer(Layer):
         if not self.drawn:
             self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
         made_of = session.frame, session.view.color_by, session.color_range
-        again, self._made_of = made_of != self._made_of, made_of
+        again = made_of != self._made_of
+        self._made_of = made_of
         for name, one in self.drawn.items():
             full = self._boundaries.drawn[name].actor
             if again:
@@ -399,7 +410,8 @@ class CoarseLayer(Layer):
             one.actor.prop.show_edges = False
             see_through(one.actor, full.prop.opacity)
             one.actor.mapper.scalar_visibility = full.mapper.scalar_visibility
-            one.actor.visibility, full.visibility = full.visibility, False
+            one.actor.visibility = full.visibility
+            full.visibility = False
         props = [one.actor.prop for one in self._sections.drawn.values()]
         self._edged = [prop for prop in props if prop.show_edges or prop in self._edged]
         for prop in self._edged:

@@ -45,7 +45,8 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
             f"a detail about {place} is not a place in a {mesh.dim}D mesh; give {mesh.dim} "
             "coordinates and a width"
         )
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    low = mesh.points.min(axis=0)
+    high = mesh.points.max(axis=0)
     # Boundaries may move out of the box by some of its size.
     far = 0.5 * zoom.width + 0.5 * float((high - low).max())
     if np.any(zoom.centre < low - far) or np.any(zoom.centre > high + far):
@@ -87,7 +88,8 @@ def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
         return None
     nodes = np.concatenate(bodies)
     points = np.concatenate([base.points[nodes], mesh.points[nodes]])
-    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    low = points.min(axis=0)
+    extent = np.ptp(points, axis=0)
     width = float(np.linalg.norm(extent))
     if width >= TINY * float(np.linalg.norm(np.ptp(base.points, axis=0))):
         return None
@@ -115,7 +117,8 @@ def _is_inside(base: Mesh, nodes: IntArray) -> bool:
 
     Those of an airfoil or blade are.
     """
-    low, high = base.points.min(axis=0), base.points.max(axis=0)
+    low = base.points.min(axis=0)
+    high = base.points.max(axis=0)
     at = base.points[nodes]
     return int(((at.min(axis=0) > low) & (at.max(axis=0) < high)).sum()) >= 2
 
@@ -127,8 +130,10 @@ def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
     """
     if mesh.dim == 2:
         return np.arange(len(mesh.cells)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
-    low, extent = base.points.min(axis=0), np.ptp(base.points, axis=0)
-    centre, across = low + extent / 2.0, int(np.argmin(extent))
+    low = base.points.min(axis=0)
+    extent = np.ptp(base.points, axis=0)
+    centre = low + extent / 2.0
+    across = int(np.argmin(extent))
     length = lengths(mesh, base)
     if length.max() > 0:
         strong = _moved_body(base, length)

@@ -22,7 +22,8 @@ PALER = 0.45
 
 DIRECTIONS = 200  # number of directions, evenly spread over the sphere, in `outermost`
 
-CELLS, THRESHOLD = "", "\n"
+CELLS = ""
+THRESHOLD = "\n"
 """Keys, among names of boundaries, of the cells and of those within the threshold."""
 
 
@@ -32,7 +33,8 @@ def outermost(points: FloatArray) -> FloatArray:
     From any side their extent is that of all points, except for a few hundredths.
     """
     rank = np.arange(DIRECTIONS) + 0.5
-    height, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * rank
+    height = 1.0 - 2.0 * rank / DIRECTIONS
+    turn = np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
     directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
     # Scaled by the extents, so that they are evenly spread for a long or flat mesh too.
@@ -51,7 +53,9 @@ class PassageLayer(KeyedLayer):
     def __init__(
         self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, threshold: ThresholdLayer
     ) -> None:
-        self._cells, self._boundaries, self._threshold = cells, boundaries, threshold
+        self._cells = cells
+        self._boundaries = boundaries
+        self._threshold = threshold
         self._table = pv.LookupTable()
         self._table_key: tuple[object, ...] = ()
         self._actors: dict[str, list[Any]] = {}
@@ -112,7 +116,8 @@ class PassageLayer(KeyedLayer):
         self._actors = {}
         self._matrices = [matrix for _, turns in wanted for matrix in turns.values()]
         if not self._matrices:
-            self._mappers, self._props = {}, {}
+            self._mappers = {}
+            self._props = {}
             return
         for name, (shape, actor) in self._sources().items():
             mapper = self._mappers.get(name) or self._mapper(shape, actor)
@@ -144,7 +149,8 @@ class PassageLayer(KeyedLayer):
         self._pale_table()
         plain = np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
-            mapper, prop = self._mappers[name], self._props[name]
+            mapper = self._mappers[name]
+            prop = self._props[name]
             if mapper.dataset is not shape:  # the threshold has other cells
                 mapper.dataset = shape
             mapper.scalar_visibility = actor.mapper.scalar_visibility

@@ -27,17 +27,20 @@ def to_display(plotter: Any, points: FloatArray) -> FloatArray:
 
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the name of a 2D mesh's boundary nearest to a pixel; None if none is in `REACH`."""
-    best, name = REACH, None
+    best = REACH
+    name = None
     at = np.array([x, y])
     for one in drawn:
         seen = to_display(plotter, np.asarray(one.shape.points))
-        a, b = seen[one.surface.facets[:, 0]], seen[one.surface.facets[:, 1]]
+        a = seen[one.surface.facets[:, 0]]
+        b = seen[one.surface.facets[:, 1]]
         along = b - a
         length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
         part = np.clip(np.einsum("ij,ij->i", at - a, along) / length2, 0.0, 1.0)
         distance = float(np.linalg.norm(a + part[:, None] * along - at, axis=1).min())
         if distance < best:
-            best, name = distance, one.surface.name
+            best = distance
+            name = one.surface.name
     return name
 
 

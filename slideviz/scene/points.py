@@ -94,9 +94,11 @@ class PointLayer(Layer):
         mapper.scalar_visibility = True
         actor = pv.Actor(mapper=mapper, name="points:nodes")
         prop = actor.prop
-        prop.style, prop.render_points_as_spheres = "points", True
+        prop.style = "points"
+        prop.render_points_as_spheres = True
         # Shading makes a ball visible on a face of the same color.
-        prop.ambient, prop.diffuse = 0.25, 0.85
+        prop.ambient = 0.25
+        prop.diffuse = 0.85
         self.stage.plotter.add_actor(
             actor, name=actor.name, reset_camera=False, render=False, pickable=False
         )

@@ -127,7 +127,8 @@ class Scene:
     def update(self, session: Session) -> None:
         """Draw another state of the same mesh; layers change only what differs."""
         session = with_drawable_colors(session)
-        old, self.session = self.session, session
+        old = self.session
+        self.session = session
         if session.mesh is None or old.mesh is None:
             return
         self.stage.set_colors(session)

@@ -23,7 +23,9 @@ from slideviz.session.passages import Period, keeps, matrices
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 
-NAME, BAND, RIM = "section:", "band:", "rim:"
+NAME = "section:"
+BAND = "band:"
+RIM = "rim:"
 """Prefixes of actors' names: the section's cells; in 2D also the line below them and its rim."""
 WIDTHS = {BAND: 8.0, RIM: 10.0}
 """Widths in pixels, for a 2D mesh, of the line in the colors of the cut cells, and of its rim.
@@ -119,7 +121,8 @@ class SectionLayer(Layer):
 
     def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
         assert session.frame is not None
-        mesh, sections = session.frame.mesh, dict(shown_sections(session))
+        mesh = session.frame.mesh
+        sections = dict(shown_sections(session))
         key = (mesh, sections, tuple(neighbours), self.stage.scheme)
         if key == self._lines_of:
             return
@@ -164,7 +167,8 @@ class SectionLayer(Layer):
     ) -> None:
         section, number, matrix = wanted
         kind = name[: name.index(":") + 1]
-        frame, by_value = session.frame, session.view.color_by != "role" and kind != RIM
+        frame = session.frame
+        by_value = session.view.color_by != "role" and kind != RIM
         assert frame is not None
         # The matrix is part of the key, as another case may have another period.
         only = self.stage.in_threshold(session)
@@ -189,7 +193,8 @@ class SectionLayer(Layer):
         self._style(kind, one.shown, section, session)
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
-        prop, scheme = shown.actor.prop, self.stage.scheme
+        prop = shown.actor.prop
+        scheme = self.stage.scheme
         prop.color = scheme.text if kind == RIM else plain_color(scheme)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole_cells
         # A cut has exactly the colors of the bar; whole cells need shading.
@@ -222,7 +227,8 @@ def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
 
 LINE = "line:"  # prefix of the actors' names of thin lines
 WIDTH = 1.2  # width of the thin line of a 2D section, in pixels
-ABOVE, BELOW = 0.9, 0.4
+ABOVE = 0.9
+BELOW = 0.4
 """Heights of the thin line above the mesh's cells, relative to `Stage.lift`: above whole cells, and
 below a band in the cells' colors."""
 

@@ -148,7 +148,8 @@ class Stage:
 
         As `StepFrame.shown_values` has them: see `drawn` for their colors.
         """
-        frame, what = session.frame, session.view.color_by
+        frame = session.frame
+        what = session.view.color_by
         assert frame is not None
         key = (frame, what)
         if self._values is None or self._values[0] != key:
@@ -168,7 +169,8 @@ class Stage:
 
         ``of`` is the frame with the cells, by default the shown one.
         """
-        frame, what = of or session.frame, session.view.color_by
+        frame = of or session.frame
+        what = session.view.color_by
         assert frame is not None
         if self._values is not None and self._values[0] == (frame, what):
             return self.drawn(session, self._values[1][cells])

@@ -169,8 +169,11 @@ class AboutAxis(Shape):
 
     def ways(self, section: Section, angle: float) -> FloatArray:
         """Return unit vectors (3, 3) at an angle: outwards, around, and along the surface."""
-        cos, sin, lean = np.cos(angle), np.sin(angle), self.lean(section)
-        side, high = np.array([cos, sin, 0.0]), np.array([0.0, 0.0, 1.0])
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        lean = self.lean(section)
+        side = np.array([cos, sin, 0.0])
+        high = np.array([0.0, 0.0, 1.0])
         outwards = np.cos(lean) * side - np.sin(lean) * high
         along = np.sin(lean) * side + np.cos(lean) * high
         return np.asarray(np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis)
@@ -214,9 +217,12 @@ class Quadric(AboutAxis):
         """
         weights, total = self.quadric(section)
         used = weights != 0.0
-        rows, weight = section.basis[used], weights[used]
-        p, d = (edges[0] - np.asarray(section.origin)) @ rows.T, edges[1] @ rows.T
-        square, slope = np.sum(weight * d * d, axis=1), np.sum(weight * p * d, axis=1)
+        rows = section.basis[used]
+        weight = weights[used]
+        p = (edges[0] - np.asarray(section.origin)) @ rows.T
+        d = edges[1] @ rows.T
+        square = np.sum(weight * d * d, axis=1)
+        slope = np.sum(weight * p * d, axis=1)
         constant = np.sum(weight * p * p, axis=1) - total
         root = np.sqrt(np.maximum(slope**2 - square * constant, 0.0))
         before, after = level
@@ -245,7 +251,8 @@ def patch_of(section: Section, points: FloatArray) -> Patch:
     # Angles count from the end of the widest gap, so that no seam is between them.
     start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
     angle = start + (angle - start) % TURN
-    low, high = (float(angle.min()), float(angle.max())), (float(along.min()), float(along.max()))
+    low = (float(angle.min()), float(angle.max()))
+    high = (float(along.min()), float(along.max()))
     places = np.column_stack([angle, along])
     middle = np.array([np.mean(low), np.mean(high)])
     flat = (places - middle) * (shape.girth(section, float(middle[1])), 1.0)

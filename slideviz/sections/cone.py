@@ -50,7 +50,8 @@ class Cone(Quadric):
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed distances (n,), positive outside; behind the apex those from the apex."""
         sin, cos = _lines(section)
-        radius, height = np.hypot(along(0), along(1)), along(2)
+        radius = np.hypot(along(0), along(1))
+        height = along(2)
         gap = radius * cos - height * sin
         return np.where(height * cos + radius * sin < 0.0, np.hypot(radius, height), gap)
 
@@ -76,7 +77,8 @@ class Cone(Quadric):
         inner to outer radius within the length of the mesh.
         """
         local = section.frame(points)
-        radius, height = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
+        radius = np.hypot(local[:, 0], local[:, 1])
+        height = local[:, 2]
         length = float(np.ptp(height))
         # Between the inner and the outer radius over the whole length, where possible.
         steep = np.degrees(np.arctan2(np.ptp(radius) / 2.0, length)) if length > 0 else 45.0
@@ -139,7 +141,8 @@ class Cone(Quadric):
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
         sin, _ = _lines(section)
         flat = np.eye(4)
-        c, s = np.cos(angle * sin), np.sin(angle * sin)
+        c = np.cos(angle * sin)
+        s = np.sin(angle * sin)
         flat[:2, :2] = [[c, -s], [s, c]]
         return flat
 
@@ -151,7 +154,9 @@ class Cone(Quadric):
         return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), length])
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        turn, length, lean = places[:, 0], np.maximum(places[:, 1], 0.0), np.radians(size)
+        turn = places[:, 0]
+        length = np.maximum(places[:, 1], 0.0)
+        lean = np.radians(size)
         radius = length * np.sin(lean)
         local = [radius * np.cos(turn), radius * np.sin(turn), length * np.cos(lean)]
         return np.asarray(np.asarray(section.origin) + np.column_stack(local) @ section.basis)

@@ -70,7 +70,10 @@ class Cutter:
             owners, low, high = self._corners(-level)
         keep = _distinct(low, high)
         enough = keep.sum(axis=1) >= self.dim
-        owners, low, high, keep = owners[enough], low[enough], high[enough], keep[enough]
+        owners = owners[enough]
+        low = low[enough]
+        high = high[enough]
+        keep = keep[enough]
         keys, corners = np.unique(low[keep] * len(points) + high[keep], return_inverse=True)
         a, b = np.divmod(keys, len(points))
         at = _crossings(points, a, b, level, section)
@@ -105,18 +108,22 @@ class Cutter:
 
         The sides are oriented outwards of cells that are not inverted.
         """
-        sides, owners = [np.empty((0, 4), np.int64)], [np.empty(0, np.int64)]
+        sides = [np.empty((0, 4), np.int64)]
+        owners = [np.empty(0, np.int64)]
         for block in self._blocks:
             mine = np.isin(block.ids, ids)
-            row, nodes = ELEMENTS[block.vtk], block.nodes[mine]
+            row = ELEMENTS[block.vtk]
+            nodes = block.nodes[mine]
             for side in row.facets if self.dim == 3 else (tuple(range(row.n_nodes)),):
                 # A triangle repeats its last node.
                 sides.append(nodes[:, list(side) + [side[-1]] * (4 - len(side))])
                 owners.append(block.ids[mine])
-        facets, owner = np.concatenate(sides), np.concatenate(owners)
+        facets = np.concatenate(sides)
+        owner = np.concatenate(owners)
         if self.dim == 3:
             outer = _single(facets, len(points))
-            facets, owner = facets[outer], owner[outer]
+            facets = facets[outer]
+            owner = owner[outer]
         keep = np.ones(facets.shape, bool)
         keep[facets[:, 2] == facets[:, 3], 3] = False
         used, corners = np.unique(facets[keep], return_inverse=True)
@@ -146,11 +153,14 @@ class Cutter:
             edges = loops[cell, loop]
             ends = block.nodes[cut[cell][:, None, None], _EDGES[block.vtk][edges]]
             ends[edges < 0] = -1
-            a, b = ends[..., 0], ends[..., 1]
-            first, last = np.minimum(a, b), np.maximum(a, b)
+            a = ends[..., 0]
+            b = ends[..., 1]
+            first = np.minimum(a, b)
+            last = np.maximum(a, b)
             on_first = (level[first] == 0) & (first >= 0)
             on_last = (level[last] == 0) & (last >= 0)
-            low, high = np.where(on_last, last, first), np.where(on_first, first, last)
+            low = np.where(on_last, last, first)
+            high = np.where(on_first, first, last)
             parts.append((block.ids[cut[cell]], low, high))
         width = max((part[1].shape[1] for part in parts), default=0)
         none = np.empty((0, width), np.int64)
@@ -177,7 +187,8 @@ def crossed_cells(
         level = np.nan_to_num(section.distance(points), nan=np.inf)
         level[np.abs(level) <= near] = 0.0
         for ids, nodes in mesh.cells.by_type.values():
-            low, high = level[nodes].min(axis=1), level[nodes].max(axis=1)
+            low = level[nodes].min(axis=1)
+            high = level[nodes].max(axis=1)
             more = BESIDE * section.shape.near * (high - low) if section.shape.near else 0.0
             crossed[ids] |= (low <= more) & (high >= -more)
     return crossed
@@ -244,7 +255,8 @@ def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
 
 def _nearly_on(level: FloatArray, low: IntArray, high: IntArray, near: float) -> IntArray:
     """Return the nodes next to which, within a part of it, an edge from low to high is crossed."""
-    a, b = low[low >= 0], high[low >= 0]
+    a = low[low >= 0]
+    b = high[low >= 0]
     reach = near * np.abs(level[a] - level[b])
     return np.concatenate([end[np.abs(level[end]) <= reach] for end in (a, b)])
 
@@ -255,7 +267,8 @@ def _crossings(
     """Return the points (k, 3) where the section crosses the edges from nodes a (k,) to b (k,)."""
     start = padded(points[a])
     way = padded(points[b]) - start
-    share, levels = np.zeros(len(a)), (level[a], level[b])
+    share = np.zeros(len(a))
+    levels = (level[a], level[b])
     # Mostly no corner is at a node, and a slice copies nothing.
     between = slice(None) if (a != b).all() else np.flatnonzero(a != b)
     edges = start[between], way[between]

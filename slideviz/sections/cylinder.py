@@ -143,7 +143,8 @@ class Cylinder(Quadric):
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
         """Return the matrix of a shift: along the axis, and by radius times angle."""
-        origin, flat = np.asarray(section.origin), np.eye(4)
+        origin = np.asarray(section.origin)
+        flat = np.eye(4)
         step = matrix[:3, :3] @ origin + matrix[:3, 3] - origin
         flat[0, 3] = step @ section.basis[2]
         flat[1, 3] = section.radius * angle
@@ -156,7 +157,8 @@ class Cylinder(Quadric):
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
         """Return points at places of the cylinder with the radius ``size``."""
-        angle, along = places[:, 0], places[:, 1]
+        angle = places[:, 0]
+        along = places[:, 1]
         local = np.column_stack([size * np.cos(angle), size * np.sin(angle), along])
         return np.asarray(np.asarray(section.origin) + local @ section.basis)
 

@@ -78,7 +78,8 @@ def rounded(value: float, size: float) -> float:
 
 def _distance(line: FloatArray, at: FloatArray) -> float:
     """Return the distance of a point (2,) from a polyline (k, 2)."""
-    start, way = line[:-1], np.diff(line, axis=0)
+    start = line[:-1]
+    way = np.diff(line, axis=0)
     length2 = np.maximum(np.einsum("ij,ij->i", way, way), 1e-30)
     share = np.clip(np.einsum("ij,ij->i", at - start, way) / length2, 0.0, 1.0)
     return float(np.linalg.norm(start + share[:, None] * way - at, axis=1).min())

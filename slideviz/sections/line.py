@@ -20,7 +20,8 @@ Box = tuple[FloatArray, FloatArray]  # lowest and highest coordinates, (2,) each
 
 def box_around(points: FloatArray) -> Box:
     """Return the box around points (n, 2 or 3) in x and y, with a margin."""
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    low = points[:, :2].min(axis=0)
+    high = points[:, :2].max(axis=0)
     room = MARGIN * float((high - low).max())
     return low - room, high + room
 
@@ -36,14 +37,16 @@ def line_ends(section: Section, box: Box) -> FloatArray | None:
     if way is None:
         return None
     start = LINE.middle(section)
-    low, high = -np.inf, np.inf
+    low = -np.inf
+    high = np.inf
     for axis in range(2):
         if way[axis] == 0.0:
             if not box[0][axis] <= start[axis] <= box[1][axis]:
                 return None
             continue
         near, far = sorted((side[axis] - start[axis]) / way[axis] for side in box)
-        low, high = max(low, near), min(high, far)
+        low = max(low, near)
+        high = min(high, far)
     return np.stack([start + low * way, start + high * way]) if low < high else None
 
 
@@ -84,7 +87,8 @@ class Line(InPlane):
 
     def middle(self, section: Section) -> FloatArray:
         """Return the point (2,) of the line in z = 0 that is nearest to the section's point."""
-        origin, normal = np.asarray(section.origin), np.asarray(section.direction)
+        origin = np.asarray(section.origin)
+        normal = np.asarray(section.direction)
         flat = normal[:2] @ normal[:2]
         if not flat > 0:
             return origin[:2]

@@ -73,7 +73,8 @@ class Section:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms
+        numbers = (*self.origin, *self.direction, self.size)
+        terms = self.shape.terms
         if not np.isfinite(numbers).all():
             raise CaseError(f"{self.kind} section: {numbers} has a number that is not finite")
         if not within(np.array(numbers), LARGEST):

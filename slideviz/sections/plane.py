@@ -89,7 +89,8 @@ class Plane(Shape):
 
     def first(self, section: Section, points: FloatArray) -> Section:
         """Return a plane across the longest extent of points (n, 3), at a round number."""
-        low, high = points.min(axis=0), points.max(axis=0)
+        low = points.min(axis=0)
+        high = points.max(axis=0)
         axis = int(np.argmax(high - low))
         origin = (low + high) / 2.0
         origin[axis] = round_middle(points[:, axis])
@@ -148,7 +149,8 @@ class Plane(Shape):
         return plane_axes(section).labels
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        rows, flat = plane_axes(section).rows, np.eye(4)
+        rows = plane_axes(section).rows
+        flat = np.eye(4)
         flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
         flat[:3, 3] = rows @ matrix[:3, 3]
         flat[2, 3] = 0.0

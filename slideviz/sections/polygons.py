@@ -86,9 +86,11 @@ class Polygons:
 
     def outline(self) -> Polygons:
         """Return the lines, of two corners, that only one polygon has: around all of them."""
-        start, after = self.connectivity, np.roll(self.connectivity, -1)
+        start = self.connectivity
+        after = np.roll(self.connectivity, -1)
         after[self.offsets[1:] - 1] = start[self.offsets[:-1]]
-        low, high = np.minimum(start, after), np.maximum(start, after)
+        low = np.minimum(start, after)
+        high = np.maximum(start, after)
         _, first, count = np.unique(
             low * len(self.points) + high, return_index=True, return_counts=True
         )

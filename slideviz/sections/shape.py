@@ -26,14 +26,17 @@ def round_middle(values: FloatArray) -> float:
 
     If a section were in a layer of nodes, rounding would decide which cells it cuts.
     """
-    low, high = float(values.min()), float(values.max())
-    middle, span = (low + high) / 2.0, high - low
+    low = float(values.min())
+    high = float(values.max())
+    middle = (low + high) / 2.0
+    span = high - low
     if not span > 0:
         return middle
     below, above = _layers_around(values, middle)
     # In the middle half of the cells at the middle (of those above it, where a layer is there).
     room = (above - below) / 4.0
-    first, last = below + room, above - room
+    first = below + room
+    last = above - room
     near = max(middle - _NEAR * span, first), min(middle + _NEAR * span, last)
     if near[0] <= near[1] and middle - below > _LAYER * span:
         first, last = near
@@ -45,7 +48,8 @@ def _layers_around(values: FloatArray, middle: float) -> tuple[float, float]:
 
     A layer is a value that many more nodes have than by chance; the ends of the values are two.
     """
-    low, high = float(values.min()), float(values.max())
+    low = float(values.min())
+    high = float(values.max())
     near = _LAYER * (high - low)
     # Of scattered nodes, about so many are as near to each other as those of a layer.
     chance = 2.0 * _LAYER * len(values)
@@ -66,13 +70,15 @@ def roundest(first: float, last: float, wanted: float) -> float:
     digits = -int(np.floor(np.log10(max(abs(first), abs(last), 1e-300)))) - 1
     while True:
         unit = 10.0**-digits
-        low, high = np.ceil(first / unit), np.floor(last / unit)
+        low = np.ceil(first / unit)
+        high = np.floor(last / unit)
         if low <= high or digits > 300:
             return round(float(np.clip(np.round(wanted / unit), low, high)) * unit, digits) + 0.0
         digits += 1
 
 
-DIGITS, FEW = 4, 2
+DIGITS = 4
+FEW = 2
 """Significant digits of the numbers of a direction or point: in full words, and in few words."""
 
 

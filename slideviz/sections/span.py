@@ -106,11 +106,13 @@ class SpanWalls:
     @cached_property
     def _begin(self) -> FloatArray:
         """(c, 3, s): by how much m' and m of each zone go on, and m at its begin, at `_SPANS`."""
-        out, before = np.zeros((len(self.channels), 3, len(_SPANS))), -1
+        out = np.zeros((len(self.channels), 3, len(_SPANS)))
+        before = -1
         middles = [np.array([[*one.field.start, one.field.middle]]) for one in self.channels]
         order = np.argsort([float(self.field.curves.plane(at)[0, 0]) for at in middles])
         for k in order.tolist():
-            one, last = self.channels[k], self.channels[before].curves
+            one = self.channels[k]
+            last = self.channels[before].curves
             start = one.curves.plane(one.begin)
             length = one.curves.length(start)
             if k != order[0]:
@@ -180,7 +182,8 @@ class SpanWalls:
         """
 
         def value(k: int, some: FloatArray) -> FloatArray:
-            curves, (theta, m, span) = self.channels[k].curves, some.T
+            curves = self.channels[k].curves
+            (theta, m, span) = some.T
             at = m - np.interp(span, _SPANS, self._begin[k, 1])
             plane = np.stack([curves.at_length(at, span), theta, span], axis=1)
             return np.column_stack([curves.traced(plane), theta])
@@ -212,7 +215,8 @@ class ConstantSpan(AboutAxis):
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed numbers (n,), positive towards the shroud, that grow as distances do."""
-        x, y = along(0), along(1)
+        x = along(0)
+        y = along(1)
         coords = np.stack([along(2), np.hypot(x, y), np.arctan2(y, x)], axis=1)
         return walls_of(section).level(coords, section.span)
 
@@ -221,7 +225,8 @@ class ConstantSpan(AboutAxis):
     ) -> FloatArray:
         """Return where edges cross, by Ridders' method (IEEE Trans. Circuits Syst. 26, 1979)."""
         (start, way), (low, high) = edges, level
-        a, b = np.zeros(len(start)), np.ones(len(start))
+        a = np.zeros(len(start))
+        b = np.ones(len(start))
         root = low / np.where(low != high, low - high, 1.0)
 
         def value(share: FloatArray) -> FloatArray:
@@ -336,7 +341,8 @@ def find_walls(
     """
     case = case or Case()
     case = case if between is None else case.change(span=between)
-    channels, missing = list[SpanChannel](), list[CaseError]()
+    channels = list[SpanChannel]()
+    missing = list[CaseError]()
     for number, (one, zone) in enumerate(each_zone(case, mesh)):
         try:
             hub, shroud = span_ends(one, zone, remedy)

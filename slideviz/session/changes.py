@@ -344,7 +344,8 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
     """Return the session after mesh or displacement files were moved: new paths by old ones."""
 
     def there(case: Case) -> Case:
-        file, out = case.mesh_file, case.mesh_out
+        file = case.mesh_file
+        out = case.mesh_out
         case = with_paths(case, lambda path: moved.get(path, path))
         if file and out and file in moved and out.parent == file.parent:
             new = moved[file]
@@ -478,10 +479,12 @@ def second_view(session: Session) -> Session:
     """
     if session.view.beside == UNDEFORMED:
         return show_frame(session, 0)
-    run, other = session.run_shown, session.run(session.view.beside)
+    run = session.run_shown
+    other = session.run(session.view.beside)
     if other is None:
         return session
-    planned, at = run.planned if run is not None else 0, session.view.frame
+    planned = run.planned if run is not None else 0
+    at = session.view.frame
     # The step at about the same part of the displacement, where numbers of steps differ.
     frame = round(at * other.planned / planned) if planned else 0
     if at:

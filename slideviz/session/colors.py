@@ -55,7 +55,8 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
     what = session.view.color_by
     if what == "role" or session.mesh is None:
         return None
-    lows, highs = [], []
+    lows = []
+    highs = []
     for frame in _frames(session, every):
         values = frame.values(what, session.mesh)
         values = values[(frame.quality.status != INVERTED) & np.isfinite(values)]

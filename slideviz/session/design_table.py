@@ -140,7 +140,8 @@ class DesignTable:
 
         ``busy`` is whether the designs are being run, ``saved`` the table that was saved last.
         """
-        done, count = len(self.results), len(self.rows)
+        done = len(self.results)
+        count = len(self.rows)
         if busy:
             so_far = f"{done:,} of {counted(count, 'design')} done"
             return f"The sweep still runs ({so_far}) and will be stopped."
@@ -159,7 +160,8 @@ class DesignTable:
 
     def summary(self, mesh: Mesh | None) -> str:
         """Return the results in words: counts, and a line for each reason why designs failed."""
-        done, bad = self.count_done(), sum(row.inverted > 0 for row in self.results.values())
+        done = self.count_done()
+        bad = sum(row.inverted > 0 for row in self.results.values())
         reasons: dict[str, list[int]] = {}
         for number in sorted(self.results):
             if self.results[number].problem:

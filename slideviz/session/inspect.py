@@ -64,7 +64,8 @@ def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
 
 def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
     """Return the distance from a point (d,) to the elements at a boundary's nearest nodes."""
-    nodes, cells = marker.nodes, marker.cells
+    nodes = marker.nodes
+    cells = marker.cells
     if not len(nodes):
         return float("inf")
     shifts = mesh.points[nodes] - point
@@ -83,17 +84,21 @@ def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
 
 def _to_polygon(corners: FloatArray, point: FloatArray) -> float:
     """Return the distance of a point (d,) from a line segment (2, d) or a face (k, 3)."""
-    start, end = corners, np.roll(corners, -1, axis=0)
+    start = corners
+    end = np.roll(corners, -1, axis=0)
     along = end - start
     square = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)
     part = np.clip(np.einsum("nd,nd->n", point - start, along) / square, 0.0, 1.0)
     far = float(np.linalg.norm(start + part[:, None] * along - point, axis=1).min())
     for k in range(1, len(corners) - 1 if corners.shape[1] == 3 else 0):
-        u, v, w = corners[k] - corners[0], corners[k + 1] - corners[0], point - corners[0]
+        u = corners[k] - corners[0]
+        v = corners[k + 1] - corners[0]
+        w = point - corners[0]
         normal = np.cross(u, v)
         area = float(normal @ normal)
         if area > 0:
-            a, b = np.cross(w, v) @ normal / area, np.cross(u, w) @ normal / area
+            a = np.cross(w, v) @ normal / area
+            b = np.cross(u, w) @ normal / area
             if a >= 0 and b >= 0 and a + b <= 1:
                 far = min(far, abs(float(w @ normal)) / area**0.5)
     return far
@@ -164,10 +169,12 @@ def worst_cells(
     through the frames, to save time and memory, and only by the numbers of the quality. Ties are in
     the order of the cells' numbers.
     """
-    frame, what = frames[at], measure(what)
+    frame = frames[at]
+    what = measure(what)
     if frame.extra is not None:
         return _listed(frame, frame.extra, at, count)
-    values, halo = frame.values(what, frames[0].mesh), frame.quality.halo
+    values = frame.values(what, frames[0].mesh)
+    halo = frame.quality.halo
     rank = np.where(frame.quality.status == INVERTED, -np.inf, -badness(what, values))
     there = ~np.isnan(values)
     cells = lowest(rank, count, there if halo is None else there & ~halo)
@@ -192,7 +199,8 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
     assert extra.base is not None
     assert frame.mesh.part is not None
     cells = np.arange(min(count, len(extra.mesh.cells)))
-    numbers, in_memory = extra.mesh.part.cells[cells], frame.mesh.part.cells
+    numbers = extra.mesh.part.cells[cells]
+    in_memory = frame.mesh.part.cells
     place = np.minimum(np.searchsorted(in_memory, numbers), len(in_memory) - 1)
     drawn = in_memory[place] == numbers  # those at the boundary are drawn as parts of it
     before = quality(extra.base, metric=extra.quality.metric).values[cells]
@@ -239,7 +247,8 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     """Return the facts about a cell; raises MeshError if there is no such cell."""
     zoned = frame.mesh
     frame, cell = frame.place_of(cell)
-    mesh, found = frame.mesh, frame.quality
+    mesh = frame.mesh
+    found = frame.quality
     sign = int(found.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
     jacobians = corner_jacobians(mesh, cell, sign)
     status = found.status[cell]
@@ -263,8 +272,10 @@ def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
 
     Of several cells around it, that with the lowest of ``values`` (m,) is returned; nan is ignored.
     """
-    at, first = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1]
-    low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
+    at = mesh.points[mesh.cells.connectivity]
+    first = mesh.cells.offsets[:-1]
+    low = np.minimum.reduceat(at, first)
+    high = np.maximum.reduceat(at, first)
     here = np.array([x, y])
     near = ((low <= here) & (here <= high)).all(axis=1) & ~np.isnan(values)
     inside = [cell for cell in np.flatnonzero(near) if _inside(mesh, int(cell), x, y)]
@@ -276,7 +287,8 @@ def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
     a = mesh.points[nodes_of(mesh, cell)]
     b = np.roll(a, -1, axis=0)
     crosses = (a[:, 1] > y) != (b[:, 1] > y)
-    a, b = a[crosses], b[crosses]
+    a = a[crosses]
+    b = b[crosses]
     at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
     return int((at > x).sum()) % 2 == 1
 

@@ -59,7 +59,9 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
 
     Raises SlidevizError if the file cannot be written.
     """
-    mesh, found, cells = frame.mesh, frame.quality, frame.mesh.cells
+    mesh = frame.mesh
+    found = frame.quality
+    cells = frame.mesh.cells
     totals = np.add.reduceat(mesh.points[cells.connectivity], cells.offsets[:-1], axis=0)
     middles = totals / np.diff(cells.offsets)[:, None]
     names = {vtk: ELEMENTS[vtk].name for vtk in cells.by_type}
@@ -106,10 +108,8 @@ def save_steps(
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:
-        tick, every = (
-            _tick(f"Writing {path.name}", report, stopped),
-            (*filter(None, [first]), *frames),
-        )
+        tick = _tick(f"Writing {path.name}", report, stopped)
+        every = (*filter(None, [first]), *frames)
         start = every[0].mesh
         with format_for(path).function("series")(path, start) as series:
             for k, frame in enumerate(every):
@@ -246,13 +246,15 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
     """
     from slideviz.formats.files import read
 
-    case, mesh_path = None, path
+    case = None
+    mesh_path = path
     if path.suffix.lower() == ".cfg":
         report(JobProgress(f"Reading {path.name}"))
         case = Case.read(path)
         if case.mesh_file is None:
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
-        mesh_path, zone = case.mesh_file, case.zone if zone is None else zone
+        mesh_path = case.mesh_file
+        zone = case.zone if zone is None else zone
     report(JobProgress(f"Reading {mesh_path.name}"))
     reading = _tick(f"Reading {mesh_path.name}", report, stopped)
     kind = case.mesh_format if case is not None else None
@@ -299,7 +301,8 @@ def prepare(
 
 def _precompute(frame: StepFrame) -> None:
     """Compute cached properties of a frame that drawing needs: in this thread, as it takes time."""
-    mesh, measured = frame.mesh, frame.quality
+    mesh = frame.mesh
+    measured = frame.quality
     _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
     _ = measured.min, measured.mean, measured.inverted, measured.cells
 
@@ -362,9 +365,11 @@ def repair(
     tick = _tick(f"Repair: {PHASES['repair']}", report, stopped)
     step = mended_frame(case, mesh, last.step, lambda now: tick(now.fraction))
     if step.safe is not None:  # the last straight way now ends at the mended mesh
-        before, done = mesh, 0.0
+        before = mesh
+        done = 0.0
         if earlier and earlier[-1].step is not None:
-            before, done = earlier[-1].mesh, earlier[-1].step.part
+            before = earlier[-1].mesh
+            done = earlier[-1].step.part
         safe = step_safety(before, step.mesh, mesh, (done, step.part), step.index)
         step = replace(step, safe=safe)
     for frame in earlier:
@@ -457,7 +462,8 @@ def save_wheel(
     """
     from slideviz.design.wheel import write_wheel
 
-    tick, moved = _tick(f"Writing {path.name}", report, stopped), [frame.mesh.points]
+    tick = _tick(f"Writing {path.name}", report, stopped)
+    moved = [frame.mesh.points]
     return write_wheel(
         path, [case], mesh, moved, passages, numbered, lambda now: tick(now.fraction)
     )

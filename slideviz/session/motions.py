@@ -50,7 +50,8 @@ class TableRows:
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
         for zone in (part for part in mesh.zone_parts if len(nodes)):
             if zone.points.start <= nodes[0] and nodes[-1] < zone.points.stop:
-                nodes, mesh = nodes - zone.points.start, zone.mesh  # as a file numbers them
+                nodes = nodes - zone.points.start  # as a file numbers them
+                mesh = zone.mesh
                 break
         return cls(", ".join(names), nodes, mesh)
 
@@ -220,13 +221,15 @@ BOX_DEGREE = 5  # its degree along its longest side; in proportion along the oth
 
 def with_new_box(session: Session, index: int) -> Case:
     """Return the case with a new FFD box, around the boundaries of a motion, which uses it then."""
-    case, mesh = session.case, session.mesh
+    case = session.case
+    mesh = session.mesh
     assert mesh is not None
     motion = case.motions[index]
     assert isinstance(motion, BoxMotion)
     names = named(motion.marker) or case.markers_with("moving")
     points = mesh.points[np.unique(np.concatenate([mesh.marker(n).nodes for n in names]))]
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     sides = high - low
     margin = BOX_MARGIN * sides.max()
     rounded = [[float(f"{v:.6g}") for v in corner] for corner in (low - margin, high + margin)]
@@ -308,7 +311,8 @@ def support_case(session: Session) -> Case:
 
 def support_words(session: Session) -> str:
     """Return the message on the support radius that is drawn, on an open mesh: length, place."""
-    mesh, case = session.mesh, support_case(session)
+    mesh = session.mesh
+    case = support_case(session)
     assert mesh is not None
     radius, boxes = support_of(case, mesh)
     if not radius:
@@ -316,7 +320,8 @@ def support_words(session: Session) -> str:
     of = " of the settings" if case is session.case else f" of run {session.shown}"
     of = of if session.runs else ""
     shape = "circle" if mesh.dim == 2 else "sphere"
-    middles, (low, high) = boxes.mean(axis=1), mesh.bounds
+    middles = boxes.mean(axis=1)
+    (low, high) = mesh.bounds
     farthest = np.linalg.norm(np.maximum(high - middles, middles - low), axis=1)
     if radius > farthest.max():
         return f"Support radius{of}: {radius:.4g}, a {shape} larger than the whole mesh"

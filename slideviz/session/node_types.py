@@ -75,7 +75,8 @@ class NodeTypes:
         if not mesh.markers:
             return NOTHING
         case, _ = roles_of_copies(case, mesh)
-        boundary, angle = boundary_of(mesh), case.feature_angle_deg
+        boundary = boundary_of(mesh)
+        angle = case.feature_angle_deg
         if self._fans is None or self._fans[:2] != (mesh, angle):
             self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
         try:

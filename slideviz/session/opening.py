@@ -80,7 +80,8 @@ def session_of_runs(
     ``first``: the undeformed mesh. ``runs``: runs of that mesh: none, one or two, with different
     numbers. ``color_by``: the quantity to color by, with one color range for both.
     """
-    last, beside = 0, None
+    last = 0
+    beside = None
     if runs:
         last = len(runs[0].frames)
         beside = runs[1].number if len(runs) > 1 else None

@@ -30,7 +30,8 @@ def choices(session: Session) -> dict[int, str]:
 
 def panes(session: Session) -> tuple[int | None, int | None]:
     """Return the numbers of the runs in the left and the right view; None: no run, or no view."""
-    first, second = session.shown, session.view.beside
+    first = session.shown
+    second = session.view.beside
     return (second, first) if session.view.swapped and second is not None else (first, second)
 
 
@@ -76,7 +77,8 @@ def _lead(session: Session, number: int | None) -> Session:
     """Return the session with another run in the first view, at the step that matches best."""
     if number is None or number == session.shown:
         return session
-    planned, at = session.planned, session.view.frame
+    planned = session.planned
+    at = session.view.frame
     session = show_run(session, number)
     frame = round(at * session.planned / planned) if planned else 0
     return show_frame(session, max(frame, 1) if at else frame)

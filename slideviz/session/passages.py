@@ -88,7 +88,8 @@ def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]
 
 def keeps(section: Section, matrix: FloatArray) -> bool:
     """Return whether a transformation (4, 4) takes a section onto itself."""
-    axis, origin = section.basis[2], np.asarray(section.origin)
+    axis = section.basis[2]
+    origin = np.asarray(section.origin)
     turned = matrix[:3, :3] @ axis
     step = transformed(origin[None], matrix)[0] - origin
     off = section.shape.keeps(section, turned, step)
@@ -136,7 +137,8 @@ class Period:
         return self._find(session)[1]
 
     def _find(self, session: Session) -> tuple[Pair | None, tuple[Pair, ...]]:
-        case, mesh = session.case, session.mesh
+        case = session.case
+        mesh = session.mesh
         if mesh is None:
             return None, ()
         names = case.markers_with("periodic")

@@ -68,7 +68,8 @@ def actor_groups(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[An
     Faces of several actors with one mapper, as neighbouring passages, count once.
     """
     parts: list[list[Any]] = [[]]
-    count, mappers = 0, set[Any]()
+    count = 0
+    mappers = set[Any]()
     for actor in actors:
         if not actor.GetVisibility():
             continue

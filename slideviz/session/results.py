@@ -132,7 +132,8 @@ class StepFrame:
 
     def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
-        now, before = self.mesh.points, undeformed.points
+        now = self.mesh.points
+        before = undeformed.points
         if now is before or not len(now):
             return 0.0
         lengths: list[float] = []
@@ -235,7 +236,8 @@ def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = Non
 
     In the mesh's length unit. Only these cells take time and memory.
     """
-    every, count = mesh.cells, len(mesh.cells) if cells is None else len(cells)
+    every = mesh.cells
+    count = len(mesh.cells) if cells is None else len(cells)
     values = np.zeros(count)
     if mesh.points is undeformed.points:
         return values
@@ -253,7 +255,8 @@ def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = Non
 def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[no-untyped-def]
     """Write to ``found`` (k,) the mean distances of cells' nodes between two states (n, d)."""
     for i in range(len(cells)):
-        begin, end = offsets[cells[i]], offsets[cells[i] + 1]
+        begin = offsets[cells[i]]
+        end = offsets[cells[i] + 1]
         total = 0.0
         for at in range(begin, end):
             square = 0.0

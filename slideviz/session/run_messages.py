@@ -65,7 +65,8 @@ def end_parts(run: Run) -> tuple[str, str]:
     if len(run.frames) < run.planned:
         bad = f": {bad}" if bad else ""
         return f"Stopped after {run.progress_words}{bad}.", ""
-    done, reach = "; ".join(filter(None, (bad, repair_words(run)))), ""
+    done = "; ".join(filter(None, (bad, repair_words(run))))
+    reach = ""
     if run.safe is not None and run.safe.fraction > 0:
         reach = f"the motion {reach_words(run.safe.fraction)}"
         if path_ending(run):
@@ -168,7 +169,8 @@ def notes_of(run: Run) -> tuple[str, ...]:
 def _remarks(run: Run, notes: bool) -> tuple[str, ...]:
     if run.last is None or run.last_step is None:
         return ()
-    layers, texts = run.last.walls, run.last_step.warnings
+    layers = run.last.walls
+    texts = run.last_step.warnings
     if layers is not None:
         texts += tuple(height_warnings(run.case, layers, run.last.mesh))
     return tuple(with_field_labels(text) for text in texts if isinstance(text, Note) == notes)

@@ -49,7 +49,8 @@ def reduction_words(case: Case) -> str:
 
 def steps_words(run: Run) -> str:
     """Return the number of steps of a run in words; of a run not done, how many of all it made."""
-    made, planned = len(run.frames), run.planned
+    made = len(run.frames)
+    planned = run.planned
     if run.end != "done":
         planned = planned or run.case.steps
     auto = ", automatic" if not run.case.steps else ""

@@ -43,7 +43,8 @@ class Unsaved:
         run = last if going else session.run_shown
         if going and run is not None:
             lost["run"] = _stop_question(run)
-        cut, source = unsaved_sections(session), session.case.source
+        cut = unsaved_sections(session)
+        source = session.case.source
         if session.unsaved_case or cut:
             more = ", method and sections" if session.view.sections else " and method"
             lost["case"] = f"the changes to {source.name}" if source else f"roles, motions{more}"
@@ -153,7 +154,8 @@ _FIELDS = {
 
 def view_to_case(session: Session, camera: Camera | None = None) -> Case:
     """Return the case of a session with its view and camera as keys; defaults are left out."""
-    view, first = session.view, ViewState()
+    view = session.view
+    first = ViewState()
     changed = {
         key: getattr(view, field)
         for key, field in _FIELDS.items()

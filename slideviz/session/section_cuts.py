@@ -47,13 +47,16 @@ class Groups:
     @classmethod
     def of(cls, source: FileSource, tick: Tick) -> Groups:
         """Return the balls of a deformed mesh; the whole file is read."""
-        lows, highs = [], []
+        lows = []
+        highs = []
         for block in source.blocks(tick, MOST):
             mesh = block.mesh
-            at, starts = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1:GROUP]
+            at = mesh.points[mesh.cells.connectivity]
+            starts = mesh.cells.offsets[:-1:GROUP]
             lows.append(np.minimum.reduceat(at, starts))
             highs.append(np.maximum.reduceat(at, starts))
-        low, high = np.concatenate(lows), np.concatenate(highs)
+        low = np.concatenate(lows)
+        high = np.concatenate(highs)
         scale = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
         return cls((low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0, scale)
 
@@ -94,7 +97,8 @@ def read_slab(
 
     Raises MeshError if a file has changed, and has mistakes, and OSError if it cannot be read.
     """
-    skin, metric = frame.mesh, frame.quality.metric
+    skin = frame.mesh
+    metric = frame.quality.metric
     assert skin.source is not None
     with ExitStack() as stack:
         source = FileSource.open(stack, (skin.source, skin.zone), moved=frame.file or skin.source)
@@ -108,7 +112,8 @@ def read_slab(
             groups = _GROUPS[skin] = Groups.of(source, tick)
 
         def blocks() -> Iterator[CellBlock]:
-            met, begin = groups.met_by(section), 0
+            met = groups.met_by(section)
+            begin = 0
             for zone in source.zones:  # whose last group may have fewer cells
                 end = begin - (-zone.n_cells // GROUP)
                 here = met[(met >= begin) & (met < end)] - begin
@@ -120,7 +125,9 @@ def read_slab(
         slab = cut_cells(blocks(), section, near=ON_SECTION * groups.scale)
     if len(slab.ids):
         return block_frame(slab, skin, metric)
-    mesh, values, codes = slab.mesh, np.empty(0), np.empty(0, np.uint8)
+    mesh = slab.mesh
+    values = np.empty(0)
+    codes = np.empty(0, np.uint8)
     none = Quality(values, values, values, codes, np.empty(0, np.int8), metric)
     return StepFrame(mesh, none, base=mesh)
 
@@ -150,16 +157,22 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     a centre in the middle of the moving boundaries. A section of constant span cuts nothing where
     there are no hub and shroud.
     """
-    mesh, case, shape = session.mesh, session.case, SHAPES[kind]
+    mesh = session.mesh
+    case = session.case
+    shape = SHAPES[kind]
     assert mesh is not None
     pair = machine_pair(session) if pair is None else pair  # None, too, of zones that differ
     if pair is not None and pair.kind == "rotational":
-        axis, origin = pair.axis, pair.origin
+        axis = pair.axis
+        origin = pair.origin
     elif mesh.dim == 2:
-        axis, origin = (0.0, 0.0, 1.0), triple(_middle_of_moving(session))
+        axis = (0.0, 0.0, 1.0)
+        origin = triple(_middle_of_moving(session))
     else:
-        axis, origin = case.axis, case.origin
-    at, way = triple(np.asarray(origin)), triple(np.asarray(axis))
+        axis = case.axis
+        origin = case.origin
+    at = triple(np.asarray(origin))
+    way = triple(np.asarray(axis))
     section = Section.of(kind, at, way, shape.terms.size.usual if shape.terms.size else 0.0)
     section = replace(section, whole_cells=mesh.dim == 2)
     pairs = session.pairs if pair is None else (pair, *session.pairs)

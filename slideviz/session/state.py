@@ -270,7 +270,8 @@ class Session:
             if self.mesh is not None
             and (pair := frame.ends(self.view.color_by, self.mesh)) is not None
         ]
-        low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=1.0)
+        low = min((a for a, _ in ends), default=0.0)
+        high = max((b for _, b in ends), default=1.0)
         if self.view.color_by == "first-height" and low >= 0:
             return 0.0, round_up(high)  # numbers with many digits have no room at the bar
         if low < high:
@@ -314,7 +315,8 @@ _PARTS = 100.0
 def outwards(low: float, high: float) -> tuple[float, float]:
     """Return two numbers rounded to few digits, the lower one down and the upper one up."""
     unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
-    first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
+    first = np.floor(low / unit + 1e-6) * unit
+    last = np.ceil(high / unit - 1e-6) * unit
     digits = max(0, round(-np.log10(unit))) + 1
     return round(float(first), digits), round(float(last), digits)
 

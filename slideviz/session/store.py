@@ -64,7 +64,8 @@ class UndoState:
     def put_into(self, session: Session) -> Session:
         """Return the session with the memento's state; the step that is shown stays."""
         session = self._put_runs(session)
-        colored_by, view = session.view.color_by, session.view.in_style(self.style)
+        colored_by = session.view.color_by
+        view = session.view.in_style(self.style)
         # File names of the case are not undone: it was saved there, undone or not.
         case = self.case.change(
             source=session.case.source,

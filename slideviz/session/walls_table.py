@@ -54,7 +54,8 @@ def wall_rows(session: Session) -> list[WallRow]:
     for name, entry in _entries(session).items():
         before = tuple(_text(entry[name]["before"][end], form) for name, end, form in _NUMBERS)
         after = tuple(_text(entry[name]["after"][end], form) for name, end, form in _NUMBERS)
-        ratio, turned = entry["first_height"]["ratio"], entry["angle"]["change"]["max"]
+        ratio = entry["first_height"]["ratio"]
+        turned = entry["angle"]["change"]["max"]
         ends = " to ".join(dict.fromkeys(_text(ratio[end], ".3f") for end in ("min", "max")))
         change = (ends, "", "", _text(turned, ".1f°"))
         rows.append(WallRow(name, entry["layered"], before, after, change, _tip(entry)))

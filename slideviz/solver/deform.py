@@ -116,12 +116,14 @@ def deform(
 
         mend = partial(mended_step, case, mesh, setup, report)
     stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify, mend=mend)
-    before, done = mesh, 0.0
+    before = mesh
+    done = 0.0
     for step in all_steps(stepping):
         ends = mend is not None and step.index == step.total and step.repaired is None
         last = _mended(stepping, step, before, done) if ends else step
         yield replace(last, check_limits=check_limits)
-        before, done = step.mesh, step.part
+        before = step.mesh
+        done = step.part
 
 
 def _mended(stepping: Stepping, step: Step, before: Mesh, done: float) -> Step:
@@ -130,7 +132,8 @@ def _mended(stepping: Stepping, step: Step, before: Mesh, done: float) -> Step:
     ``before``, ``done``: the mesh before this step, and the part of the motion that it has.
     """
     assert stepping.mend is not None
-    plain, step = step.mesh, stepping.mend(step)
+    plain = step.mesh
+    step = stepping.mend(step)
     if stepping.certify and step.mesh is not plain:
         part = done, step.part
         step = replace(step, safe=step_safety(before, step.mesh, stepping.mesh, part, step.index))
@@ -173,14 +176,16 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
     """
     tried: list[Trial] = []
     best: tuple[Trial, list[Step]] | None = None
-    worse, failure = 0, None
+    worse = 0
+    failure = None
     for count in COUNTS:
         if tried and count <= tried[-1].steps:
             continue  # halving made so many already
         try:
             steps = list(stepping.steps(count, halve=True))
         except UnsoundError as problem:
-            worse, failure = worse + 1, problem
+            worse = worse + 1
+            failure = problem
             if worse == 2:
                 break
             continue
@@ -192,7 +197,8 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
             if not trial.inverted and trial.min - best[0].min <= gain:
                 break
         if best is None or (-trial.inverted, trial.min) > (-best[0].inverted, best[0].min):
-            best, worse = (trial, steps), 0
+            best = (trial, steps)
+            worse = 0
         else:
             worse += 1
         if worse == 2:

@@ -110,7 +110,8 @@ def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
 
 def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
     """Return the case where halo copies of boundaries have the others' roles, and notes."""
-    roles, notes = dict(case.roles), []
+    roles = dict(case.roles)
+    notes = []
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
         role = case.roles.get(copy, "fixed")
         other = case.roles.get(origin, "fixed")
@@ -211,7 +212,8 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     ``images`` (p, 2): pairs of periodic images, which are taken to coincide.
     """
     apart = COINCIDENT * mesh.extent
-    some, links = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)], images
+    some = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)]
+    links = images
     if len(some):
         from scipy.spatial import cKDTree  # takes long to load
 

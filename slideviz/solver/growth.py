@@ -70,7 +70,8 @@ def unsoundness(
             f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
             f"{_cause(setup, mesh, moved)}"
         )
-    asked, largest = largest, max(largest, part * least)
+    asked = largest
+    largest = max(largest, part * least)
     if farthest <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     shift = moved - setup.coords
@@ -155,7 +156,8 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     if not found.length > STRAY * most > 0.0:
         return []
     where = ", ".join(f"{value:.6g}" for value in found.point)
-    ratio, radius = found.length / most, setup.basis.radius
+    ratio = found.length / most
+    radius = setup.basis.radius
     smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
     remedy = f"RBF_KERNEL= wendland-c0, which does not, or INFLUENCE_FACTOR= {smaller}"
     if setup.fitted_radius < radius:
@@ -226,7 +228,9 @@ def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Itera
     Nodes may be off as the undeformed facets are, and `OFF_WALL`. Those of `_off_walls` are not
     among them.
     """
-    field, boundary, rims = setup.span, setup.boundary, setup.known[:0]
+    field = setup.span
+    boundary = setup.boundary
+    rims = setup.known[:0]
     if field is None:
         return
     if setup.rims is not None:
@@ -269,7 +273,8 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
         nodes = nodes[chosen[nodes]]
         farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
         if len(nodes) > 1 and farthest <= TAKEN * largest:
-            at, moved = setup.coords[nodes], shift[nodes]
+            at = setup.coords[nodes]
+            moved = shift[nodes]
             size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
             strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)
     return max(largest, float(max(strains)) * float(np.ptp(setup.coords, axis=0).max()))
@@ -277,7 +282,8 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
 
 def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     nodes = np.concatenate([setup.known, setup.classes.sliding])
-    at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
+    at = setup.coords[nodes]
+    shift = (moved - setup.coords)[nodes]
     from scipy.spatial import cKDTree  # takes long to load
 
     near = cKDTree(at).query(at, k=min(2, len(nodes)))

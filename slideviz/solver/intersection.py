@@ -101,7 +101,8 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in case.markers_with("moving"):
-        moved, others = mesh.marker(name).cells, _others(case, mesh, name)
+        moved = mesh.marker(name).cells
+        others = _others(case, mesh, name)
         hit = swept_crossing(mesh.points, after, moved, others)
         while hit is not None:
             wall = [other for other in others if other[0] == hit.marker]
@@ -127,10 +128,12 @@ def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[
 
     The path is an arc in a cylindrical frame, about its axis, and for motions that rotate.
     """
-    frame, at = find_period(case, mesh, boundary_of(mesh))[1], mesh.points[nodes]
+    frame = find_period(case, mesh, boundary_of(mesh))[1]
+    at = mesh.points[nodes]
     parts = np.arange(1, ARCS + 1) / ARCS
     if frame.cylindrical:
-        start, shift = frame.coords(at), frame.difference(at, vectors)
+        start = frame.coords(at)
+        shift = frame.difference(at, vectors)
         places = [frame.points(start + part * shift) for part in parts]
     elif any(motion.turned(0.0) is not motion for motion in case.motions):
         try:
@@ -261,8 +264,10 @@ def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Itera
     pair = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
     if pair.kind == "translational":
         along = pair.vector / pair.period**2
-        far, place = at @ along, around @ along
-        first, last = floor(place.min() - far.max()), ceil(place.max() - far.min())
+        far = at @ along
+        place = around @ along
+        first = floor(place.min() - far.max())
+        last = ceil(place.max() - far.min())
         for count in range(first, last + 1):
             yield at + float(count) * pair.vector
         return
@@ -345,8 +350,12 @@ def _solid_angles(points, facets, p):  # type: ignore[no-untyped-def]
             a = _arm(points, facets[f, 0], p)
             b = _arm(points, facets[f, k], p)
             c = _arm(points, facets[f, k + 1], p)
-            ab, bc, ca = dot3(a, b), dot3(b, c), dot3(c, a)
-            u, v, w = np.sqrt(dot3(a, a)), np.sqrt(dot3(b, b)), np.sqrt(dot3(c, c))
+            ab = dot3(a, b)
+            bc = dot3(b, c)
+            ca = dot3(c, a)
+            u = np.sqrt(dot3(a, a))
+            v = np.sqrt(dot3(b, b))
+            w = np.sqrt(dot3(c, c))
             volume = dot3(a, cross3(b, c))
             total += 2.0 * np.arctan2(volume, u * v * w + ab * w + bc * u + ca * v)
     return total

@@ -39,14 +39,19 @@ def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> Layer
     if mesh.halo is not None:
         free[np.setdiff1d(mesh.halo.receivers, domain.images)] = False
         free[mesh.halo.outer] = False
-    nodes, frame = np.flatnonzero(free), domain.frame
-    targets, slides = frame.points(domain.coords[nodes]), np.isin(nodes, domain.classes.sliding)
+    nodes = np.flatnonzero(free)
+    frame = domain.frame
+    targets = frame.points(domain.coords[nodes])
+    slides = np.isin(nodes, domain.classes.sliding)
     return find_zone(wall_nodes(frame, domain.coords, known, walls), nodes, targets, slides)
 
 
 def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
-    boundary, points, columns = domain.boundary, mesh.points, find_columns(mesh, 1)
-    height, edges = columns.stack_thickness(points), points[columns.nodes]
+    boundary = domain.boundary
+    points = mesh.points
+    columns = find_columns(mesh, 1)
+    height = columns.stack_thickness(points)
+    edges = points[columns.nodes]
     rise = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
     length = size if mesh.dim == 2 else np.sqrt(size / 2)
@@ -58,7 +63,8 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
             layered = case.layers == "keep" or 2 * np.count_nonzero(height[mine]) > mine.sum()
             if layered and domain.roles.get(name, "fixed") == role:
                 chosen |= mine
-        facets, sides = boundary.facets[chosen], _sides(domain, chosen)
+        facets = boundary.facets[chosen]
+        sides = _sides(domain, chosen)
         links = np.concatenate([facets[:, [0, k]] for k in range(1, facets.shape[1])])
         part = components(len(points), *links.T)[facets[:, 0]]
         for label in np.unique(part):
@@ -87,12 +93,16 @@ def _sides(domain: Domain, chosen: np.ndarray) -> IntArray:
     Fans of a node are sides of a sharp edge where their normals differ by more than `SHARP`.
     ``chosen`` (f,) bool: the facets of walls.
     """
-    fans, normals = domain.fans, domain.normals
-    order, links, apart = np.unique(fans.fan[chosen[fans.facet]]), [np.empty((2, 0), int)], 1
+    fans = domain.fans
+    normals = domain.normals
+    order = np.unique(fans.fan[chosen[fans.facet]])
+    links = [np.empty((2, 0), int)]
+    apart = 1
     order = order[np.argsort(fans.fan_node[order], kind="stable")]
     node = fans.fan_node[order]
     while len(at := np.flatnonzero(node[apart:] == node[: len(node) - apart])):
-        one, two = order[at], order[at + apart]
+        one = order[at]
+        two = order[at + apart]
         alike = np.einsum("jd,jd->j", normals[one], normals[two]) > SHARP
         links.append(np.stack([one[alike], two[alike]]))
         apart += 1
@@ -114,7 +124,8 @@ def _first_heights(
     where no cell is flat.
     """
     facets = columns.boundary.facets[some]
-    nodes, usual = np.unique(facets), float(np.median(flat)) if len(flat) else 0.0
+    nodes = np.unique(facets)
+    usual = float(np.median(flat)) if len(flat) else 0.0
     first = np.zeros(len(nodes))
     column = np.unique(columns.corner[some])
     column = column[column < len(rise)]
@@ -131,11 +142,14 @@ def thickness_warnings(case: Case, domain: Domain, zone: LayerZone | None) -> li
         return []
     from scipy.spatial import cKDTree  # takes long to load
 
-    frame, coords, boundary = domain.frame, domain.coords, domain.boundary
+    frame = domain.frame
+    coords = domain.coords
+    boundary = domain.boundary
     held = [domain.roles.get(name, "fixed") in ("moving", "fixed") for name in boundary.names]
     facets = boundary.facets[np.array(held)[boundary.marker]]
     links = np.concatenate([facets[:, [0, k]] for k in range(1, facets.shape[1])])
-    part, nodes = components(len(coords), *links.T), np.unique(facets)
+    part = components(len(coords), *links.T)
+    nodes = np.unique(facets)
     periods = [-1, 1] if np.any(frame.shift()) else []
     warnings = []
     for wall, *_ in zone.walls.walls:

@@ -70,7 +70,8 @@ class _Corners:
 
     def of(self, coords: Array) -> list[Array]:
         """Return the corners of all facets, one array (f, d) for each place in a facet."""
-        facets, axis = self.setup.boundary.facets, self.setup.axis
+        facets = self.setup.boundary.facets
+        axis = self.setup.axis
         v = value(coords)
         touching = np.flatnonzero(axis[facets].any(axis=1) & ~axis[facets].all(axis=1))
         parts = [take(coords, facets[:, k]) for k in range(facets.shape[1])]
@@ -119,7 +120,8 @@ def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
     """Return the unit normal of each fan (m, d), as ``slideviz.mesh.fans.fan_normals``."""
-    boundary, fans = setup.boundary, setup.wall_fans
+    boundary = setup.boundary
+    fans = setup.wall_fans
     corners = _Corners(setup).of(coords)
     if boundary.dim == 2:
         vectors = transform(TURN[2], corners[1] - corners[0])
@@ -147,7 +149,8 @@ def _directions(setup: Setup, normals: Array) -> Array:
     _, starts, size = np.unique(node, return_index=True, return_counts=True)
     first = starts[size == 2]
     if len(first):
-        one, two = take(total, first), take(total, first + 1)
+        one = take(total, first)
+        two = take(total, first + 1)
         total = put(total, first + 1, unit(two - multiply(one, dot(two, one))))
     keep = np.ones(len(node), bool)
     for start, count in zip(starts[size > 2].tolist(), size[size > 2].tolist(), strict=True):
@@ -164,10 +167,12 @@ def _leading(rows: Array) -> Array:
     depends on it.
     """
     a = value(rows)
-    vectors, sizes = np.linalg.svd(a)[2], np.zeros(3)
+    vectors = np.linalg.svd(a)[2]
+    sizes = np.zeros(3)
     found = np.linalg.svd(a, compute_uv=False)
     sizes[: len(found)] = found**2
-    lead, rest = vectors[:2], vectors[2]
+    lead = vectors[:2]
+    rest = vectors[2]
     gap = 1.0 / (sizes[:2] - sizes[2])
 
     def there(t: FloatArray) -> FloatArray:

@@ -136,7 +136,8 @@ def prescribe(
     """
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
     moved = moved or displaced(displacements(case, mesh), mesh)
-    classes, frame = domain.classes, domain.frame
+    classes = domain.classes
+    frame = domain.frame
     case = case.change(roles=domain.roles)
     problem, folded = motion_messages(case, mesh, displaced_on(rims, mesh, moved))
     if problem:
@@ -183,7 +184,8 @@ def moving_bodies(case: Case, mesh: Mesh, moved: Displacements) -> FloatArray:
     A body is a connected part of the moving boundaries. Those of which no node is displaced do not
     count, unless no node at all is displaced.
     """
-    inside, names = without_halo(mesh)[0], case.markers_with("moving")
+    inside = without_halo(mesh)[0]
+    names = case.markers_with("moving")
     tables = [table for name in names for _, table in inside.marker(name).cells.by_type.values()]
     links = [table[:, [0, k]] for table in tables for k in range(1, table.shape[1])]
     pairs = np.concatenate([np.empty((0, 2), np.int64), *links])

@@ -42,7 +42,8 @@ def remedies(
     ``layers``: of the ``Step`` with inverted cells.
     ``folded``: whether there are inverted cells: repair is a remedy for these.
     """
-    found, roles = [], set(case.roles.values())
+    found = []
+    roles = set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if case.layers != "no" and case.layer_thickness:
@@ -127,7 +128,8 @@ def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
         full = np.pad(at, ((0, 0), (0, 3 - at.shape[1]))) - np.array(pair.origin)
         return full - np.outer(full @ axis, axis)
 
-    before, after = arms(points), arms(points + vectors)
+    before = arms(points)
+    after = arms(points + vectors)
     sine = np.cross(before, after) @ axis
     cosine = np.einsum("ij,ij->i", before, after)
     return float(np.abs(np.arctan2(sine, cosine)).max(initial=0.0))

@@ -228,7 +228,8 @@ def mend(
         points = now.halo.move_receivers(now.points, points, beyond)
     moved = np.flatnonzero((points != now.points).any(axis=1))
     number = np.arange(len(now.cells)) if cells is None else cells
-    mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
+    mended = now.with_points(sealed(points))
+    before = sealed(now.points[moved])
     unmendable, warnings = unmendable_words(done.impossible, mesh, number)
     poor = domain.cells.take(np.setdiff1d(done.bad_after, done.folded_after))
     return MeshRepair(
@@ -360,7 +361,8 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
         pairs = np.isin(mesh.halo.receivers, np.setdiff1d(copies, mesh.halo.outer))
         held = np.concatenate([held, copies, mesh.halo.donors[pairs]])
     held = np.unique(setup.classes.representative[held])
-    frame, coords = setup.frame, setup.frame.coords(points)
+    frame = setup.frame
+    coords = setup.frame.coords(points)
     body = elastic_body(mesh, frame, setup.axis)
     problem = problem_at(setup, coords, coords[setup.known])
 
@@ -403,7 +405,8 @@ def _orthonormal(nodes: IntArray, normals: FloatArray, count: int) -> list[Float
     place = np.arange(len(nodes)) - np.searchsorted(nodes[order], nodes[order])
     out: list[FloatArray] = []
     for k in range(place.max(initial=-1) + 1):
-        rows, at = np.zeros((count, normals.shape[1])), order[place == k]
+        rows = np.zeros((count, normals.shape[1]))
+        at = order[place == k]
         rows[nodes[at]] = normals[at]
         for other in out:
             rows -= other * (other * rows).sum(axis=1, keepdims=True)
@@ -425,7 +428,8 @@ def _projection(
     ``inner`` (n,): nodes that move in the planes of their normals before, wherever they are.
     ``maps_at``: returns the maps at coordinates.
     """
-    frame, representative = setup.frame, setup.classes.representative
+    frame = setup.frame
+    representative = setup.classes.representative
     normals = _orthonormal(*setup.constraints(setup.coords), len(at))
 
     def project(nodes: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:

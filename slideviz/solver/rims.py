@@ -43,7 +43,8 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
     Those that move over the span alone are not among them on hub and shroud: they stay on these by
     their motion.
     """
-    boundary, moving = domain.boundary, domain.classes.moving
+    boundary = domain.boundary
+    moving = domain.classes.moving
     roles = np.array([domain.roles.get(name, "fixed") for name in boundary.names], object)
     is_moving = np.zeros(len(mesh.points), bool)
     is_moving[moving] = True
@@ -52,12 +53,14 @@ def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
     facet, column = np.nonzero(facets[:, None] & is_moving[boundary.facets])
     node = boundary.facets[facet, column]
     keep = domain.once(node) & ~domain.axis[node] & ~_over_span(case, mesh, domain, node, facet)
-    facet, node = facet[keep], node[keep]
+    facet = facet[keep]
+    node = node[keep]
     if not len(node):
         return None
     rim, walls = _walls(case, domain, is_moving, node, facet)
     representative = np.searchsorted(moving, domain.classes.representative[moving])
-    place, bodies = moving[:0], None
+    place = moving[:0]
+    bodies = None
     if case.rims == "slide":
         of_moving = boundary.facets[roles[boundary.marker] == "moving"]
         place, bodies = _bodies(mesh, of_moving, moving, representative, rim)
@@ -80,7 +83,8 @@ def _over_span(
     out = np.zeros(len(node), bool)
     if not moves_over_span(case):
         return out
-    boundary, other = domain.boundary, np.zeros(len(mesh.points), bool)
+    boundary = domain.boundary
+    other = np.zeros(len(mesh.points), bool)
     for name in case.markers_with("moving"):
         motions = [motion for motion in case.motions if applies_to(motion, name)]
         if not all(motion.keeps_span for motion in motions):
@@ -96,14 +100,17 @@ def _walls(
 
     ``node`` and ``facet`` (p,): pairs of a node of the rim and a facet of a wall there.
     """
-    boundary, rim, walls = domain.boundary, np.unique(node), list[RimWall]()
+    boundary = domain.boundary
+    rim = np.unique(node)
+    walls = list[RimWall]()
     marker = boundary.marker[facet]
     for which in np.unique(marker):
         plane = _plane(case, domain, boundary.marker == which)
         if plane is not None:
             rows = np.searchsorted(rim, np.unique(node[marker == which]))
             walls.append(FlatWall((boundary.names[which],), rows, *plane))
-            node, facet = node[marker != which], facet[marker != which]
+            node = node[marker != which]
+            facet = facet[marker != which]
             marker = marker[marker != which]
     if len(node):
         walls += _curved_walls(case, domain, is_moving, rim, node, facet)
@@ -115,10 +122,12 @@ def _plane(case: Case, domain: Domain, member: np.ndarray) -> tuple[FloatArray, 
 
     Nor is there any if they go on smoothly out of it. ``member`` (f,) bool: the facets.
     """
-    boundary, coords = domain.boundary, domain.coords
+    boundary = domain.boundary
+    coords = domain.coords
     x = corners(coords, boundary.facets[member], domain.axis)
     vectors = corner_vectors(x)
-    normal, point = unit(vectors.sum(axis=0)), x[0, 0]
+    normal = unit(vectors.sum(axis=0))
+    point = x[0, 0]
     flat = FLAT * np.abs(x).max()
     if not normal.any() or np.abs((x - point) @ normal).max() > flat:
         return None
@@ -143,7 +152,8 @@ def _curved_walls(
     facet: IntArray,
 ) -> Iterator[CurvedWall]:
     """Yield the smooth surfaces that nodes are on, of a ``rim`` (r,); parameters as of `_walls`."""
-    boundary, frame = domain.boundary, domain.frame
+    boundary = domain.boundary
+    frame = domain.frame
     place = partial(corners, domain.coords, axis=domain.axis)
     roles = {name: domain.roles.get(name, "fixed") for name in boundary.names}
     roles = {name: role if role in APART else "sliding" for name, role in roles.items()}
@@ -255,7 +265,8 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
         return replace(moved, vectors=vectors)
     if case.rims == "free":
         return moved
-    known, key = _RIMS.setdefault(mesh, {}), rims_key(case)
+    known = _RIMS.setdefault(mesh, {})
+    key = rims_key(case)
     if key not in known:
         rims = find_rims(case, mesh, find_domain(case, mesh))
         if rims is not None and rims.bodies is not None:

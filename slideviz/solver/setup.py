@@ -77,7 +77,8 @@ def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float
     ``facets`` (f, k): of the boundary, so that a streamed mesh has the same.
     """
     moving, sliding = np.zeros((2, len(points)), bool)
-    moving[classes.moving], sliding[classes.sliding] = True, True
+    moving[classes.moving] = True
+    sliding[classes.sliding] = True
     near = facets[moving[facets].any(axis=1) & sliding[facets].any(axis=1)]
     ends = np.stack([near, np.roll(near, -1, axis=1)], axis=-1).reshape(-1, 2)
     ends = np.concatenate([ends, ends[:, ::-1]])
@@ -129,13 +130,16 @@ def loose_warnings(
         return [sentence]
     if reduction.tolerance <= LOOSE * largest:
         return []
-    absolute, relative = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
+    absolute = f"{largest / 100:.2g}"
+    relative = f"{largest / extent / 100:.2g}"
     remedy = f"use DATA_RED_RELATIVE= {relative} or less"
     if not case.reduction.relative:
         remedy = f"use DATA_RED_TOLERANCE= {absolute} or less (or DATA_RED_RELATIVE= {relative})"
-    is_, so = "not below", "no control node is needed to meet it, and only the cells"
+    is_ = "not below"
+    so = "no control node is needed to meet it, and only the cells"
     if reduction.tolerance < largest:
-        is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"
+        is_ = "more than a tenth of"
+        so = "control nodes follow the motion roughly, and the cells"
     sentence = (
         f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
         f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
@@ -236,7 +240,8 @@ class Setup(Domain):
             return
         row = np.full(len(self.coords), -1)
         row[nodes] = np.arange(len(nodes))
-        copy, origin = row[self.halo.receivers], row[self.halo.donors]
+        copy = row[self.halo.receivers]
+        origin = row[self.halo.donors]
         both = (copy >= 0) & (origin >= 0)
         moved = slid[origin[both]]
         if not self.frame.cylindrical:
@@ -274,7 +279,9 @@ def setup_of(
     gap = sliding_gap(mesh.points, domain.boundary.facets, domain.classes)
     reduction = find_reduction(case, mesh.extent, conditions.largest, candidates, gap)
     loose = loose_warnings(case, reduction, conditions.largest, mesh.extent, gap)
-    frame, coords, axis = domain.frame, domain.coords, domain.axis
+    frame = domain.frame
+    coords = domain.coords
+    axis = domain.axis
     span = span_field(case, mesh) if moves_over_span(case) else None
     tracks = find_tracks(
         domain.boundary,
@@ -342,7 +349,8 @@ def stiffness_of(case: Case, mesh: Mesh) -> Stiffness:
 
     walls = [np.empty(0, np.int64)]
     for marker in mesh.markers:
-        role, name = case.roles.get(marker.name, "fixed"), marker.name.lower()
+        role = case.roles.get(marker.name, "fixed")
+        name = marker.name.lower()
         if role == "moving" or (role == "fixed" and not any(word in name for word in NOT_WALLS)):
             walls.append(marker.nodes)
     nodes = np.unique(np.concatenate(walls))

@@ -66,13 +66,18 @@ class Stepping:
         length, and these again, up to ``HALVINGS`` times. ``count`` can also be the part of the
         displacement that is made after each step.
         """
-        setup, mesh = self.setup, self.mesh
+        setup = self.setup
+        mesh = self.mesh
         parts = [k / count for k in range(1, count + 1)] if isinstance(count, int) else count
         ahead = [(part, 0) for part in parts]
-        coords, done, index, folded = setup.coords, 0.0, 0, 0
+        coords = setup.coords
+        done = 0.0
+        index = 0
+        folded = 0
         warnings = [*self.case.warnings, *setup.warnings]
         remarks: list[str] = []
-        worst, least = 0.0, (0.0, 0.0, 0, 0.0)
+        worst = 0.0
+        least = (0.0, 0.0, 0, 0.0)
         seconds = dict(self.seconds)
         before: Solution | None = None
         made: list[Step] = []
@@ -102,7 +107,8 @@ class Stepping:
                 try:
                     now = self.quality_of([*made, step]).inverted
                 except UnsoundError as problem:
-                    now, failure = folded, failure or problem
+                    now = folded
+                    failure = failure or problem
                 if (now > folded or failure) and halvings < HALVINGS:
                     needed = 1 if failure else self._halvings(last, step.mesh)
                     for k in range(halvings + 1, min(halvings + needed, HALVINGS) + 1):
@@ -118,11 +124,15 @@ class Stepping:
                 with timer.phase("quality"):
                     safe = step_safety(last, step.mesh, mesh, (done, part), index + 1)
                 step = replace(step, safe=safe)
-            coords, done, index, last = moved, part, index + 1, step.mesh
+            coords = moved
+            done = part
+            index = index + 1
+            last = step.mesh
             before = solution
             ahead.pop(0)
             if solution.short and solution.max_error > worst:
-                remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
+                remarks = [_short_warning(setup, solution, index)]
+                worst = solution.max_error
             elif not remarks:
                 remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
@@ -227,7 +237,8 @@ def mended_coords(setup: Setup, step: Step, moved: FloatArray) -> FloatArray:
     """Return the coordinates (n, d) of a step after its repair; ``moved`` are those before."""
     if step.repaired is None or not len(step.repaired.nodes):
         return moved
-    nodes, now = step.repaired.nodes, moved.copy()
+    nodes = step.repaired.nodes
+    now = moved.copy()
     now[nodes] = setup.frame.coords(step.mesh.points[nodes])
     return now
 
@@ -263,7 +274,8 @@ def one_step(
         return put(displacement, second, take(displacement, first), overwrite=True)
 
     keep = keep_layers(setup, problem, goal, timer)
-    displacement, relaxed = tie(keep(solution.displacement)), None
+    displacement = tie(keep(solution.displacement))
+    relaxed = None
     if setup.relaxation is not None:
         displacement, relaxed = setup.relaxation.relaxed(
             problem, displacement, _rigid(setup), setup.constraints, tie, timer
@@ -290,7 +302,8 @@ def keep_layers(
     if zone is None:
         return lambda displacement: displacement
     with timer.phase("layers"):
-        carried, coords = zone.carried(zone.walls.motion(goal)), take(problem.coords, zone.nodes)
+        carried = zone.carried(zone.walls.motion(goal))
+        coords = take(problem.coords, zone.nodes)
 
     def keep(displacement: Array) -> Array:
         with timer.phase("layers"):
@@ -312,7 +325,8 @@ def problem_at(
 ) -> Problem:
     """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
     once = np.flatnonzero(setup.once(setup.known))
-    known, classes = setup.known[once], setup.classes
+    known = setup.known[once]
+    classes = setup.classes
 
     def fixed(name: str, make: Callable[[], Any]) -> Any:
         return make() if frozen is None else frozen.fixed(name, make)
@@ -361,7 +375,8 @@ def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> F
 
     def add(part: slice) -> None:
         # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
-        by, before = displacement[part], coords[part]
+        by = displacement[part]
+        before = coords[part]
         displacement[part] = np.where(by == 0, before, before + by)
 
     in_parts(add, len(coords))
@@ -393,7 +408,8 @@ def with_halo_copies(
 ) -> tuple[FloatArray, FloatArray]:
     """Return Cartesian ``points`` and coordinates ``moved`` (n, d), with halo copies moved, too."""
     rows = setup.copies
-    points, out = halo.move_receivers(mesh.points, points, rows), moved.copy()
+    points = halo.move_receivers(mesh.points, points, rows)
+    out = moved.copy()
     out[halo.receivers[rows]] = setup.frame.coords(points[halo.receivers[rows]])
     return points, out
 

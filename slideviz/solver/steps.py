@@ -93,7 +93,8 @@ class MeshRepair:
 
     def words(self) -> str:
         """Return what was mended in words: ``303 of 303 folded cells mended, 66 are poor``."""
-        before, after = len(self.folded), len(self.folded_left)
+        before = len(self.folded)
+        after = len(self.folded_left)
         poor = len(self.left) - after
         if before:
             verb = "is" if poor == 1 else "are"

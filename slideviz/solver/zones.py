@@ -63,7 +63,8 @@ class InterfaceMotion:
         self._zone = {n: k for k, part in enumerate(mesh.zone_parts) for n in names_in(mesh, part)}
         asked = [each for each in self.interfaces if self.roles.get(each.marker) == "moving"]
         for index in self.moving(range(len(self.cases))):
-            alone, zone = self._alone[index], mesh.zone_parts[index].mesh
+            alone = self._alone[index]
+            zone = mesh.zone_parts[index].mesh
             moved = on_walls(alone, zone, displacements(alone, zone))
             shift = np.zeros_like(mesh.points)
             shift[mesh.zone_parts[index].points][moved.nodes] = moved.vectors
@@ -134,11 +135,14 @@ class InterfaceMotion:
 
     def _follow(self, each: ZoneInterface, shift: FloatArray) -> None:
         new = ~self.led[each.partners]
-        nodes, leaders = each.partners[new], each.nodes[new]
-        self.led[nodes], self.leader[nodes] = True, leaders
+        nodes = each.partners[new]
+        leaders = each.nodes[new]
+        self.led[nodes] = True
+        self.leader[nodes] = leaders
         self._vectors[nodes] = shift[leaders]
         index = each.zone - 1
-        part, alone = self.mesh.zone_parts[index], self._alone[index]
+        part = self.mesh.zone_parts[index]
+        alone = self._alone[index]
         self._names[index] |= {names_in(self.mesh, part)[each.other]}
         here = np.flatnonzero(self.led[part.points])
         vectors = self._vectors[part.points][here]
@@ -155,8 +159,10 @@ class InterfaceMotion:
         """
         parts = enumerate(self.mesh.zone_parts)
         now = with_zones(self.mesh, [steps[k].mesh if k in steps else z.mesh for k, z in parts])
-        points, nodes = now.points, np.flatnonzero(self.led)
-        leaders, start = self.leader[nodes], self.mesh.points
+        points = now.points
+        nodes = np.flatnonzero(self.led)
+        leaders = self.leader[nodes]
+        start = self.mesh.points
         alike = (start[nodes] == start[leaders]).all(axis=1)
         gap = np.abs(points[nodes] - points[leaders]).max(axis=1, initial=0.0)
         alike &= gap <= ROUNDING * self.mesh.extent
@@ -172,7 +178,8 @@ def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     """
     if not mesh.zone_parts:
         return check_motion(case, mesh)
-    motion, folded = InterfaceMotion(case, mesh), None
+    motion = InterfaceMotion(case, mesh)
+    folded = None
     for index, _ in motion.leaders_first():
         problem, overlap = check_motion(motion.cases[index], mesh.zone_parts[index].mesh)
         if problem:
@@ -199,15 +206,18 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
 def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
     """Return the motion of interfaces, and the steps of those zones that move."""
     require_valid(case, mesh)
-    motion, runs = InterfaceMotion(case, mesh), Runs()
+    motion = InterfaceMotion(case, mesh)
+    runs = Runs()
     for index, ahead in motion.leaders_first():
-        done, part = len(runs), mesh.zone_parts[index]
+        done = len(runs)
+        part = mesh.zone_parts[index]
         count = 1 + len(motion.moving(ahead))
 
         def zone_report(
             now: Progress, done: int = done, count: int = count, zone: int = index + 1
         ) -> None:
-            step, total = done * now.total + now.step, (done + count) * now.total
+            step = done * now.total + now.step
+            total = (done + count) * now.total
             report(replace(now, step=step, total=total, zone=zone))
 
         try:
@@ -222,7 +232,8 @@ def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[Interfa
 
 def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
     """Yield the steps of zones as those of the mesh of all."""
-    mesh, longest = motion.mesh, max(runs.values(), key=len)
+    mesh = motion.mesh
+    longest = max(runs.values(), key=len)
     before: dict[int, Step] = {}
     for leader in longest:
         steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
@@ -255,7 +266,8 @@ def joined_step(
 
     ``fresh`` are those that are no step of the round before.
     """
-    each, new = list(steps.values()), list(fresh.values())
+    each = list(steps.values())
+    new = list(fresh.values())
     counts: Counter[str] = Counter()
     spent: Counter[str] = Counter()
     for step in each:
@@ -301,7 +313,8 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def _kept_layers(mesh: Mesh, steps: Mapping[int, Step]) -> KeptLayers | None:
-    walls, nodes = [], 0
+    walls = []
+    nodes = 0
     for index, step in steps.items():
         if step.kept_layers is None:
             continue

@@ -87,7 +87,8 @@ def _places(stack: ExitStack, source: ZoneSource, folder: Path) -> IntArray | No
 def _gathered(source: ZoneSource, where: IntArray) -> Cells:
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
-    types, flats = [], []
+    types = []
+    flats = []
     for part in np.split(ordered, cuts):
         block = source.elements_at(int(part[0]), int(part[-1] - part[0]) + 1)
         some = Cells.from_types(block.types, block.nodes).take(part - part[0])
@@ -136,7 +137,8 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
         if text.zone.sends:
             raise halo_error(name)
         require_binary_names(name, (marker.name for marker in text.zone.markers))
-    layouts, alone = binary_layouts(texts, is_result=True), texts[0].zone.bounds.zones > len(texts)
+    layouts = binary_layouts(texts, is_result=True)
+    alone = texts[0].zone.bounds.zones > len(texts)
     warn(sentence_of_lost(target, printable(source.name), lost_of_texts(texts), alone=alone))
     require_disk_space(target, target, layouts[-1].place.end)
     with atomic_write(target) as file:
@@ -148,7 +150,8 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
 def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
     with ExitStack() as stack:
         zones = FileSource.open(stack, (source, zone)).zones
-        binary, places = zones[0].file, [one.place for one in zones]
+        binary = zones[0].file
+        places = [one.place for one in zones]
         for place in places:
             require_text_names(binary.name, (marker.name for marker in place.markers))
         if len(places) < binary.zones:

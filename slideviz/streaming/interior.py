@@ -34,10 +34,12 @@ class InteriorDisplacer:
 
     def repaired(self, repair: MeshRepair) -> InteriorDisplacer:
         """Return the same after the repair of the whole mesh, with its nodes in the skin moved."""
-        last, mesh = self.steps[-1], repair.mesh
+        last = self.steps[-1]
+        mesh = repair.mesh
         assert self.skin.part is not None
         assert mesh.part is not None
-        skin, points = self.skin.part.points, np.array(last.mesh.points)
+        skin = self.skin.part.points
+        points = np.array(last.mesh.points)
         nodes = repair.nodes[np.isin(repair.nodes, skin)]
         now = mesh.points[np.searchsorted(mesh.part.points, nodes)]
         points[np.searchsorted(skin, nodes)] = now
@@ -66,13 +68,15 @@ class InteriorDisplacer:
         inner = np.ones(len(points), bool)
         inner[at] = False
         self._require_enclosed(nodes, points, start, inner)
-        axis, coords = on_axis(frame, start), start
+        axis = on_axis(frame, start)
+        coords = start
         zone = self._zone(start, inner & ~axis)
         for step, motion in zip(self.steps, self._motions, strict=True):
             assert step.field is not None
             displacement = step.field.at(frame.features(coords), frame.points(coords))
             if zone is not None:
-                by, carried = displacement[zone.nodes], zone.carried(motion)
+                by = displacement[zone.nodes]
+                carried = zone.carried(motion)
                 moved = zone.displacement(coords[zone.nodes], by, carried)
                 displacement[zone.nodes] = value(moved)
             coords = shifted(coords, displacement, axis)
@@ -96,7 +100,8 @@ class InteriorDisplacer:
 
     def _zone(self, start: FloatArray, free: np.ndarray) -> LayerZone | None:
         """Return the zone of walls among the nodes of a mask (m,), with coordinates (m, d)."""
-        zone, nodes = self.setup.zone, np.flatnonzero(free)
+        zone = self.setup.zone
+        nodes = np.flatnonzero(free)
         if zone is None:
             return None
         return find_zone(
@@ -152,7 +157,8 @@ class InteriorDisplacer:
         squared = np.einsum("nd,nd->n", shift, shift)
         squared[at] = 0.0
         k = int(np.argmax(squared))
-        far, after = float(np.linalg.norm(shift[k])) if squared[k] else 0.0, step.mesh.points
+        far = float(np.linalg.norm(shift[k])) if squared[k] else 0.0
+        after = step.mesh.points
         message = overshoot_of_rest(self.setup, self.skin, after, step.part, far)
         if message:
             where = ", ".join(f"{value:.6g}" for value in points[k])

@@ -69,8 +69,13 @@ class Output:
         resume: bool,
         replaces: Path | None,
     ) -> None:
-        self._stack, self._input, self._path, self._timer = stack, mesh_input, output, timer
-        self._ranks, self._is_text, self._replaces = ranks, is_text, replaces
+        self._stack = stack
+        self._input = mesh_input
+        self._path = output
+        self._timer = timer
+        self._ranks = ranks
+        self._is_text = is_text
+        self._replaces = replaces
         every = FileSource.open(stack, (mesh_input.path, mesh_input.zone)).zones
         self.zones = tuple(replace(one, first_cell=0, first_point=0) for one in every)
         """The zones of the undeformed mesh, each with numbers of its own."""
@@ -128,7 +133,8 @@ class Output:
 
     def resume_message(self) -> str:
         """Return a sentence on how much of a stopped run can be used."""
-        done, total = self._opened().done, len(self._parts)
+        done = self._opened().done
+        total = len(self._parts)
         if done:
             return f"{self._path.name}: continues after {done} of {total} parts"
         if self._input.is_reused:
@@ -146,7 +152,8 @@ class Output:
         Points that are not ``final`` are those of a trial number of steps: all are written, and a
         stopped run does not go on with them. Without ``displacer`` they are the undeformed ones.
         """
-        partial, mine = self._opened(), self._parts_of(zone)
+        partial = self._opened()
+        mine = self._parts_of(zone)
         if not final and any(partial.sums[at] is not None for at in mine):
             partial.note([None if at in mine else one for at, one in enumerate(partial.sums)])
         # Ranks must see what others write, and none write a page back with old bytes of others.
@@ -171,7 +178,9 @@ class Output:
         With ``displacer`` it says how far each of its steps may go.
         Raises MeshError if cells are numbered in both directions, and some are folded.
         """
-        partial, source, count = self._opened(), self.zones[zone], self._cells[-1].stop
+        partial = self._opened()
+        source = self.zones[zone]
+        count = self._cells[-1].stop
         if not self._collectors:
             arguments = self._stack, self._path.parent, count, self._metric
             self._collectors = [QualityCollector(*arguments) for _ in range(2)]
@@ -212,7 +221,8 @@ class Output:
         """Write the output where it is a text, with ``boxes`` of each zone, None: as they were."""
         if not self._is_text:
             return
-        partial, written = self._opened(), 0
+        partial = self._opened()
+        written = 0
         moved = [
             replace(z, points=PointTable(z.file.of(partial.file), z.place), base=z.points)
             for z in self.zones

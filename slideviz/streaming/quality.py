@@ -68,7 +68,8 @@ class QualityCollector:
         self, ids: Index, values: FloatArray, status: NDArray[np.uint8], signs: NDArray[np.int8]
     ) -> None:
         """Add the values, statuses and signs of the cells ``ids`` (k,)."""
-        self._values[ids], self._status[ids] = values, status
+        self._values[ids] = values
+        self._status[ids] = status
         self.signs = orientations_of(np.concatenate([self.signs, signs]))
         self._release()
 
@@ -98,7 +99,8 @@ def quality_blocks(
     for block in source.blocks(tick):
         measured = quality(block.mesh, block.base, metric)
         if isinstance(source, FileSource) and not may_fold:
-            before, signs = len(signs), orientations_of(np.concatenate([signs, measured.signs]))
+            before = len(signs)
+            signs = orientations_of(np.concatenate([signs, measured.signs]))
             for zone in source.zones if before < 2 == len(signs) else ():
                 remedy = ""
                 if zone.base is None:
@@ -220,10 +222,13 @@ class MeasuredBlock:
 
         It says how far each step may go if it gets the steps, with ``displacer``.
         """
-        base, mesh = block.base, block.mesh
+        base = block.base
+        mesh = block.mesh
         assert base is not None
-        before, after = quality(base, metric=metric), quality(mesh, base, metric)
-        ends, inverted = mesh.cells.offsets, np.flatnonzero(after.status == INVERTED)
+        before = quality(base, metric=metric)
+        after = quality(mesh, base, metric)
+        ends = mesh.cells.offsets
+        inverted = np.flatnonzero(after.status == INVERTED)
         first = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
         nodes = {k: block.nodes[mesh.cells.connectivity[ends[k] : ends[k + 1]]] for k in first}
         return cls(
@@ -241,19 +246,23 @@ class MeasuredBlock:
 
 def _safe_fractions(block: CellBlock, displacer: InteriorDisplacer) -> list[SafeFraction]:
     """Return how far each step may go, by the cells of a block."""
-    base, steps, found = block.base, displacer.steps, []
+    base = block.base
+    steps = displacer.steps
+    found = []
     assert base is not None
     meshes = [block.mesh]
     if len(steps) > 1:
         moved = displacer.after_steps(block.nodes, base.points)
         meshes = [base.with_points(points) for points in moved]
         meshes[-1] = block.mesh  # where cells were repaired, not what the last step left
-    before, done = base, 0.0
+    before = base
+    done = 0.0
     for step, mesh in zip(steps, meshes, strict=True):
         safe = step_safety(before, mesh, base, (done, step.part), step.index)
         cell = None if safe.cell is None else int(block.ids[safe.cell])
         found.append(replace(safe, cell=cell))
-        before, done = mesh, step.part
+        before = mesh
+        done = step.part
     return found
 
 
@@ -261,7 +270,8 @@ class RunCollector:
     """The quality of all cells of a zone before and after a run, collected block by block."""
 
     def __init__(self, after: QualityCollector, before: QualityCollector) -> None:
-        self.after, self.before = after, before
+        self.after = after
+        self.before = before
         self.inverted: dict[int, tuple[int, IntArray]] = {}
         """VTK type and nodes of inverted cells, by their number: those with the lowest numbers."""
         self.farthest = Farthest(-1.0, 0, np.empty(0))

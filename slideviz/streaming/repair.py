@@ -48,8 +48,12 @@ class FileRegions:
         going_on: Callable[[], object],
     ) -> None:
         assert skin.part is not None
-        self._source, self._file, self._going_on = source, file, going_on
-        self._skin, self._freedom, self._facets = skin.part.points, freedom, facets
+        self._source = source
+        self._file = file
+        self._going_on = going_on
+        self._skin = skin.part.points
+        self._freedom = freedom
+        self._facets = facets
         self.nodes = self._skin[:0]
         self.before = np.empty((0, skin.dim))
         """`nodes`, `before` (m,), (m, d): nodes in regions that were moved, and where they were."""
@@ -63,7 +67,9 @@ class FileRegions:
         near = self._nodes_of(lambda block, _: np.isin(block.ids, cells))
         for _ in range(rings):
             near = self._nodes_of(_touching(near))
-        blocks, count, free = [], 0, free_memory()
+        blocks = []
+        count = 0
+        free = free_memory()
         for block in self._blocks(_touching(near)):
             blocks.append(block)
             count += len(block.ids)
@@ -79,7 +85,8 @@ class FileRegions:
         nodes, connectivity = np.unique(flat, return_inverse=True)
         types = np.concatenate([block.types for block in blocks])
         order = np.argsort(ids, kind="stable")
-        ids, table = ids[order], Cells.from_types(types, connectivity).take(order)
+        ids = ids[order]
+        table = Cells.from_types(types, connectivity).take(order)
         assert self._source.base is not None
         mesh = Mesh(self._source.points.at(nodes), table, name=self._source.file.name)
         reference = mesh.with_points(self._source.base.at(nodes))
@@ -161,7 +168,8 @@ def mend_file(
     ``points`` (k, d): of the deformed skin.
     ``before`` and ``after``: quality of all cells, undeformed and deformed.
     """
-    below, count = min(case.repair_below, before.min), source.n_cells
+    below = min(case.repair_below, before.min)
+    count = source.n_cells
     parts = [slice(first, first + CELLS) for first in range(0, count, CELLS)]
     folded = np.concatenate([p.start + np.flatnonzero(after.status[p] != VALID) for p in parts])
     poor = np.concatenate([p.start + np.flatnonzero(after.values[p] < below) for p in parts])

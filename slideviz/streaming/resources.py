@@ -44,7 +44,8 @@ def missing_memory(case: Case) -> str:
 
 def missing_memory_of(path: Path, kind: FileFormat) -> str:
     """Return the sentence that an SU2 mesh needs more memory than is free; "" if it fits."""
-    needed, free = NEEDED[kind] * path.stat().st_size, free_memory()
+    needed = NEEDED[kind] * path.stat().st_size
+    free = free_memory()
     if needed <= free:
         return ""
     return f"{path.name} needs about {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free"

@@ -65,9 +65,11 @@ class RemainingTime:
     """
 
     def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:
-        self._report, self._left_stages = report, [(stage, 1.0) for stage in stages]
+        self._report = report
+        self._left_stages = [(stage, 1.0) for stage in stages]
         self._spent = self._usual = 0.0
-        self._begin, self._part = monotonic(), 0.0
+        self._begin = monotonic()
+        self._part = 0.0
 
     def divide(self, zones: int) -> None:
         """Let the two stages after this one be done for each zone by itself."""
@@ -80,7 +82,8 @@ class RemainingTime:
         if done != "solve":
             self._spent += monotonic() - self._begin
             self._usual += SECONDS[done] * share
-        self._begin, self._part = monotonic(), 0.0
+        self._begin = monotonic()
+        self._part = 0.0
 
     def more(self, stage: str) -> None:
         """Begin a stage that was not foreseen."""
@@ -101,9 +104,11 @@ class RemainingTime:
     def _left(self) -> float | None:
         """Return an estimate of the seconds that are left; None before there is enough evidence."""
         (stage, share), now = self._left_stages[0], monotonic() - self._begin
-        spent, usual = self._spent, self._usual
+        spent = self._spent
+        usual = self._usual
         if stage != "solve":
-            spent, usual = spent + now, usual + SECONDS[stage] * share * self._part
+            spent = spent + now
+            usual = usual + SECONDS[stage] * share * self._part
         if usual < LEAST_PART:
             return None
         pace = spent / usual
@@ -217,7 +222,9 @@ class _ZoneRuns:
     """
 
     def __init__(self, out: Output, remaining: RemainingTime, listed: int) -> None:
-        self._out, self._remaining, self._listed = out, remaining, listed
+        self._out = out
+        self._remaining = remaining
+        self._listed = listed
         self._displacers: dict[int, InteriorDisplacer] = {}
         self._measured: dict[int, RunCollector] = {}
         self._joined: InterfaceMotion | None = None
@@ -246,7 +253,8 @@ class _ZoneRuns:
             (before.points.view(np.int64) != after.points.view(np.int64)).any(axis=1)
         )
         if len(apart):
-            numbers, points = after.part.points[apart], after.points[apart]
+            numbers = after.part.points[apart]
+            points = after.points[apart]
             self._out.change(
                 zone, "evaluate", lambda at, file, _: at.points.write(file, numbers, points)
             )
@@ -268,7 +276,8 @@ class _ZoneRuns:
             require_memory(setup, case)
             # Let go of what is not needed any more: cells and joints, after the steps the tracks.
             whole = skin if case.repair != "no" else None
-            full, skin = setup if whole else None, without_cells(skin)
+            full = setup if whole else None
+            skin = without_cells(skin)
             pairs = np.empty((0, 2), np.int64)
             boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
             setup = replace(setup, boundary=boundary)
@@ -315,10 +324,13 @@ class _ZoneRuns:
             for zone, displacer in self._displacers.items()
         }
         if self._joined is None:
-            skin, steps, first = self._displacers[0].skin, runs[0], [0]
+            skin = self._displacers[0].skin
+            steps = runs[0]
+            first = [0]
         else:
             motion = self._joined
-            skin, steps = without_cells(motion.mesh), list(joined_steps(motion, runs))
+            skin = without_cells(motion.mesh)
+            steps = list(joined_steps(motion, runs))
             first = [part.first_cell for part in motion.mesh.zone_parts]
         folded = {
             start + cell: when
@@ -332,7 +344,8 @@ class _ZoneRuns:
 
     def _folded(self, zone: int, steps: Sequence[Step]) -> dict[int, tuple[int, int]]:
         """Return VTK type and first inverted step, of ``steps``, of inverted cells of a zone."""
-        cells, displacer = self._measured[zone].inverted, self._displacers.get(zone)
+        cells = self._measured[zone].inverted
+        displacer = self._displacers.get(zone)
         if displacer is None:
             return {cell: (vtk, 1) for cell, (vtk, _) in cells.items()}
         found = folded_steps(displacer, self._out.zones[zone], cells)
@@ -409,7 +422,8 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
 
     The last one warns of the node of the whole mesh that went farthest, if it strays.
     """
-    skin, last = displacer.skin, displacer.steps[-1]
+    skin = displacer.skin
+    last = displacer.steps[-1]
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)

@@ -283,7 +283,8 @@ def _point_reader(
             block = point_block(source, place, first, BLOCK)
             outer: Outer = {}
             for axis in range(place.dim):
-                low, high = int(block[:, axis].argmin()), int(block[:, axis].argmax())
+                low = int(block[:, axis].argmin())
+                high = int(block[:, axis].argmax())
                 outer[axis, "low"] = first + low, block[low].copy()
                 outer[axis, "high"] = first + high, block[high].copy()
             return block[nodes - first], outer

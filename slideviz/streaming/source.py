@@ -67,9 +67,11 @@ class CellBlock:
 
     def part_of(self, whole: Mesh) -> CellBlock:
         """Return the block with the name and the zone of the mesh that it is a part of."""
-        n_points, n_cells = len(whole.points), len(whole.cells)
+        n_points = len(whole.points)
+        n_cells = len(whole.cells)
         if whole.part is not None:
-            n_points, n_cells = whole.part.n_points, whole.part.n_cells
+            n_points = whole.part.n_points
+            n_cells = whole.part.n_cells
         part = Part(
             frozen_array(self.nodes, np.int64), frozen_array(self.ids, np.int64), n_points, n_cells
         )
@@ -88,7 +90,8 @@ _EMPTY = (
 def join_blocks(blocks: Iterable[CellBlock]) -> CellBlock:
     """Return the cells of some blocks as one, by ascending number."""
     every = list(blocks) or [CellBlock(*_EMPTY)]
-    one, meshes = every[0], [block.mesh for block in every]
+    one = every[0]
+    meshes = [block.mesh for block in every]
     ids = np.concatenate([block.ids for block in every])
     order = np.argsort(ids, kind="stable")
     nodes, first = np.unique(np.concatenate([block.nodes for block in every]), return_index=True)
@@ -146,7 +149,8 @@ class MemorySource:
     def blocks(self, tick: Tick = lambda _: None) -> Iterator[CellBlock]:
         """Yield the mesh as one block."""
         numbers = np.arange(max(self.n_cells, self.n_points))
-        ids, nodes = numbers[: self.n_cells], numbers[: self.n_points]
+        ids = numbers[: self.n_cells]
+        nodes = numbers[: self.n_points]
         yield CellBlock(ids, nodes, self.mesh, self.base)
         tick(1.0)
 
@@ -247,9 +251,11 @@ class ZoneSource:
 
         Where their nodes lie close to each other, the points between are among them (`SPARSE`).
         """
-        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
+        low = int(block.nodes.min())
+        high = int(block.nodes.max()) + 1
         if high - low <= SPARSE * len(block.types):
-            nodes, flat = np.arange(low, high), block.nodes - low
+            nodes = np.arange(low, high)
+            flat = block.nodes - low
         else:
             nodes, flat = np.unique(block.nodes, return_inverse=True)
         cells = Cells.from_types(block.types, flat)

@@ -36,7 +36,9 @@ from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat
 
-SCANNED, FILLED, COPIED = 0.15, 0.75, 0.8
+SCANNED = 0.15
+FILLED = 0.75
+COPIED = 0.8
 """Parts of the time for reading a text after which its lines are found, its copy is made, and the
 checksums of the copy are computed."""
 
@@ -163,8 +165,11 @@ def open_for_run(
         for text in texts:
             require_binary_names(name, (m.name for m in text.zone.markers))
         warn(sentence_of_lost(output, name, lost_of_texts(texts)))
-    layouts, left = binary_layouts(texts, is_result=not is_text), reusable_bytes(output)
-    state, size, width = path.stat(), layouts[-1].place.end, layouts[0].conn.itemsize
+    layouts = binary_layouts(texts, is_result=not is_text)
+    left = reusable_bytes(output)
+    state = path.stat()
+    size = layouts[-1].place.end
+    width = layouts[0].conn.itemsize
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {size}"
     with partial_file(output, size, about, resume=resume, more=BINARY) as copy:
         is_reused = (

@@ -92,7 +92,8 @@ def csv_text(rows: Sequence[CombinationRow]) -> str:
         columns["limits"] = StudyColumn("limits that are not met, or met", lambda r: r.limits)
     lines: list[list[object]] = [[*KEY_COLUMNS, *columns, "problem"]]
     for row in rows:
-        tried, result = row.combination, row.result
+        tried = row.combination
+        result = row.result
         values = [None if result is None else c.value(result) for c in columns.values()]
         lines.append([tried.method, tried.periodic, tried.steps or "auto", *values, row.problem])
     return csv_table.csv_text(lines)
@@ -379,7 +380,8 @@ class _Clock:
     """Stopwatch: ``with clock:`` adds the block's wall time and the time of all processors."""
 
     def __init__(self, seconds: float = 0.0, processor: float = 0.0) -> None:
-        self.seconds, self.processor = seconds, processor
+        self.seconds = seconds
+        self.processor = processor
 
     def __enter__(self) -> None:
         self.seconds -= time.perf_counter()

@@ -32,7 +32,8 @@ DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
 _OVERSAMPLED = 2
 """Ratio of drawn to shown size of pictures, so that fine mesh lines turn grey, not black."""
-_NAME, _LOWEST = 0.3, 0.5
+_NAME = 0.3
+_LOWEST = 0.5
 """Inches: width of the name of a row, and the least height of a row, so that its name fits."""
 _HIGHEST = 40.0  # inches: height of the figure while it is laid out; it is trimmed afterwards
 
@@ -54,7 +55,8 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
     }
     if not kept:
         return None
-    methods, modes = _axis(rows, done, "method"), _axis(rows, done, "periodic")
+    methods = _axis(rows, done, "method")
+    modes = _axis(rows, done, "periodic")
     places = {
         (methods[row.combination.method][0], modes[row.combination.periodic][0]): row
         for row in rows
@@ -62,7 +64,8 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
     }
     names = [tuple(name for _, name in axis.values()) for axis in (methods, modes)]
     if len(modes) == 1 or len(methods) > 2 * len(modes):  # the methods beside each other
-        names, places = names[::-1], {at[::-1]: row for at, row in places.items()}
+        names = names[::-1]
+        places = {at[::-1]: row for at, row in places.items()}
     # Those of long montages are smaller.
     wide = (WIDTH - _NAME) / max(len(names[1]), 2 if len(names[0]) < 3 else 3)
     side = int(wide * DPI * _OVERSAMPLED)
@@ -142,7 +145,8 @@ def _facets(
         image = shown.get((row, column))
         if image is not None:
             axes.imshow(image[down[row], across], interpolation="antialiased")
-        half, middle = heights[row] / 2.0, (down[row].stop - down[row].start) / 2.0
+        half = heights[row] / 2.0
+        middle = (down[row].stop - down[row].start) / 2.0
         axes.set(aspect="equal", xlim=(0, width), ylim=(middle + half, middle - half))
         if row == 0:
             axes.set_title(fitted(names[1][column], wide, PRINT.size)[0], fontsize=PRINT.size)

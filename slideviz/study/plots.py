@@ -80,7 +80,9 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
     ``span``: when left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
     no span for a 2D mesh.
     """
-    axis, origin, turns = case.axis, case.origin, False
+    axis = case.axis
+    origin = case.origin
+    turns = False
     names = case.markers_with("periodic")
     if names and span in (None, "r"):
         try:
@@ -161,7 +163,8 @@ def _against(what: What) -> _Draw:
     def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         outcomes = []
         for line in lines:
-            result, found = line.result, line.result.quality
+            result = line.result
+            found = line.result.quality
             numbers = found.min, found.mean, found.inverted, result.processor_seconds
             outcomes.append(Outcome(line.label, result.steps, *numbers, line.series))
         against_steps(axes, outcomes, what, _QUIET)
@@ -311,7 +314,8 @@ def _readable_seconds(together: Sequence[Axes]) -> None:
     values = values[values > 0.0]
     if not len(values) or values.max() < _WIDE * values.min():
         return
-    low, high = values.min() / 1.5, values.max() * 1.5
+    low = values.min() / 1.5
+    high = values.max() * 1.5
     # Three numbers a decade, and of many decades one.
     parts = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
     for axes in together:

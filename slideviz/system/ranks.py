@@ -156,7 +156,8 @@ class Ranks(SerialPool):
 
         If ``make`` fails, its error is the answer to each task.
         """
-        fault, work = None, None
+        fault = None
+        work = None
         try:
             work = stack.enter_context(make(*arguments))
         except Exception as problem:
@@ -166,7 +167,8 @@ class Ranks(SerialPool):
             result = None
             if work is not None:
                 try:
-                    fault, result = None, work(task)
+                    fault = None
+                    result = work(task)
                 except Exception as problem:
                     fault = self._portable(problem)
             self.comm.send((index, result, fault), 0)
@@ -215,7 +217,8 @@ class Ranks(SerialPool):
         """
         from mpi4py import MPI
 
-        status, wait = MPI.Status(), 1e-5
+        status = MPI.Status()
+        wait = 1e-5
         while not self.comm.iprobe(status=status):
             if other is not None and other.done():
                 return 0, None

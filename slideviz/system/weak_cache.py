@@ -21,7 +21,8 @@ def weak_cache(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def cached(*args: P.args, **kwargs: P.kwargs) -> R:
-        of_first, key = results.setdefault(args[0], {}), (*args[1:], *kwargs.items())
+        of_first = results.setdefault(args[0], {})
+        key = (*args[1:], *kwargs.items())
         if key not in of_first:
             of_first[key] = function(*args, **kwargs)
         return of_first[key]

@@ -435,7 +435,8 @@ def _moved(
     """
     nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
     vectors = np.zeros((len(nodes), mesh.dim))
-    warnings, any_inside = [], False
+    warnings = []
+    any_inside = False
     for name in on:
         inside, _ = embedding(box, mesh, name)
         any_inside |= bool(len(inside.nodes))

@@ -185,7 +185,8 @@ def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displa
     index = [boundary.names.index(name) for name in names]
     facets = boundary.facets[np.isin(boundary.marker, index)]
     nodes = np.unique(facets)
-    points, local = mesh.points[nodes], np.searchsorted(nodes, facets)
+    points = mesh.points[nodes]
+    local = np.searchsorted(nodes, facets)
     rim = nodes[np.unique(find_edges(points, local)[1])]
     target, target_size = _read_target(motion.path, mesh, names)
     walls = _walls(case, mesh, nodes, index, rim)
@@ -220,12 +221,15 @@ def _walls(
 
     They are surfaces of the frame, as an annulus is round, and go on flat beyond the rim.
     """
-    inside, sides = without_halo(mesh)[0], case.markers_with("periodic")
+    inside = without_halo(mesh)[0]
+    sides = case.markers_with("periodic")
     pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin) if sides else ()
     frame, _ = make_frame(
         inside.points, pairs, periodic_distance=case.periodic in ("fixed", "moving")
     )
-    coords, boundary, walls = frame.coords(mesh.points), boundary_of(mesh), dict[str, Wall]()
+    coords = frame.coords(mesh.points)
+    boundary = boundary_of(mesh)
+    walls = dict[str, Wall]()
     shift = frame.shift()
     place = partial(corners, coords, axis=on_axis(frame, coords))
     moving = np.zeros(len(coords), bool)
@@ -245,7 +249,8 @@ def _walls(
 
 def _on_wall(tree: ClosestPoints, frame: Frame, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     at, which = tree.nearest(frame.coords(x))
-    points, normals = frame.points(at), _normals(tree.simplices(which))
+    points = frame.points(at)
+    normals = _normals(tree.simplices(which))
     return points, unit(np.einsum("mij,mi->mj", coords_slopes(frame, points), normals))
 
 
@@ -253,15 +258,18 @@ def _checked(
     motion: Onto, names: tuple[str, ...], laid: Laid, walls: dict[str, Wall], size: float
 ) -> Remaining:
     """Return the note on a boundary laid onto a target; CaseError where they do not fit."""
-    of, file = " and ".join(names), printable(motion.path)
-    away, count = int(np.count_nonzero(laid.facing < AGREE)), len(laid.facing)
+    of = " and ".join(names)
+    file = printable(motion.path)
+    away = int(np.count_nonzero(laid.facing < AGREE))
+    count = len(laid.facing)
     if away > MOST_AWAY * count:
         raise CaseError(
             f"{file}: {away:,} of {count:,} nodes of {of} do not face this surface: their "
             "normals are more than 70° apart; give a surface near the boundary and about parallel "
             "to it, whose facets are oriented alike"
         )
-    farthest, limit = float(laid.distances.max()), motion.limit or FARTHEST * size
+    farthest = float(laid.distances.max())
+    limit = motion.limit or FARTHEST * size
     if farthest > limit:
         default = "" if motion.limit else f", {FARTHEST:.0%} of its size"
         raise CaseError(

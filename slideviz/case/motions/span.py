@@ -221,7 +221,8 @@ class Blade:
         Also for each motion the row of the total that it changes, and the derivative (n, k) of that
         by its values.
         """
-        totals, slopes = [np.zeros((TOTALS, len(self.nodes)))], list[tuple[int, FloatArray]]()
+        totals = [np.zeros((TOTALS, len(self.nodes)))]
+        slopes = list[tuple[int, FloatArray]]()
         for motion, reached in zip(self.motions, self.reached, strict=True):
             row, change, slope = change_of(
                 motion.kind, motion.spans, motion.values, self.sections.spans
@@ -245,10 +246,12 @@ def blades_of(case: Case, mesh: Mesh, on: Mapping[str, IntArray]) -> list[Blade]
     }
     groups: list[tuple[set[str], list[int]]] = []
     for place, motion in motions.items():
-        names, places = {name for name in on if applies_to(motion, name)}, [place]
+        names = {name for name in on if applies_to(motion, name)}
+        places = [place]
         for other in [group for group in groups if group[0] & names]:
             groups.remove(other)
-            names, places = names | other[0], sorted(places + other[1])
+            names = names | other[0]
+            places = sorted(places + other[1])
         groups.append((names, places))
     return [_blade(case, mesh, on, sorted(names), places) for names, places in groups]
 
@@ -292,7 +295,8 @@ def _turns(case: Case, mesh: Mesh, triangles: IntArray) -> FloatArray:
 
     ``triangles`` (t, 3): its facets, which periodic sides may cut.
     """
-    out, sides = np.zeros(len(mesh.points)), case.markers_with("periodic")
+    out = np.zeros(len(mesh.points))
+    sides = case.markers_with("periodic")
     if sides:
         inside = without_halo(mesh)[0]
         pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)

@@ -71,10 +71,13 @@ class FrozenFit:
         stays 0 with data reduction, as that of `GreedyFit`, and for warnings of derivatives.
         """
         basis = problem.basis
-        self._problem, self._to_come, self.dropped = problem, stages, dropped
+        self._problem = problem
+        self._to_come = stages
+        self.dropped = dropped
         self._basis, self._features = basis, problem.features
         self._dim = problem.dim
-        self._chosen, self._fixed = chosen, fixed
+        self._chosen = chosen
+        self._fixed = fixed
         self._refined, self._checked = refined and supports(basis), checked and not basis.saddle
         self.error_estimate: Any = np.zeros(())
         self.stages: tuple[Levels, ...] = ()
@@ -106,14 +109,17 @@ class FrozenFit:
 
     def _solved(self, rows: ConstraintRows, index: IntArray, level: int, stage: str) -> Interpolant:
         """Return the interpolant of ``rows``, those with the numbers ``index`` among all rows."""
-        count, m = len(rows.nodes), value(rows.right).shape[-1]
+        count = len(rows.nodes)
+        m = value(rows.right).shape[-1]
         solve, extra = self._solver(rows, index, level, stage)
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
         right[..., :count, :] = value(rows.right)
         weights: Array = solve(right)
-        forward, back = solve, None
+        forward = solve
+        back = None
         if isinstance(solve, MeasuredSystem | WithPolynomial):
-            forward, back = solve.tangent, solve.adjoint
+            forward = solve.tangent
+            back = solve.adjoint
         if isinstance(solve, MeasuredSystem | WithPolynomial) and self._problem.reduction is None:
             self.error_estimate = np.maximum(self.error_estimate, solve.error_estimate)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
@@ -134,7 +140,8 @@ class FrozenFit:
 
         Zeros where the system is constant. ``extra`` of the n unknowns are the polynomial's.
         """
-        count, m = len(rows.nodes), found.shape[-1]
+        count = len(rows.nodes)
+        m = found.shape[-1]
         if not (isinstance(self._features, Variable) or isinstance(rows.normals, Variable)):
             return np.zeros_like(found)
         weights: Array = found[:count]
@@ -162,7 +169,8 @@ class FrozenFit:
         solve = self._definite(rows, index, level, stage)
         if not self._basis.polynomial:
             return solve, 0
-        along, name = row_terms(self._problem, rows), f"{stage} terms {level}"
+        along = row_terms(self._problem, rows)
+        name = f"{stage} terms {level}"
         use = self._chosen(name, lambda: independent(along))
         made = self._fixed(f"{name} solver", lambda: WithPolynomial(solve, along, use))
         return made, along.shape[1]
@@ -171,7 +179,8 @@ class FrozenFit:
         self, rows: ConstraintRows, index: IntArray, level: int, stage: str
     ) -> Callable[..., FloatArray]:
         """Return the solver of the positive definite system of ``rows``, without a polynomial."""
-        place, normals = self._problem.place(rows.nodes), rows.directions
+        place = self._problem.place(rows.nodes)
+        normals = rows.directions
         if normals is None:
             factor = self._fixed(
                 f"{stage} factor {level}", lambda: self._extended(place, index, level)
@@ -222,7 +231,8 @@ class FrozenFit:
         """Extend the factor of the previous stage by the new rows, which have no directions."""
         before, factor = self._factors.get(level, (index[:0], NOTHING))
         if not np.array_equal(index[: len(before)], before):
-            before, factor = index[:0], NOTHING
+            before = index[:0]
+            factor = NOTHING
         new = place[:, len(before) :]
         if not new.shape[1]:
             return factor
@@ -237,7 +247,8 @@ class FrozenFit:
         self, rows: ConstraintRows, name: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return the solver of a system with polynomial, and how many unknowns it adds."""
-        count, place = len(rows.nodes), (self._problem.place(rows.nodes), rows.directions)
+        count = len(rows.nodes)
+        place = (self._problem.place(rows.nodes), rows.directions)
         along = row_terms(self._problem, rows)
         total = along.shape[1]
 

@@ -28,7 +28,9 @@ class MeasuredSystem:
     """Solves a system in blocks, and estimates the errors of the fields of its solutions."""
 
     def __init__(self, blocks: list[IntArray], systems: list[System], *, refined: bool) -> None:
-        self._blocks, self._systems, self._refined = blocks, systems, refined
+        self._blocks = blocks
+        self._systems = systems
+        self._refined = refined
         self.error_estimate: FloatArray = np.zeros(())
         """(...,): estimated error of each of the last solutions, as a part of its largest datum."""
 
@@ -44,13 +46,15 @@ class MeasuredSystem:
         wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
         largest = np.abs(right if data is None else data).max(axis=(-1, -2), initial=0.0)
         largest = np.repeat(largest.ravel(), m)
-        out, error_estimate = np.empty_like(wide), np.zeros(len(largest))
+        out = np.empty_like(wide)
+        error_estimate = np.zeros(len(largest))
         for block, system in zip(self._blocks, self._systems, strict=True):
             with enough_threads(2.0 * len(block) * wide[block].size):
                 solved = system.factor.solve(wide[block])
                 if self._refined:
                     refined = system.refined(wide[block], largest, solved, of_weights=of_weights)
-                    solved, field_error = refined.weights, refined.error_estimate
+                    solved = refined.weights
+                    field_error = refined.error_estimate
                 else:
                     parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
                     off = [system.field_error(wide[block, at], solved[:, at]) for at in parts]
@@ -128,7 +132,8 @@ class WithPolynomial:
         return np.asarray(getattr(self._inner, "error_estimate", 0.0))
 
     def _solved(self, solve: Callable[..., FloatArray], right: FloatArray) -> FloatArray:
-        data, out = np.ascontiguousarray(right[..., : self._n, :]), np.zeros_like(right)
+        data = np.ascontiguousarray(right[..., : self._n, :])
+        out = np.zeros_like(right)
         free = columnwise(
             partial(solve_triangular, self._r, trans=1, check_finite=False),
             right[..., self._rows, :],

@@ -207,14 +207,17 @@ class FrozenStep:
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
         """Return coordinates and Cartesian points, with copies in a halo moved, too."""
-        setup, frame = self.setup, self.setup.frame
+        setup = self.setup
+        frame = self.setup.frame
         at = _at_rest(points(frame, moved), moved, setup.coords, self.mesh.points)
         halo = self.mesh.halo
         if halo is None:
             return moved, at
         rows = setup.copies
-        donors, copies = halo.donors[rows], halo.receivers[rows]
-        donor, start = self.mesh.points[donors], self.mesh.points[copies]
+        donors = halo.donors[rows]
+        copies = halo.receivers[rows]
+        donor = self.mesh.points[donors]
+        start = self.mesh.points[copies]
         follow = tape.transform(halo.rotations[rows], tape.take(at, donors) - donor)
         overwrite = at is not moved
         at = tape.put(at, copies, add_displacement(start, follow), overwrite=overwrite)
@@ -288,7 +291,8 @@ class _Run:
         On the plane of the facet, the line of the edge or the vertex that is closest at the
         reference.
         """
-        setup, base = self._setup, tape.take(self._coords, nodes)
+        setup = self._setup
+        base = tape.take(self._coords, nodes)
         name = f"project {next(self._projections)}"
         anchor, matrix = self._kept(name, partial(self._tracked, nodes, value(base), value(free)))
         away = tape.transform(matrix - np.eye(matrix.shape[-1]), base - anchor)
@@ -311,8 +315,10 @@ class _Run:
         See `slideviz.rbf.projection.projection_matrices`.
         """
         tracks = self._setup.tracks
-        label, at = tracks.of_node[nodes], base + free
-        anchor, matrix = base.copy(), np.zeros((*base.shape, base.shape[1]))
+        label = tracks.of_node[nodes]
+        at = base + free
+        anchor = base.copy()
+        matrix = np.zeros((*base.shape, base.shape[1]))
         for index in np.unique(label[label >= 0]).tolist():
             rows = np.flatnonzero(label == index)
             found, which = tracks.tracks[index].nearest(at[rows])
@@ -327,12 +333,15 @@ class _Run:
 
         Rotations (t, d, d) turn displacements of the latter into those of the copies, in the frame.
         """
-        setup, halo, d = self._setup, self._setup.halo, self._setup.coords.shape[1]
+        setup = self._setup
+        halo = self._setup.halo
+        d = self._setup.coords.shape[1]
         if halo is None:
             return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, d, d))
         row = np.full(len(setup.coords), -1)
         row[nodes] = np.arange(len(nodes))
-        copy, origin = row[halo.receivers], row[halo.donors]
+        copy = row[halo.receivers]
+        origin = row[halo.donors]
         both = (copy >= 0) & (origin >= 0)
         turn = halo.rotations[both]
         if setup.frame.cylindrical:

@@ -91,7 +91,8 @@ def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
             c[..., 0] - a[..., 0]
         )
 
-    start, end = ends[:, 0], ends[:, 1]
+    start = ends[:, 0]
+    end = ends[:, 1]
     across = side(one, other, start) * side(one, other, end) <= 0.0
     # Segments on the line itself do not cross it.
     apart = (side(one, other, start) == 0.0) & (side(one, other, end) == 0.0)
@@ -99,10 +100,13 @@ def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
 
 
 def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
-    u, v = triangle[1] - triangle[0], triangle[2] - triangle[0]
+    u = triangle[1] - triangle[0]
+    v = triangle[2] - triangle[0]
     normal = np.cross(u, v)
-    start, along = ends[:, 0] - triangle[0], ends[:, 1] - ends[:, 0]
-    height, rise = start @ normal, along @ normal
+    start = ends[:, 0] - triangle[0]
+    along = ends[:, 1] - ends[:, 0]
+    height = start @ normal
+    rise = along @ normal
     # Whether it gets to the plane of the triangle; one within the plane pierces nothing.
     reaches = (np.abs(height) <= np.abs(rise)) & (height * rise <= 0.0) & (rise != 0.0)
     at = start[reaches] - (height[reaches] / rise[reaches])[:, None] * along[reaches]
@@ -133,13 +137,15 @@ def held_by_continuity(
     What is held in one zone is held in all, so that boundaries which they share stay together. None
     are where no zone has FFD_CONTINUITY, but a warning says which ones SU2 would hold.
     """
-    every, warnings = {}, []
+    every = {}
+    warnings = []
     for name, box in boxes.items():
         zones = [config, *(zone for zone in config.beside if name in _boxes_moved(zone))]
         asking = [zone for zone in zones if zone.words["FFD_CONTINUITY"]]
         held = _held_in(asking or zones, mesh, box)
         every[name] = held if asking else NONE
-        stuck, partly = [], []
+        stuck = []
+        partly = []
         for place, variable in enumerate(config.variables, 1):
             if variable.box != name:
                 continue
@@ -267,7 +273,8 @@ class MovedBoxes(Displacer):
 
     def moved_boxes(self) -> dict[str, tuple[Box, bool]]:
         """Return the boxes after the design, and whether their nodes are placed anew."""
-        moved, renewed = self.at_design.moved(), self.at_design.uvw()
+        moved = self.at_design.moved()
+        renewed = self.at_design.uvw()
         for name, (places, uvw) in renewed.items():
             moved[name] = replace(moved[name], embedded=self._listed(moved[name], places, uvw))
         return {name: (box, name in renewed) for name, box in moved.items()}
@@ -276,7 +283,8 @@ class MovedBoxes(Displacer):
         self, box: Box, places: IntArray, uvw: FloatArray
     ) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return the surface points of a box with new parametric coordinates (k, 3) of nodes."""
-        nodes, found = self.nodes[places], {}
+        nodes = self.nodes[places]
+        found = {}
         for marker, (listed, before) in box.embedded.items():
             at = np.minimum(np.searchsorted(nodes, listed), len(nodes) - 1)
             moves = (nodes[at] == listed) & (marker in self.config.markers)
@@ -297,10 +305,13 @@ def limits_of(config: Su2Config) -> Limits:
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
     """Return the boxes that the variables deform, with the nodes (m,) inside; or CaseError."""
-    known, names = boxes_for(config.case, mesh), _boxes_moved(config)
+    known = boxes_for(config.case, mesh)
+    names = _boxes_moved(config)
     nested = {name for box in known.values() if box.parent for name in (box.name, box.parent)}
     order = [box.name for box in boxes_of(mesh, system_of(config.case))]
-    boxes, inside, warnings = [], {}, []
+    boxes = []
+    inside = {}
+    warnings = []
     for name in (*order, *(name for name in known if name not in order)):
         # As in SU2, a box without variables takes the nodes that the file lists for it, too.
         if name not in names | nested and not known[name].embedded.keys() & {*config.markers}:

@@ -200,7 +200,8 @@ ELSEWHERE = ("MOTION", "DEFORMATION_FILENAME")
 SU2_CONTINUITY = "2ND_DERIVATIVE"  # SU2's default of FFD_CONTINUITY
 OWN = {name for name in OURS if not name.startswith(("FFD_", "MARKER_"))}
 """Keys of case files that resemble no key of SU2."""
-ALIKE, ALIKE_OWN = 0.9, 0.8
+ALIKE = 0.9
+ALIKE_OWN = 0.8
 """Similarity (``difflib``, 0 to 1) from which an unread key may be a mistyped one; the second for
 keys in `OWN`. SU2 has keys as similar as MARKER_INTERFACE (0.84 to MARKER_INTERNAL) and
 SOLUTION_FILENAME (0.895 to SOLUTION_ADJ_FILENAME)."""
@@ -252,7 +253,9 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
     The first replace those in the file: they are SU2's keys, and lists of boundaries. Raises
     CaseError if a key is none of a configuration or of slideviz, or has no meaning here.
     """
-    found, others, known = {}, [], _read_keys() | {FUNCTION, *READ_WITH_RBF}
+    found = {}
+    others = []
+    known = _read_keys() | {FUNCTION, *READ_WITH_RBF}
     listed = {term.key for term in ROLES.values()} | {*ELSEWHERE}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -284,7 +287,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     files = _listed_files(rows, problems)
     if problems:
         raise CaseError(listed(path, problems))
-    each, faults = dict[Path, Su2Config](), dict[str, None]()
+    each = dict[Path, Su2Config]()
+    faults = dict[str, None]()
     # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
     inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
     for file, numbers in _numbers_of_zones(files).items():
@@ -299,7 +303,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     if faults:
         raise CaseError(first_lines(path, [*faults]))
     zones = [replace(each[file], zone=zone) for zone, file in enumerate(files, 1)]
-    first, reader = zones[0], _Reader(rows, problems)
+    first = zones[0]
+    reader = _Reader(rows, problems)
     mesh = reader.file("MESH_FILENAME", FILES["MESH_FILENAME"])
     out = reader.file("MESH_OUT_FILENAME", FILES["MESH_OUT_FILENAME"])
     strange = [key for key in rows if key not in _read_keys(rows)]
@@ -351,7 +356,8 @@ def _rows(path: Path) -> tuple[dict[str, Entry], list[Problem], tuple[str, ...]]
 
 def _listed_files(rows: dict[str, Entry], problems: list[Problem]) -> list[Path]:
     """Return the configurations of zones in CONFIG_LIST; appends to ``problems``."""
-    entry, reader = rows["CONFIG_LIST"], _Reader(rows, problems)
+    entry = rows["CONFIG_LIST"]
+    reader = _Reader(rows, problems)
     if _word(rows, "MULTIZONE") != "YES" and _word(rows, "SOLVER") != "MULTIPHYSICS":
         reader.note(entry, "needs MULTIZONE= YES, or SOLVER= MULTIPHYSICS: SU2 takes one zone else")
     if "ZONE" in rows:
@@ -398,7 +404,8 @@ def _config(
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
         warnings=(*warnings, *notes, *_perhaps_ours(path, ignored, rows)),
     )
-    variables, keys = variables or NOTHING, frozenset(rows)
+    variables = variables or NOTHING
+    keys = frozenset(rows)
     return Su2Config(case, markers, variables, files, words, ignored, reader.named, keys, zone)
 
 
@@ -449,7 +456,8 @@ class _Reader:
     """Reads the keys of a configuration; appends mistakes to ``problems``, fills ``named``."""
 
     def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
-        self.rows, self.problems = rows, problems
+        self.rows = rows
+        self.problems = problems
         self.named: dict[str, str] = {}
         self.warnings: list[str] = []
 

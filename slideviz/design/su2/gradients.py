@@ -84,7 +84,8 @@ def find_gradients(
     Raises SlidevizError if the sensitivities are missing or of another mesh, or the deformation is
     not possible. The warnings of the `Deformer` are among the warnings of the result.
     """
-    mesh, markers = surface.mesh, surface.config.markers
+    mesh = surface.mesh
+    markers = surface.config.markers
     sensitivities = read_sensitivities(surface.config, mesh, surface.nodes)
     displacement = surface.displacement
     if surface.moves_whole_mesh:

@@ -28,7 +28,8 @@ def read_mesh(config: Su2Config) -> Mesh:
 
     With MULTIZONE_MESH= NO each zone is the mesh that its configuration names.
     """
-    file, form = config.case.mesh_file, config.case.mesh_format
+    file = config.case.mesh_file
+    form = config.case.mesh_format
     assert file is not None
     if config.words["MULTIZONE_MESH"].upper() == "YES" or not config.zones:
         raise_all(
@@ -184,10 +185,12 @@ def _without_missing(config: Su2Config, mesh: Mesh) -> Su2Config:
 
 def zone_of(config: Su2Config, mesh: Mesh) -> tuple[IntArray, tuple[Marker, ...]]:
     """Return the nodes and the boundaries of the zone that a configuration is of, or all."""
-    points, markers = slice(0, len(mesh.points)), slice(None)
+    points = slice(0, len(mesh.points))
+    markers = slice(None)
     if config.zone is not None:
         part = mesh.zone_parts[config.zone - 1]
-        points, markers = part.points, part.markers
+        points = part.points
+        markers = part.markers
     return np.arange(points.start, points.stop), mesh.markers[markers]
 
 

@@ -104,7 +104,9 @@ SUFFIXES = dict(line.split(",") for line in _OBJECTIVES.splitlines()[1:])
 """Suffixes that SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
 SURFACE = "surface_sensitivity"
 """The column, in small letters, of derivatives along normals that SU2 writes for surfaces."""
-EXACT, CLOSE, SAME = 1e-13, 1e-8, 1e-6
+EXACT = 1e-13
+CLOSE = 1e-8
+SAME = 1e-6
 """Differences of positions in a file from points, as a part of the largest coordinate: up to
 ``EXACT`` the file is of these points, above ``CLOSE`` there is a warning, above ``SAME`` the file
 is of other points."""
@@ -272,7 +274,9 @@ def match(
     if design is not None and gap > EXACT * unit:
         there, others = _nearest(found, design())
         if there <= gap:
-            gap, rows, at_design = there, others, True
+            gap = there
+            rows = others
+            at_design = True
     if gap > SAME * unit:
         raise CaseError(
             f"{found.path}: its points are neither those of {mesh.name} nor those of this design: "

@@ -100,7 +100,8 @@ class MovedNodes:
         The trailing edge is between the first node of the last marker and its last one with
         x > 0, or the first if its normal is nearer to x; the leading edge is farthest from it.
         """
-        mesh, markers = self.mesh, [name for name in self.mesh.marker_names if name in self.markers]
+        mesh = self.mesh
+        markers = [name for name in self.mesh.marker_names if name in self.markers]
         listed = mesh.marker(markers[-1]).cells.connectivity
         order = listed[np.sort(np.unique(listed, return_index=True)[1])]
         first = mesh.points[order[0], :2]
@@ -117,7 +118,8 @@ class MovedNodes:
 
     def chord_notes(self, kinds: set[str]) -> list[str]:
         """Return warnings where the chord is not that which variables of some kinds expect."""
-        x, notes = self.points[:, 0], []
+        x = self.points[:, 0]
+        notes = []
         unit = [kind for kind in UNIT_CHORD if kind in kinds]
         if unit and max(abs(x.min()), abs(x.max() - 1.0)) > OFF_CHORD:
             notes.append(

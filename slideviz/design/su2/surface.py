@@ -70,7 +70,8 @@ def convex_part(
     """
     if not _is_checked(config):
         return 1.0, attempt(config), ()
-    least, kind = quality(mesh).inverted, config.variables[0]
+    least = quality(mesh).inverted
+    kind = config.variables[0]
     impossible: list[CaseError | DeformError] = []
 
     def tried(config: Su2Config) -> tuple[Attempt | None, int]:
@@ -88,14 +89,18 @@ def convex_part(
         note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is applied"
         return 1.0, full, (note,)
     best: tuple[float, Attempt] | None = None
-    part, step, depth, valid = 1.0, 1.0, 0, False
+    part = 1.0
+    step = 1.0
+    depth = 0
+    valid = False
     for _ in range(_count(config, "ITER")):
         step /= 2.0
         part += step if valid else -step
         found, inverted = tried(scaled(config, part))
         valid = found is not None and not inverted
         if found is not None and valid:  # which is larger than the one before
-            best, depth = (part, found), depth + 1
+            best = (part, found)
+            depth = depth + 1
         if depth == _count(config, "DEPTH"):
             break
     note = f"CONVEXITY_CHECK: all of the design would invert {first} more cells"
@@ -346,7 +351,9 @@ class MovingSurface:
         ):
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
-        nodes, vectors, warnings = self.nodes, self.displacement, self.warnings
+        nodes = self.nodes
+        vectors = self.displacement
+        warnings = self.warnings
         if self.moves_whole_mesh or not self.config.markers:
             every = dict.fromkeys(names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")

@@ -220,7 +220,8 @@ def _groups(
         warnings.append(
             f"DV_PARAM has {sentence}: as in SU2, the last ones of DV_KIND have no effect"
         )
-    last, most = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
+    last = groups[-1]
+    most = len(KINDS[kinds[len(groups) - 1]].parameters)
     if most and len(last) > most:
         extra = ", ".join(word.text for word in last[most:])
         warnings.append(Note(f"DV_PARAM: {extra} after the last variable is ignored"))
@@ -229,7 +230,8 @@ def _groups(
 
 
 def _variable(name: str, group: list[Word]) -> DesignVariable:
-    kind, names = KINDS[name], KINDS[name].parameters
+    kind = KINDS[name]
+    names = KINDS[name].parameters
     if not names:
         return DesignVariable(name, (0.0,))  # what is written there means nothing: mostly (1.0)
     needed = f"{name} needs {form(name)}"
@@ -326,7 +328,8 @@ def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
         return f"{first.kind} is first, and alone moves the mesh"
     if variable.group != first.group:
         return f"{first.kind} is first, and decides what can move"
-    order, leading = KINDS[variable.kind].order, KINDS[first.kind].order
+    order = KINDS[variable.kind].order
+    leading = KINDS[first.kind].order
     if variable.kind == "HICKS_HENNE_CAMBER" != first.kind:
         return f"HICKS_HENNE_CAMBER moves only where it stands first, and {first.kind} does"
     if order < leading and first.kind != "ANGLE_OF_ATTACK":

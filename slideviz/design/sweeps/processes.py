@@ -127,11 +127,14 @@ def run_task(task: Task) -> TaskResult:
 
 def _result(task: Task, mesh: Mesh | None, begin: float) -> DesignRow:
     """Deform the mesh as ``slideviz run`` does, and return the row."""
-    last, errors = None, []
+    last = None
+    errors = []
     if mesh is None:
         assert task.output is not None
         done = stream(task.case, task.output, file_format=task.file_format)
-        mesh, last, measured = done.mesh, done.steps[-1], done.quality
+        mesh = done.mesh
+        last = done.steps[-1]
+        measured = done.quality
         errors = [step.max_error for step in done.steps]
     else:
         for step in deform(task.case, mesh):

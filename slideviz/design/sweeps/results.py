@@ -44,7 +44,8 @@ from slideviz.system.atomic import atomic_write, reason_of
 from slideviz.system.csv_table import csv_rows, csv_text, write_csv
 from slideviz.system.file_checks import read_json, require_regular_file
 
-RESULTS, SOURCES = "results.csv", "sweep.json"
+RESULTS = "results.csv"
+SOURCES = "sweep.json"
 LOCK = "sweep.lock"
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # errors of file systems without locks
 
@@ -56,7 +57,9 @@ class SweepResults:
     """
 
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
-        self._folder, self._designs, self._sources = folder, designs, sources
+        self._folder = folder
+        self._designs = designs
+        self._sources = sources
         self._lock: BaseFileLock | None = None
         limited = any(design.case.limits for design in designs.rows)
         self._words = ("limits", *WORDS) if limited else WORDS

@@ -152,7 +152,8 @@ def sweep(
         mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     if folder is None and (meshes or resume):
         raise CaseError("meshes and resume need a folder; give folder=")
-    results, earlier = None, list[DesignRow]()
+    results = None
+    earlier = list[DesignRow]()
     if folder is not None:
         results = SweepResults(Path(folder), asked, sources_of(case, mesh))
         earlier = results.start(resume=resume, force=force, meshes=meshes)
@@ -239,7 +240,9 @@ class _Loop:
         waiting: deque[Design],
         going_on: Callable[[], object],
     ) -> None:
-        self._executor, self._tasks, self._waiting = executor, tasks, waiting
+        self._executor = executor
+        self._tasks = tasks
+        self._waiting = waiting
         self._check = going_on
         self._pending: dict[Future[TaskResult], tuple[Design, bool]] = {}
         self._tries: dict[int, int] = {}

@@ -108,7 +108,8 @@ def read_designs(case: Case, table: Table) -> Designs:
     columns = columns_of(case, names)
     if not columns or not rows:
         raise CaseError("the table of designs is empty; give at least one column and one row")
-    designs, problems = [], []
+    designs = []
+    problems = []
     for at, row in enumerate(rows, start=1):
         values = {name: _value(row.get(name, "")) for name in names}
         try:

@@ -70,7 +70,8 @@ def join(zones: Sequence[CgnsZone]) -> Joined:
     for zone in range(len(zones)):
         for one in _interfaces(zones, zone, names, tolerance):
             (left if one.period or one.why else closed).append(one)
-    here, there = np.empty(0, np.int64), np.empty(0, np.int64)
+    here = np.empty(0, np.int64)
+    there = np.empty(0, np.int64)
     for one in closed:
         assert one.pairs is not None
         here = np.append(here, one.pairs[0] + begins[one.zone])
@@ -224,6 +225,7 @@ def _nearest(
     """Return nodes (m,) of faces, and the nearest node (m,) of the donor's faces ``others``."""
     from scipy.spatial import KDTree
 
-    here, there = faces.nodes, others.nodes
+    here = faces.nodes
+    there = others.nodes
     closest = KDTree(donor.points[there]).query(zone.points[here])[1]
     return here, there[closest]

@@ -186,7 +186,8 @@ def _add_open(
 
 
 def _free_name(one: Interface, taken: Sequence[str]) -> str:
-    name, number = one.node.name, 1
+    name = one.node.name
+    number = 1
     while name in taken:
         number += 1
         name = f"{one.node.name}_{number}"
@@ -231,7 +232,8 @@ def require_cgns(mesh: Mesh, path: Path) -> tuple[CgnsForm, Path]:
     ``path`` is the file to write, for messages. Raises MeshError if it was not read from a CGNS
     file, so it cannot be written as one.
     """
-    form, source = mesh.origin, mesh.source
+    form = mesh.origin
+    source = mesh.source
     if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):
         raise path_error(
             path,
@@ -251,7 +253,8 @@ def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: 
     for names, numbers in zip(form.datasets, form.numbers, strict=True):
         for axis, name in enumerate(names):
             dataset = tree.get(name)
-            before, after = form.points[numbers, axis], points[numbers, axis]
+            before = form.points[numbers, axis]
+            after = points[numbers, axis]
             if not isinstance(dataset, h5py.Dataset) or dataset.size != len(numbers):
                 raise _changed(path, source, name)
             values = np.asarray(dataset[()])

@@ -63,7 +63,8 @@ def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
     corners = [0, steps[0], steps[0] + steps[1], steps[1]]
     vtk = 9
     if len(shape) == 3:
-        corners, vtk = corners + [at + steps[2] for at in corners], 12
+        corners = corners + [at + steps[2] for at in corners]
+        vtk = 12
     cells = Cells.from_blocks([(vtk, first[:, None] + np.array(corners))])
     if np.nansum(corner_sums(Mesh(points, cells))) < 0:
         turn = [4, 5, 6, 7, 0, 1, 2, 3] if vtk == 12 else [0, 3, 2, 1]
@@ -150,7 +151,9 @@ def _mixed(node: Node, flat: IntArray, count: int) -> tuple[IntArray, IntArray]:
     In its array ``flat`` each element's type precedes its nodes; ``count`` is m.
     """
     # A damaged range must not ask for more memory than the file has numbers.
-    places, at, sizes = np.empty(min(count, len(flat)), np.int64), 0, _SIZES.tolist()
+    places = np.empty(min(count, len(flat)), np.int64)
+    at = 0
+    sizes = _SIZES.tolist()
     kinds = memoryview(np.ascontiguousarray(flat).data)
     for element in range(count):
         kind = kinds[at] if at < len(kinds) else None
@@ -255,7 +258,8 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
             "the mesh without them"
         )
     nodes = {node.name: node for node in grid.children("DataArray_t")}
-    columns, datasets = [], []
+    columns = []
+    datasets = []
     for axis in _AXES[:count]:
         if axis not in nodes:
             raise grid.fault(

@@ -294,7 +294,8 @@ def _files_of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
     except ET.ParseError:
         return  # meshio says what is wrong with it
     for item in items:
-        text, kind = (item.text or "").strip(), item.get("Format")
+        text = (item.text or "").strip()
+        kind = item.get("Format")
         if kind == "HDF":
             name = text.rpartition(":")[0]
             yield name, _resolved(path.parent / name)

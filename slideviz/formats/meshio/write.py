@@ -185,7 +185,8 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.dim] = mesh.points
-    blocks, tags = [], []
+    blocks = []
+    tags = []
     values: dict[str, list[NDArray]] = {key: [] for key in cell_data}
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         blocks.append((_NAMES[vtk], nodes))

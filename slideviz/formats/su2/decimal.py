@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from slideviz.system.jit_cache import OPTIONS, njit
 
-_LEAST, _MOST = -342, 308  # powers of ten beyond which a number of 19 digits is zero or infinite
+_LEAST = -342  # power of ten below which a number of 19 digits is zero
+_MOST = 308  # and above which it is infinite
 _DIGITS = 19  # how many decimal digits fit into 64 bits
 
 
@@ -43,7 +44,8 @@ _U63 = np.uint64(63)
 # below these; the mantissa's limit, and the highest bit of it, which a float64 does not store.
 _LOW = np.uint64(0xFFFFFFFF)
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
-_BYTE_FREE, _BIT_FREE = np.uint64(1 << 56), np.uint64(1 << 63)
+_BYTE_FREE = np.uint64(1 << 56)
+_BIT_FREE = np.uint64(1 << 63)
 _WHOLE = np.uint64(1 << 53)
 _SPARE = np.uint64(0x1FF)
 """The bits of a product's high half that a float64 and its rounding do not need."""
@@ -53,8 +55,12 @@ _HIDDEN = np.uint64(1 << 52)
 @njit(inline="always", **OPTIONS)
 def _product(a, b):  # type: ignore[no-untyped-def]
     """Return the high and the low 64 bits of the product of two uint64."""
-    a0, a1, b0, b1 = a & _LOW, a >> _U32, b & _LOW, b >> _U32
-    low, middle = a0 * b0, a1 * b0
+    a0 = a & _LOW
+    a1 = a >> _U32
+    b0 = b & _LOW
+    b1 = b >> _U32
+    low = a0 * b0
+    middle = a1 * b0
     middle += low >> _U32
     cross = a0 * b1 + (middle & _LOW)
     return a1 * b1 + (middle >> _U32) + (cross >> _U32), a * b
@@ -122,7 +128,9 @@ def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
     """
     sign = np.uint64(text[at] == 45) << _U63
     at += (text[at] == 45) | (text[at] == 43)
-    first, q, more = at, 0, False
+    first = at
+    q = 0
+    more = False
     digits, at = _digits(text, at, _U0)
     length = at - first
     if text[at] == 46:
@@ -169,7 +177,11 @@ def _first_digits(text, at):  # type: ignore[no-untyped-def]
 
     Leading zeros do not count. The number begins at ``text[at]``; its exponent is not read.
     """
-    value, count, q, point, more = _U0, 0, 0, False, False
+    value = _U0
+    count = 0
+    q = 0
+    point = False
+    more = False
     while True:
         digit = np.uint64(text[at]) - U48
         if digit < U10 and count < _DIGITS:
@@ -192,7 +204,8 @@ def _exponent(text, at):  # type: ignore[no-untyped-def]
     down = text[at] == 45
     if down or text[at] == 43:
         at += 1
-    first, value = at, 0
+    first = at
+    value = 0
     while 48 <= text[at] <= 57 and at < first + 6:
         value = value * 10 + (text[at] - 48)
         at += 1

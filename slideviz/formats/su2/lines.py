@@ -112,7 +112,8 @@ def chosen_zones(name: str, number: int | None, zones: int) -> range:
 
 def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:
     """Return the zone of each FFD box, by name, in other zones than that of ``bounds``."""
-    found, zone = {}, 1
+    found = {}
+    zone = 1
     for section in sections:
         if section.key == "IZONE":
             zone = int(section.value.split()[0])
@@ -312,7 +313,8 @@ def line_end(raw: Source, at: int) -> int:
         newline = raw[at : at + size].find(b"\n")
         if newline >= 0:
             return at + newline + 1
-        at, size = at + size, 2 * size
+        at = at + size
+        size = 2 * size
     return raw.size
 
 

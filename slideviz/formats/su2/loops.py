@@ -19,7 +19,8 @@ from slideviz.system.jit_cache import OPTIONS, njit
 
 @njit(inline="always", **OPTIONS)
 def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
-    stop, quotient = at + 1, value
+    stop = at + 1
+    quotient = value
     while quotient >= 10:
         quotient //= 10
         stop += 1
@@ -38,7 +39,8 @@ def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-d
     ``first``: the index of the first element; if negative, rows get no index.
     ``out`` (b,) uint8: receives the text.
     """
-    at, k = 0, 0
+    at = 0
+    k = 0
     for row in range(len(types)):
         at = _print_whole(np.int64(types[row]), out, at)
         for _ in range(offsets[row + 1] - offsets[row]):
@@ -73,7 +75,9 @@ def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
     ``first``: index of the first point.
     ``out`` (b,) uint8: receives the text.
     """
-    j, at, row = 2, 0, first
+    j = 2
+    at = 0
+    row = first
     while j < len(numbers):
         for _ in range(dim):
             j, at = _copy_number(numbers, j, out, at)
@@ -97,7 +101,10 @@ def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
     ``changed`` (m, d) bool: the coordinates to replace.
     ``out`` (b + c,) uint8: receives the text.
     """
-    i, j, at, row = 0, 2, 0, 0
+    i = 0
+    j = 2
+    at = 0
+    row = 0
     while i < len(text):
         while text[i] <= 32 and text[i] != 10:
             out[at] = text[i]
@@ -195,13 +202,20 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
     ``runs`` (l, 5) int64: receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines
     counted from the start of the block; l is the number of lines. The first run may have no text.
     """
-    at, line, n = 0, 0, 0
+    at = 0
+    line = 0
+    n = 0
     while at < len(text):
-        begin, at = at, _first_word(text, at)
+        begin = at
+        at = _first_word(text, at)
         code = text[at]
         empty = code == 10 or code == 37
         if not empty and not is_numeric(code):
-            runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3], runs[n, 4] = begin, line, TEXT, 0, 0
+            runs[n, 0] = begin
+            runs[n, 1] = line
+            runs[n, 2] = TEXT
+            runs[n, 3] = 0
+            runs[n, 4] = 0
             n += 1
             while text[at] != 10 and text[at] != 37:
                 if text[at] == 61:
@@ -209,7 +223,11 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
                 at += 1
         else:
             if n == 0:
-                runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3], runs[n, 4] = 0, 0, ROWS, 0, 0
+                runs[n, 0] = 0
+                runs[n, 1] = 0
+                runs[n, 2] = ROWS
+                runs[n, 3] = 0
+                runs[n, 4] = 0
                 n += 1
             if not empty:
                 runs[n - 1, 3] += 1
@@ -236,7 +254,8 @@ def _whole_number(text, at):  # type: ignore[no-untyped-def]
 
     The number is -1 if there are no digits or more than 18.
     """
-    first, value = at, np.int64(0)
+    first = at
+    value = np.int64(0)
     digit = np.uint64(text[at]) - U48
     while digit < U10:
         value = value * 10 + np.int64(digit)
@@ -273,9 +292,13 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     ``odd`` (m, 3) int64: receives for each row left its number, the first byte of its line, and the
     index of its first node in ``nodes``.
     """
-    at, row, k, n = 0, 0, 0, 0
+    at = 0
+    row = 0
+    k = 0
+    n = 0
     while at < len(text):
-        line, begin = at, _first_word(text, at)
+        line = at
+        begin = _first_word(text, at)
         if is_numeric(text[begin]):
             kind = _type_of(text, begin)
             size = SIZES[kind]
@@ -287,7 +310,9 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
                 at = _whole_number(text, begin)[1]
                 at = _nodes(text, at, size, n_points, nodes, k)
             if at < 0 or not _ends_row(text, at):
-                odd[n, 0], odd[n, 1], odd[n, 2] = row, line, k
+                odd[n, 0] = row
+                odd[n, 1] = line
+                odd[n, 2] = k
                 n += 1
             row += 1
             k += size
@@ -318,15 +343,20 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
     which is that number: perhaps its index, and a coordinate is missing.
     ``odd`` (m, 2) int64: receives for each row left its number and the first byte of its line.
     """
-    at, row, n, dim = 0, 0, 0, points.shape[1]
+    at = 0
+    row = 0
+    n = 0
+    dim = points.shape[1]
     bits = np.zeros(1, np.uint64)
     value = bits.view(np.float64)
     while at < len(text):
-        line, begin = at, _first_word(text, at)
+        line = at
+        begin = _first_word(text, at)
         if is_numeric(text[begin]):
             if row == len(points):
                 return -1, n
-            at, words = (begin if _next_word(text, line) == begin else -1), 0
+            at = begin if _next_word(text, line) == begin else -1
+            words = 0
             while at >= 0 and text[at] != 10 and text[at] != 37:
                 at = decimal(text, at, bits, 0) if words < dim + 2 else -1
                 if words < dim:
@@ -334,7 +364,8 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
                 words += 1
                 at = _next_word(text, at) if at >= 0 else -1
             if at < 0 or words < dim:
-                odd[n, 0], odd[n, 1] = row, line
+                odd[n, 0] = row
+                odd[n, 1] = line
                 n += 1
             else:
                 extra[0] = max(extra[0], words)

@@ -96,7 +96,9 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
     Raises MeshError if it has a wrong type, dimension or nodes, or a word that is no whole number.
     """
     numbers = _numbers(lines, index, row, np.int64)
-    words, vtk, n_numbers = row.split(), int(numbers[0]), len(numbers) - 1
+    words = row.split()
+    vtk = int(numbers[0])
+    n_numbers = len(numbers) - 1
     if vtk not in ELEMENTS or ELEMENTS[vtk].dim != dim:
         raise _wrong_type(lines, index, vtk, dim, show(words[0]))
     kind = ELEMENTS[vtk]
@@ -186,7 +188,8 @@ def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
     """
     from slideviz.formats.su2.loops import point_block
 
-    text, dim = lines.text(piece), points.shape[1]
+    text = lines.text(piece)
+    dim = points.shape[1]
     odd = np.empty((piece.rows, 2), np.int64)
     extra = np.array([0, np.iinfo(np.int64).max])
     n_rows, n_odd = point_block(

@@ -83,7 +83,8 @@ def _best(
     It is one of ``tries`` if any fits, else possibly the one fitted to the points. None if it
     misses most receivers. ``index`` is their ``PERIODIC_INDEX``.
     """
-    before, after = mesh.points[donors], mesh.points[receivers]
+    before = mesh.points[donors]
+    after = mesh.points[receivers]
     allowed = FITS * float(np.ptp(mesh.points, axis=0).max())
 
     def misfit(motion: RigidMotion) -> FloatArray:
@@ -98,7 +99,8 @@ def _best(
     motion = min(tries, key=rank, default=fitted)
     if rank(motion)[0]:
         motion = min(motion, fitted, key=rank)
-    far, name = misfit(motion), f"PERIODIC_INDEX= {index}"
+    far = misfit(motion)
+    name = f"PERIODIC_INDEX= {index}"
     wrong = int(np.count_nonzero(far > allowed))
     if 2 * wrong > len(far):
         return None, _unused(f"no motion brings the donors of {name} onto their receivers")
@@ -146,7 +148,9 @@ def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
     They differ in the unit of the angles, the order of rotations, whether the translation comes
     before or after, and the direction.
     """
-    centre, angles, shift = transform[0], transform[1], transform[2]
+    centre = transform[0]
+    angles = transform[1]
+    shift = transform[2]
     for unit, order in product((1.0, np.pi / 180.0), ((2, 1, 0), (0, 1, 2))):
         rotation = np.eye(3)
         for axis in order:
@@ -159,7 +163,8 @@ def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
 
 
 def _about(axis: int, angle: float) -> FloatArray:
-    i, j = (axis + 1) % 3, (axis + 2) % 3
+    i = (axis + 1) % 3
+    j = (axis + 2) % 3
     out = np.eye(3)
     out[i, i] = out[j, j] = np.cos(angle)
     out[j, i] = np.sin(angle)
@@ -218,7 +223,9 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
 
 def _read_zone(text: Text, progress: Tick, *, alone: bool) -> Mesh:
     """Return a zone, with its interfaces to the others if it is read ``alone``."""
-    lines, text_zone, n_points = text.lines, text.zone, text.n_points
+    lines = text.lines
+    text_zone = text.zone
+    n_points = text.n_points
     raw = lines.raw
     sizes = [
         rows[-1].end - rows[0].begin if rows else 0

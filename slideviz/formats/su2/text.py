@@ -203,7 +203,9 @@ class _Walk:
     def _walk(
         self,
     ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[KeywordBlock, ...]]:
-        markers, sends, unknown = [], [], []
+        markers = []
+        sends = []
+        unknown = []
         at = 0
         while at < len(self.sections):
             section = self.sections[at]
@@ -243,13 +245,15 @@ class _Walk:
                 f"marker {show(tag.value)} is not followed by MARKER_ELEMS="
                 + (misspelt(self.sections[at : at + 1], "MARKER_ELEMS") or _COUNT_THEM),
             )
-        at, domain = at + 1, b""
+        at = at + 1
+        domain = b""
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
             # The elements follow the SEND_TO line.
             self._require_no_rows(following)
             head = self.sections[at]
             following = KeywordBlock(following.key, following.value, head.line, head.stop)
-            at, domain = at + 1, head.value
+            at = at + 1
+            domain = head.value
         return following, domain, at
 
     def _name(self, section: KeywordBlock) -> str:
@@ -341,7 +345,9 @@ def boundaries_elsewhere(text: Text, progress: Tick) -> Iterator[tuple[int, str,
 
     ``progress`` is called with 1 while they are read; it may raise to stop.
     """
-    lines, sections, zone = text.lines, text.sections, text.zone
+    lines = text.lines
+    sections = text.sections
+    zone = text.zone
     for bounds in find_bounds(lines, sections):
         if bounds.number == zone.bounds.number:
             continue
@@ -394,7 +400,9 @@ def scan(raw: Source, progress: Tick) -> Lines:
         runs[:n_runs, 0] += bounds[0]
         return runs[:n_runs].copy(), n_lines, text.isspace()
 
-    found, line, blank = [], 0, True
+    found = []
+    line = 0
+    blank = True
     blocks = _blocks(raw)
     for (_, end), (runs, n_lines, empty) in zip(blocks, ordered_map(scanned, blocks), strict=True):
         runs[:, 1] += line
@@ -409,7 +417,8 @@ def scan(raw: Source, progress: Tick) -> Lines:
 
 
 def _blocks(raw: Source) -> list[tuple[int, int]]:
-    bounds, begin = [], 0
+    bounds = []
+    begin = 0
     while begin < raw.size:
         end = line_end(raw, min(begin + BLOCK_BYTES, raw.size) - 1)
         bounds.append((begin, end))

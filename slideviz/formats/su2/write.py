@@ -58,7 +58,8 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     elif not isinstance(document, Document):
         yield from _zone_text(mesh)
     else:
-        raw, (begin, end) = document.raw, document.zone
+        raw = document.raw
+        (begin, end) = document.zone
         raw.require_same()
         yield from (raw[a:b] for a, b in _ranges(0, begin))
         yield from _zone_text(mesh)
@@ -70,7 +71,8 @@ def _zone_text(mesh: Mesh) -> Iterator[bytes]:
     """Yield the lines of a zone, with the other sections that its file has."""
     check_mesh(mesh)
     require_text_names(mesh.name, mesh.marker_names)
-    document, boxes = mesh.origin, mesh.origin.ffd
+    document = mesh.origin
+    boxes = mesh.origin.ffd
     kept: list[bytes] = []
     if isinstance(document, Document):
         places = (*document.sends, *document.unknown)
@@ -147,7 +149,8 @@ def patched_blocks(raw: Source, changes: Sequence[PointChange]) -> Iterator[byte
             return task
         if isinstance(task, tuple):
             return raw[slice(*task)]
-        one, rows = change[task], slice(task.row, task.row + task.rows)
+        one = change[task]
+        rows = slice(task.row, task.row + task.rows)
         return _moved_rows(raw, task, one.before(rows), one.after(rows))
 
     yield from ordered_map(text, [*tasks, *_around(edits, done, raw.size + 1)])

@@ -88,7 +88,8 @@ def _beside(
     make: WorkerFactory[Piece, None], files: tuple[Path, Path], tasks: list[Piece], _: SerialPool
 ) -> Iterator[Callable[[Tick], None]]:
     """Context with a function that waits for a thread's ``tasks``; its end stops these early."""
-    stopped, done = Event(), 0
+    stopped = Event()
+    done = 0
 
     def run() -> None:
         nonlocal done

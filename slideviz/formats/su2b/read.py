@@ -55,7 +55,8 @@ def element_block(
     Raises MeshError if an element has a wrong offset, type, dimension or node; the message has the
     byte.
     """
-    width, count = source.width, min(size, table.count - first)
+    width = source.width
+    count = min(size, table.count - first)
     at = table.offsets + first * width
     offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
     start = int(offsets[0]) if first else 0

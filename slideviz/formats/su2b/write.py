@@ -187,7 +187,8 @@ def write_at(file: int, at: int, content: NDArray) -> None:
     left = content.view(np.uint8).data
     while left:
         written = os.pwrite(file, left, at)
-        at, left = at + written, left[written:]
+        at = at + written
+        left = left[written:]
 
 
 def _by_type(cells: Cells) -> IntArray | None:

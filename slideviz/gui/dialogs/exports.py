@@ -92,12 +92,14 @@ class Exports(QObject):
         """Ask for the options of a picture, then for a file name, and write the picture."""
         if self._session.mesh is None:
             return
-        view, settings = self.window.viewing, self.window.settings
+        view = self.window.viewing
+        settings = self.window.settings
         with self._renderer() as renderer:
             choices = str(settings.value("picture", ""))
             dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), choices)
             accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
-            options, choices = dialog.picture_options, dialog.choices
+            options = dialog.picture_options
+            choices = dialog.choices
             dialog.deleteLater()
             if not accepted:
                 return
@@ -124,7 +126,8 @@ class Exports(QObject):
         if self._session.mesh is None:
             return
         view = self.window.viewing
-        width, height = max(view.width(), 64), max(view.height(), 64)
+        width = max(view.width(), 64)
+        height = max(view.height(), 64)
         larger = max(COPIED_WIDTH / width, 1.0)
         size = round(larger * width), round(larger * height)
         shown = self._session.view
@@ -142,7 +145,8 @@ class Exports(QObject):
 
     def section(self, paper: PageFormat) -> None:
         """Ask for a file name, and write a picture of the selected section."""
-        session, section = self._session, self._session.view.section
+        session = self._session
+        section = self._session.view.section
         if section is None or session.frame is None or self.window.runner.busy:
             return
         if path := self._ask("Save picture of the section", "_section.png", PLOT_FILTERS):
@@ -171,7 +175,8 @@ class Exports(QObject):
         dialog.show()
 
     def _ask_film(self, kind: str) -> Path | None:
-        files, parent = self.window.files, self.film or self.window
+        files = self.window.files
+        parent = self.film or self.window
         if kind:
             filters = {".mp4": "MP4 film (*.mp4)", ".gif": "GIF film (*.gif)"}[kind]
             path = self._ask("Export film", f"_steps{kind}", filters, parent)
@@ -202,8 +207,10 @@ class Exports(QObject):
 
     def steps(self) -> None:
         """Ask for a file name and write the mesh of every step: numbered files, or one .vtkhdf."""
-        session, files = self._session, self.window.files
-        run, mesh = session.run_shown, session.mesh
+        session = self._session
+        files = self.window.files
+        run = session.run_shown
+        mesh = session.mesh
         if run is None or mesh is None or not run.frames or self.window.runner.busy:
             return
         ending = usual_ending(mesh)
@@ -228,13 +235,16 @@ class Exports(QObject):
     def wheel(self) -> None:
         """Ask for passages and a file name, and write the wheel of the shown step."""
         session = self._session
-        frame, mesh, around = session.frame, session.mesh, wheel_passages(session)
+        frame = session.frame
+        mesh = session.mesh
+        around = wheel_passages(session)
         if frame is None or mesh is None or not around or self.window.runner.busy:
             return
         with self._renderer() as renderer:
             dialog = WheelDialog(self.window, renderer, around)
             accepted = dialog.exec() == WheelDialog.DialogCode.Accepted
-            several, numbered = dialog.count, dialog.numbered.isChecked()
+            several = dialog.count
+            numbered = dialog.numbered.isChecked()
             dialog.deleteLater()
         if not accepted:
             return
@@ -406,7 +416,8 @@ class PictureDialog(PixelFields, QDialog):
     @property
     def picture_options(self) -> PictureOptions:
         picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
-        background, text = self.background.currentData(), float(self.text.currentData())
+        background = self.background.currentData()
+        text = float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
             return PictureOptions(self.pixels, background, **picked, letters=text * LETTERS)
         dpi = float(self.dpi.value())

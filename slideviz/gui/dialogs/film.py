@@ -299,7 +299,8 @@ class FilmDialog(QDialog):
             return
         self._previewing.stop()
         self._file = file
-        options, film_options = self.form.picture_options, self.form.film_options
+        options = self.form.picture_options
+        film_options = self.form.film_options
         self._runner.start(film_steps(self.renderer, options, file, film_options, overwrite=True))
         self._show_filming(True)
 

@@ -153,7 +153,8 @@ class ShortcutsDialog(QDialog):
         top.setExpanded(True)
 
     def _filter(self, wanted: str) -> None:
-        wanted, total = wanted.strip().lower(), 0
+        wanted = wanted.strip().lower()
+        total = 0
         for index in range(self.tree.topLevelItemCount()):
             top = self.tree.topLevelItem(index)
             matches = 0
@@ -240,7 +241,8 @@ def _search_field(words: str) -> QLineEdit:
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
     """Return per menu its title, and title, first key and tip of each command that has a key."""
     # A plain `CommandState`: no title such as “Undo role”.
-    now, native = CommandState(window.store.session), QKeySequence.SequenceFormat.NativeText
+    now = CommandState(window.store.session)
+    native = QKeySequence.SequenceFormat.NativeText
     rows = {
         menu.title: [
             (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(native), one.tip)

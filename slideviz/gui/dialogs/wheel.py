@@ -57,7 +57,8 @@ class WheelDialog(QDialog):
             name="wheel_numbered",
         )
         self.words = hint_label()
-        kinds, form = QDialogButtonBox.StandardButton, QFormLayout()
+        kinds = QDialogButtonBox.StandardButton
+        form = QFormLayout()
         form.addRow("Passages", self.passages)
         form.addRow("", self.numbered)
         buttons = dialog_buttons(self, kinds.Save, kinds.Cancel)
@@ -73,7 +74,8 @@ class WheelDialog(QDialog):
         return chosen
 
     def _draw(self) -> None:
-        mesh, count = self._session.mesh, self.count
+        mesh = self._session.mesh
+        count = self.count
         assert mesh is not None
         many = self._around if count == "all" else [count] * len(self._around)
         cells = sum(k * len(zone.cells) for k, zone in zip(many, zones_of(mesh), strict=True))

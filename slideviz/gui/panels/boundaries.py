@@ -28,9 +28,12 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
 
-NAME, COUNT, ROLE = 0, 1, 2  # the columns of the table
+NAME = 0  # the columns of the table
+COUNT = 1
+ROLE = 2
 NARROW = 290  # width of the table in pixels below which it has no room for the numbers of elements
-ROLE_WIDTH, LEAST_ROLE_WIDTH = 136, 112  # width in pixels of the roles, and in a narrow table
+ROLE_WIDTH = 136  # of the roles, in pixels
+LEAST_ROLE_WIDTH = 112  # in a narrow table
 
 
 class BoundariesTable(QTableWidget):
@@ -56,7 +59,8 @@ class BoundariesTable(QTableWidget):
 
     def distribute_width(self) -> None:
         """Show names whole: they take the width of the numbers where there is no more room."""
-        room, names = self.viewport().width(), self.sizeHintForColumn(NAME)
+        room = self.viewport().width()
+        names = self.sizeHintForColumn(NAME)
         narrow = self.width() < NARROW or names + self.sizeHintForColumn(COUNT) > room - ROLE_WIDTH
         self.setColumnHidden(COUNT, narrow)
         role = LEAST_ROLE_WIDTH if narrow else ROLE_WIDTH
@@ -75,7 +79,8 @@ class BoundariesTable(QTableWidget):
             self.menu_wanted.emit(row, self.viewport().mapToGlobal(where))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, alt = event.key(), event.modifiers() & Qt.KeyboardModifier.AltModifier
+        key = event.key()
+        alt = event.modifiers() & Qt.KeyboardModifier.AltModifier
         plain = (Qt.Key.Key_F2, Qt.Key.Key_Return, Qt.Key.Key_Enter)
         row = self.chosen_row()
         if row >= 0 and (key in plain or (alt and key == Qt.Key.Key_Down)):
@@ -161,7 +166,8 @@ class BoundariesPanel(Panel):
         )
 
     def _fill(self, session: Session, rows: tuple[tuple[str, int], ...]) -> None:
-        self._rows, self._choices = rows, []
+        self._rows = rows
+        self._choices = []
         self.table.setRowCount(0)
         self.table.clearSpans()
         self.table.setRowCount(len(rows))
@@ -205,8 +211,10 @@ class BoundariesPanel(Panel):
                 self.table.item(row, COUNT).setText(text)
 
     def _sync_row(self, session: Session, row: int, name: str) -> None:
-        role, guess = session.role(name), session.guesses.get(name)
-        item, choice = self.table.item(row, NAME), self._choices[row]
+        role = session.role(name)
+        guess = session.guesses.get(name)
+        item = self.table.item(row, NAME)
+        choice = self._choices[row]
         assert choice is not None
         self._show_checked(item, name not in session.view.hidden)
         about = "".join(

@@ -73,7 +73,8 @@ class CurveCanvas(PlotCanvas):
             self.update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        was_dragged, self._line = self._line is not None, None
+        was_dragged = self._line is not None
+        self._line = None
         self.update()
         left = event.button() == Qt.MouseButton.LeftButton
         if left and self._has_axes and was_dragged >= self.draggable:
@@ -87,7 +88,8 @@ class CurveCanvas(PlotCanvas):
         super().paintEvent(event)
         if self._line is None or not self._has_axes:
             return
-        painter, (top, height) = QPainter(self), self.axes_rows()
+        painter = QPainter(self)
+        (top, height) = self.axes_rows()
         painter.setPen(QPen(QColor(SELECTED_COLOR), 2.0))
         painter.drawLine(QPointF(self._line, top), QPointF(self._line, top + height))
         words = f" {self.to_value(self._line):.0f} % "
@@ -107,7 +109,8 @@ class CurvesPanel(Panel):
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
-        head, span = self._make_head(), self._make_span()
+        head = self._make_head()
+        span = self._make_span()
         in_column(head, self.area, span, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
         self.follow(lambda session: session.mesh, self._offer_coordinates)
         self.follow(_shown)
@@ -191,7 +194,8 @@ class CurvesPanel(Panel):
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
-        session, kind = self.store.session, self.kind.currentData()
+        session = self.store.session
+        kind = self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None
         whole = self.whole.isChecked()
@@ -205,7 +209,8 @@ class CurvesPanel(Panel):
             return partial(draw_or_say, partial(curves.draw_meridional_view, session))
         if kind == "gaps":
             return partial(draw_or_say, partial(draw_measured, session))
-        coordinate, what = self.coordinate.currentData(), self.what.currentData()
+        coordinate = self.coordinate.currentData()
+        what = self.what.currentData()
         find = partial(self._profiles.of, session, coordinate)
         return partial(draw_or_say, partial(draw_span, find, coordinate, what, whole))
 
@@ -251,7 +256,8 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
 
     ``whole``: the axis shows all qualities from 0 to 1 rather than those of the curves.
     """
-    axes, runs = figure.add_subplot(), curves.step_runs(session)
+    axes = figure.add_subplot()
+    runs = curves.step_runs(session)
     quality_by_step(axes, runs, style)
     if not whole:
         axes.set_ylim(close_limits(part for run in runs for part in (run.minimum, run.mean)))
@@ -263,7 +269,9 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
 
 def draw_reach(session: Session, whole: bool, figure: Figure, style: Style) -> None:
     """Draw the lowest quality against the fraction of the motion, and the end of what is proved."""
-    axes, found, run = figure.add_subplot(), reach_of(session), reach_run(session)
+    axes = figure.add_subplot()
+    found = reach_of(session)
+    run = reach_run(session)
     assert run is not None
     style_axes(axes, style, "fraction of the motion [%]", "lowest quality [-]")
     look = style.series(series_number(curves.series_of(run), 0))
@@ -318,7 +326,8 @@ def draw_measured(session: Session, figure: Figure, style: Style) -> None:
 
 def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
     """Draw the greedy selection of the shown step: its error against control nodes."""
-    axes, run = figure.add_subplot(), curves.greedy_run(session)
+    axes = figure.add_subplot()
+    run = curves.greedy_run(session)
     assert run is not None
     convergence(axes, [run], style=style)
     axes.set_title(run.label, fontsize=style.size, color=style.scheme.text)

@@ -93,7 +93,8 @@ class DesignPlot(QWidget):
     def show_table(self, table: DesignTable, shown: int | None) -> None:
         """Draw the results of a table; the design ``shown`` has a ring."""
         self.across.offer({name: name for name in table.columns})
-        self._table, self._shown = table, shown
+        self._table = table
+        self._shown = shown
         plotted = table.count_done() > 0
         self.save.setEnabled(plotted)
         self.across.setVisible(len(table.columns) > 1)
@@ -103,7 +104,8 @@ class DesignPlot(QWidget):
             self.area.show_text(FAILED if table.results else EMPTY)
 
     def drawing(self) -> Draw:
-        column, what = self.across.currentData(), self.what.currentData()
+        column = self.across.currentData()
+        what = self.what.currentData()
         if column is None or not self._table.count_done():
             return lambda _figure, _style: None
         return partial(_draw, self._table, column, what, self._shown)
@@ -113,11 +115,10 @@ class DesignPlot(QWidget):
         self.show_table(self._table, self._shown)
 
     def _picked(self, x: float, y: float) -> None:
-        column, what = self.across.currentData(), self.what.currentData()
-        curves, failed = (
-            design_curves(self._table, column, what),
-            failed_designs(self._table, column),
-        )
+        column = self.across.currentData()
+        what = self.what.currentData()
+        curves = design_curves(self._table, column, what)
+        failed = failed_designs(self._table, column)
         nearest = nearest_design(self.canvas.figure.axes[0], curves, x, y, failed)
         if nearest is not None:
             self.picked(nearest)
@@ -129,7 +130,8 @@ class DesignPlot(QWidget):
 def _draw(
     table: DesignTable, column: str, what: str, shown: int | None, figure: Figure, style: Style
 ) -> None:
-    curves, failed = design_curves(table, column, what), failed_designs(table, column)
+    curves = design_curves(table, column, what)
+    failed = failed_designs(table, column)
     against_designs(figure.add_subplot(), curves, column, what, shown, style, failed=failed)
 
 
@@ -146,7 +148,8 @@ class DesignsJob(QObject):
 
     def __init__(self, ended: Callable[[str, bool], None], parent: QObject) -> None:
         super().__init__(parent)
-        self._text, self._fraction = "", 0.0
+        self._text = ""
+        self._fraction = 0.0
         self._rows: list[DesignRow] = []
         self._ended = ended
         self.runner = JobRunner(self)
@@ -173,7 +176,8 @@ class DesignsJob(QObject):
     def _flush(self) -> None:
         """Emit the results since the last emission, and the progress."""
         self._timer.stop()
-        rows, self._rows = self._rows, []
+        rows = self._rows
+        self._rows = []
         if rows:
             self.results_arrived.emit(rows)
         if self.runner.busy:
@@ -294,7 +298,8 @@ class DesignsPanel(Panel):
         self.changed.emit()
 
     def _sync(self) -> None:
-        busy, rows = self.runner.busy, bool(self.table.rows)
+        busy = self.runner.busy
+        rows = bool(self.table.rows)
         in_file = self.store.session.in_file
         opened = self.store.session.mesh is not None and not in_file
         count = 0 if busy else len(self.table.rows) - len(self._with_valid_results().results)
@@ -423,7 +428,8 @@ class DesignsPanel(Panel):
 
     def show_design(self, number: int) -> None:
         """Show the mesh of a design, numbered from 1, in the window: deform it as a run there."""
-        session, row = self.store.session, self.table.results.get(number)
+        session = self.store.session
+        row = self.table.results.get(number)
         other = session.mesh is not (self.mesh or session.mesh)
         if session.mesh is None or session.in_file or other:
             return
@@ -465,7 +471,8 @@ class DesignsPanel(Panel):
 
     # The job ---------------------------------------------------------------------------
     def start(self) -> None:
-        session, table = self.store.session, self._with_valid_results()
+        session = self.store.session
+        table = self._with_valid_results()
         if self.runner.busy or session.mesh is None or session.in_file:
             return
         if len(table.results) == len(table.rows) or not self._confirm_replacing(table):

@@ -89,7 +89,8 @@ class DesignsModel(QAbstractTableModel):
         return flags
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        at, column = index.row(), index.column() - len(self.table.columns)
+        at = index.row()
+        column = index.column() - len(self.table.columns)
         row = self.table.results.get(at + 1)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter

@@ -201,7 +201,8 @@ class DisplayPanel(Panel):
             self._sync(session)
 
     def _sync(self, session: Session) -> None:
-        view, opened = session.view, session.mesh is not None
+        view = session.view
+        opened = session.mesh is not None
         self.setEnabled(opened)
         self.color_by.show_value(view.color_by)
         self.map.show_value(view.color_map)
@@ -228,12 +229,14 @@ class DisplayPanel(Panel):
         self._sync_passages(session, self._period.of_zones(session))
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
-            able, term = COMMANDS[name].enabled(CommandState(session)), SHOWN[name]
+            able = COMMANDS[name].enabled(CommandState(session))
+            term = SHOWN[name]
             box.setEnabled(able)
             box.setToolTip(wrapped(term.why_not if opened and not able else term.tip))
 
     def _sync_passages(self, session: Session, pairs: Sequence[Pair]) -> None:
-        tip, count = NOT_PERIODIC, 0
+        tip = NOT_PERIODIC
+        count = 0
         if pairs:
             around = tuple(pair.around for pair in pairs if pair.around is not None)
             self.passages.set_around(around if len(around) == len(pairs) else ())
@@ -260,7 +263,8 @@ class DisplayPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    case, view = session.case, session.view
+    case = session.case
+    view = session.view
     periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
     runs = session.runs if view.color_by == "displacement" else ()
     return session.mesh, session.pairs, view.style, periodic, runs
@@ -269,5 +273,6 @@ def _shown(session: Session) -> object:
 def _worse_half(session: Session) -> tuple[float, float]:
     """Return the worse half of the color range, which is the first threshold."""
     low, high = session.color_range
-    middle, term = low + 0.5 * (high - low), RATED.get(quantity_of(session.view.color_by))
+    middle = low + 0.5 * (high - low)
+    term = RATED.get(quantity_of(session.view.color_by))
     return (middle, high) if term is not None and term.best == "low" else (low, middle)

@@ -72,12 +72,14 @@ class BrushCanvas(PlotCanvas):
         if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes or self.locked:
             return
         x = event.position().x()
-        self._pressed, self._moved = self.value_at(x), False
+        self._pressed = self.value_at(x)
+        self._moved = False
         if self.band is not None:
             ends = [self.pixel_of(value) for value in self.band]
             for near, far in ((0, 1), (1, 0)):
                 if abs(x - ends[near]) <= END_PX:
-                    self._pressed, self._moved = self.band[far], True
+                    self._pressed = self.band[far]
+                    self._moved = True
         self.dragging.emit(True)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -203,11 +205,14 @@ class HistogramPanel(Panel):
         bad = quality.inverted
         mean = quality.mean if what == "size-skew" else plain.mean()
         if what == "displacement":  # of a node: values of cells are means over their nodes
-            low, ends = "highest", session.frame.largest_displacement(session.mesh)
+            low = "highest"
+            ends = session.frame.largest_displacement(session.mesh)
         elif RATED[what].best == "low":
-            low, ends = "max", plain.max()
+            low = "max"
+            ends = plain.max()
         else:
-            low, ends = "min", quality.min if what == "size-skew" else plain.min()
+            low = "min"
+            ends = quality.min if what == "size-skew" else plain.min()
         form = ".4f" if what in SIZE_SKEW else ".4g"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
@@ -231,7 +236,8 @@ class HistogramPanel(Panel):
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
-        log, whole = self.log.isChecked(), self.whole.isChecked()
+        log = self.log.isChecked()
+        whole = self.whole.isChecked()
         return partial(draw_histogram, self._counts, self.store.session, log=log, full_range=whole)
 
     # What the user does ----------------------------------------------------------------

@@ -157,7 +157,8 @@ class LimitsPanel(Panel):
 
     def _show_limits(self, session: Session) -> None:
         """Fill the list of limits; a dash where one is not checked yet."""
-        limits, results = session.case.limits, session.limit_results
+        limits = session.case.limits
+        results = session.limit_results
         known = {} if not results else {result.limit: result for result in results}
         with QSignalBlocker(self.limits):
             self.limits.clear()
@@ -247,7 +248,8 @@ class LimitsPanel(Panel):
             self.store.change(changes.set_case, limits=limits)
 
     def _limit_clicked(self, item: QTreeWidgetItem) -> None:
-        session, place = self.store.session, item.data(0, NAME)
+        session = self.store.session
+        place = item.data(0, NAME)
         again = place == session.limit
         self.store.change(replace, limit=None if again or place < 0 else place)
         chosen = self.store.session.limit_chosen

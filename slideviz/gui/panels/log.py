@@ -32,11 +32,13 @@ class LogHandler(logging.Handler):
         """Emit the line of a log record; a message repeated in a row is only counted."""
         line = self.format(record)
         # A library's warning at every drawing would push all else out of the panel.
-        what, self._last = self._last, (record.levelno, record.getMessage())
+        what = self._last
+        self._last = (record.levelno, record.getMessage())
         if what == self._last:
             self._repeats += 1
             return
-        repeats, self._repeats = self._repeats, 0
+        repeats = self._repeats
+        self._repeats = 0
         # A thread may still log when the window, and the signal's object with it, is gone.
         with contextlib.suppress(RuntimeError):
             if repeats:

@@ -234,7 +234,8 @@ class MethodPanel(Panel):
 
     def _add_hints(self) -> None:
         """Add hints: the period that was found, and what part of the extent the tolerance is."""
-        form, fields = self.form, self.form.fields
+        form = self.form
+        fields = self.form.fields
         row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.period_hint)
         row, role = _position(form, fields["tolerance"])
@@ -294,7 +295,8 @@ class MethodPanel(Panel):
         reduction = replace(
             self._with_absolute_tolerance(self._reduction or Reduction()), auto=False
         )
-        case, spare = session.case, Case(reduction=reduction)
+        case = session.case
+        spare = Case(reduction=reduction)
         if case.reduction is not None:
             case = case.change(reduction=replace(reduction, auto=case.reduction.auto))
         fields = self.form.fields
@@ -309,7 +311,8 @@ class MethodPanel(Panel):
         self._sync_hints(session)
 
     def _set_mesh(self, session: Session) -> None:
-        self._reduction, self._largest = None, ((), 0.0)
+        self._reduction = None
+        self._largest = ((), 0.0)
         self.watch.restore()
         # Once for each mesh: it takes 10 ms where there are 250,000 cells.
         self._extent = session.mesh.extent if session.mesh is not None else 0.0
@@ -320,7 +323,8 @@ class MethodPanel(Panel):
         return replace(given, tolerance=float(f"{absolute:.6g}"))
 
     def _sync_hints(self, session: Session) -> None:
-        case, extent = session.case, self._extent
+        case = session.case
+        extent = self._extent
         tolerance = self.form.fields["tolerance"]
         assert isinstance(tolerance, NumberField)
         part = f"{tolerance.value / extent:.3g} of the extent" if extent else ""
@@ -341,7 +345,8 @@ class MethodPanel(Panel):
 
     def _radius_words(self, session: Session) -> str:
         """Return the support radius in words; "" where there is none."""
-        case, mesh = session.case, session.mesh
+        case = session.case
+        mesh = session.mesh
         if mesh is None:
             return ""
         key = support_key(case, mesh)

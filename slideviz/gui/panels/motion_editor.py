@@ -269,7 +269,8 @@ class MotionEditor(QWidget):
 
     def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
         """Show a motion, offering ``targets`` and ``dim`` components; None hides the editor."""
-        self._motion, self._dim = motion, dim
+        self._motion = motion
+        self._dim = dim
         self.setVisible(motion is not None)
         if motion is None:
             return
@@ -448,7 +449,8 @@ class MotionEditor(QWidget):
 
     def _typed(self, name: str) -> Any:
         """Return the value in a row; while its numbers contradict, that of the shown motion."""
-        field, row = getattr(self, name), ROWS[name]
+        field = getattr(self, name)
+        row = ROWS[name]
         if isinstance(field, Choice):
             return field.currentData()
         if name == "path":

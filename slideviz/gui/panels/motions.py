@@ -120,9 +120,11 @@ class TableDialog(QDialog):
         """Show the effect of the table, or its error, and enable the save button accordingly."""
         self._soon.stop()
         try:
-            said, wrong = self.rows.check(self.text), False
+            said = self.rows.check(self.text)
+            wrong = False
         except SlidevizError as error:
-            said, wrong = str(error), True
+            said = str(error)
+            wrong = True
         self.answer.setText(said)
         set_style(self.answer, "bad", wrong and bool(self.text.strip()))
         self.save.setEnabled(not wrong)
@@ -220,7 +222,8 @@ class MotionPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        motions, moving = session.case.motions, session.case.markers_with("moving")
+        motions = session.case.motions
+        moving = session.case.markers_with("moving")
         dim = session.mesh.dim if session.mesh is not None else 2
         said = (describe(motion, dim, self._extent) for motion in motions)
         texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
@@ -260,13 +263,15 @@ class MotionPanel(Panel):
         return centroid(self._mesh, named(target) or moving)
 
     def _sync_editor(self, session: Session) -> None:
-        row, motions = self.list.currentRow(), session.case.motions
+        row = self.list.currentRow()
+        motions = session.case.motions
         dim = session.mesh.dim if session.mesh else 3
         motion = motions[row] if 0 <= row < len(motions) else None
         self.editor.show_motion(motion, targets(session), dim)
 
     def _sync_buttons(self, session: Session, moving: tuple[str, ...]) -> None:
-        row, count = self.list.currentRow(), self.list.count()
+        row = self.list.currentRow()
+        count = self.list.count()
         for name, able in (
             ("duplicate", row >= 0),
             ("copy", row >= 0),
@@ -304,7 +309,8 @@ class MotionPanel(Panel):
     def _add_for(self, target: Target, kind: type[Motion]) -> None:
         """Add a motion with zero displacement, and put the cursor into its first field."""
         session = self.store.session
-        boxes, machine = box_names(session), machine_axis(session)
+        boxes = box_names(session)
+        machine = machine_axis(session)
         chord = self._chord(target)
         motion = kind.new(target, NewMotion(session.mesh.dim, machine, boxes, chord))
         self.store.change(changes.add_motion, motion)
@@ -373,7 +379,8 @@ class MotionPanel(Panel):
 
     def _ask_table(self, marker: Target, path: Path) -> Path | None:
         session = self.store.session
-        case, mesh = session.case, session.mesh
+        case = session.case
+        mesh = session.mesh
         assert mesh is not None
         beside = case.source or session.path
         folder = beside.parent if beside is not None else folder_of(self)

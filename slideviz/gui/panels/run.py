@@ -33,7 +33,9 @@ from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
-SETTINGS, NOTES, REACH = "settings", "notes", "reach"
+SETTINGS = "settings"
+NOTES = "notes"
+REACH = "reach"
 """Targets of links in the text: take the settings of the shown run, show its notes, show the curve
 of how far its motion may go."""
 
@@ -113,7 +115,8 @@ class RunPanel(Panel):
 
     def _show_run(self, session: Session) -> None:
         """Show how the shown run ended, or that the panels have other settings than it."""
-        run, bad = session.run_shown, ""
+        run = session.run_shown
+        bad = ""
         if run is None:
             self._show_ready("Ready.", session)
         elif not session.outdated:
@@ -121,7 +124,8 @@ class RunPanel(Panel):
             text, reach = map(html.escape, end_parts(run))
             if reach_run(session):
                 reach = f"<a href='{REACH}'>{reach}</a>"
-            text, notes = text + reach, notes_of(run)
+            text = text + reach
+            notes = notes_of(run)
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)

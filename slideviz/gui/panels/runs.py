@@ -40,7 +40,9 @@ class RunActions:
     """The actions of the runs panel, for the selected run or the run with a given number."""
 
     def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
-        self.panel, self.tree, self.store = panel, tree, store
+        self.panel = panel
+        self.tree = tree
+        self.store = store
         self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
         for command in filter(None, RUN_COMMANDS):
             self.buttons[command.name] = tool_button(
@@ -49,7 +51,8 @@ class RunActions:
         for name, button in self.buttons.items():
             button.setObjectName(f"runs_{name}")
             button.setIconSize(QSize(18, 18))
-        every, left = list(self.buttons.values()), 1 + RUN_COMMANDS.index(None)
+        every = list(self.buttons.values())
+        left = 1 + RUN_COMMANDS.index(None)
         self.row = WrappingRow(every[:left], every[left:], spacing=2)
         """The buttons."""
 
@@ -60,7 +63,8 @@ class RunActions:
         return window
 
     def _make_compare(self) -> QToolButton:
-        menu, tip = QMenu(), f"{COMPARE.tip} Ctrl+click on a run does so too."
+        menu = QMenu()
+        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
         menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
         return tool_button(tip, image="beside", text="Compare", menu=menu)
 
@@ -74,7 +78,8 @@ class RunActions:
             self.buttons[command.name].setEnabled(able and selected)
 
     def menu(self, number: int) -> QMenu:
-        session, menu = self.store.session, QMenu(self.panel)
+        session = self.store.session
+        menu = QMenu(self.panel)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
         # A right click selects no row: the menu's first line names its run.
@@ -214,7 +219,8 @@ class RunsPanel(Panel):
 
     def _select(self, session: Session) -> None:
         """Select the row of the shown run, or that of the undeformed mesh at its step 0."""
-        run, place = session.run_shown, -1
+        run = session.run_shown
+        place = -1
         if run is not None:
             # A run without steps, as one that failed, has no other than step 0.
             place = 1 + session.runs.index(run) if session.view.frame or not run.frames else 0
@@ -224,7 +230,8 @@ class RunsPanel(Panel):
 
     def _fill(self, session: Session) -> None:
         with QSignalBlocker(self.tree):
-            tree, runs = self.tree, session.runs
+            tree = self.tree
+            runs = session.runs
             count = len(runs) + 1 if runs else 0
             while tree.topLevelItemCount() > count:
                 tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
@@ -277,7 +284,8 @@ class RunsPanel(Panel):
 
     def _double_clicked(self) -> None:
         """Show the run beside the one shown before the double click, or end that comparison."""
-        number, seen = self.tree.number, self.tree.seen_before
+        number = self.tree.number
+        seen = self.tree.seen_before
         if number is None:
             return
         if seen.run is None or seen.run == number:

@@ -23,7 +23,8 @@ from slideviz.session.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)  # the columns of the list
 NUMBER = Qt.ItemDataRole.UserRole
-WORDS, NAME = NUMBER + 1, NUMBER + 2
+WORDS = NUMBER + 1
+NAME = NUMBER + 2
 """Item data roles of column `RUN`: the run's number (0: the undeformed mesh), the row's second
 line, the run's own name."""
 

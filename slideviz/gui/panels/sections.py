@@ -137,13 +137,15 @@ class SectionEditor(QWidget):
     ) -> None:
         """Show a section of a mesh; ``place`` is its row in the list. None hides the editor."""
         other = (place, _way(section)) != (self._place, _way(self._section))
-        self._section, self._place = section, place
+        self._section = section
+        self._place = place
         self.setVisible(section is not None and mesh is not None)
         if section is None or mesh is None:
             return
         if mesh is not self._mesh:
             self._mesh, self._points = mesh, section_cuts.cell_points(mesh)
-        terms, flat = section.shape.terms, mesh.dim == 2
+        terms = section.shape.terms
+        flat = mesh.dim == 2
         # A circle's axis is always z, and that of a span the machine's.
         fixed = (flat and bool(terms.point)) or section.walls is not None
         word = _axis_of(section)
@@ -181,7 +183,8 @@ class SectionEditor(QWidget):
         if key != self._span_of:
             assert self._points is not None
             self._span_of, self._span = key, section_cuts.position_range(section, self._points)
-        value, (low, high) = section.shape.position(section), self._span
+        value = section.shape.position(section)
+        (low, high) = self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
             return  # the user is moving the slider
@@ -355,7 +358,8 @@ class SectionsPanel(Panel):
 
     # What is shown ---------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        mesh, sections = session.mesh, session.view.sections
+        mesh = session.mesh
+        sections = session.view.sections
         dim = mesh.dim if mesh is not None else 3
         self.hint.setText(HINTS[dim])
         for kind, button in self.add.items():
@@ -432,7 +436,8 @@ class SectionsPanel(Panel):
             self.services.banner.show_message(with_field_labels(str(error)))
 
     def _want_picture(self, paper: PageFormat) -> None:
-        title, axes = self.titled.isChecked(), self.with_axes.isChecked()
+        title = self.titled.isChecked()
+        axes = self.with_axes.isChecked()
         self.services.exports.section(replace(paper, title=title, axes=axes))
 
     def _want_other_size(self) -> None:

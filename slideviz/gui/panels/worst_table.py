@@ -24,14 +24,17 @@ CELL, QUALITY, SINCE = range(3)
 """The first columns; then come the zone if there are several, the coordinates, and the cell type
 if there are several."""
 
-ZONE, LAST = "Zone", "Type"  # titles of these columns
-ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
+ZONE = "Zone"  # titles of these columns
+LAST = "Type"
+ARROW = 20
+GAP = "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
 
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
-FEWEST, MOST = 4, 5  # least and most decimals shown of a quality
+FEWEST = 4  # decimals shown of a quality
+MOST = 5
 MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
@@ -90,7 +93,8 @@ class WorstModel(QAbstractTableModel):
         self._digits = FEWEST
         self.order = np.empty(0, np.int64)
         """(n,): the index in ``worst`` of the cell in each row."""
-        self._by, self._down = QUALITY, False
+        self._by = QUALITY
+        self._down = False
 
     def show(self, worst: WorstCells | None, around: Pair | None = None) -> None:
         """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
@@ -190,7 +194,8 @@ class WorstModel(QAbstractTableModel):
         axis = column - len(COLUMNS) - self._zoned
         if axis == len(self.names):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
-        value, digits = float(self.places[at, axis]), self._decimals[axis]
+        value = float(self.places[at, axis])
+        digits = self._decimals[axis]
         # The sum turns -0 into 0; a column of tiny numbers is shown in scientific notation.
         if digits - self._more < 8:
             return f"{round(value, digits) + 0.0:.{digits}f}"
@@ -261,9 +266,12 @@ class WorstTable(QTableView):
         if not model.rowCount():
             return
         if model.headers != self._shared:
-            self._shared, self._given = model.headers, []
+            self._shared = model.headers
+            self._given = []
             self._needed = [0] * len(self._shared)
-        metrics, rows, before = self.fontMetrics(), range(model.rowCount()), self._needed
+        metrics = self.fontMetrics()
+        rows = range(model.rowCount())
+        before = self._needed
         self._needed = []
         for column, words in enumerate(self._shared):
             texts = [model.index(row, column).data() for row in rows]

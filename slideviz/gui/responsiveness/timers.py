@@ -79,7 +79,8 @@ COUNTING_MS = 300
 REST_MS = 200
 """Least time between two drawings of a plot or table while steps are played."""
 
-REST_TIMES, MOST_REST = 4.0, 4
+REST_TIMES = 4.0
+MOST_REST = 4
 """Pause of a plot relative to the time its drawing took; and its limit, in units of `REST_MS`."""
 
 LOOK_MS = 8

@@ -66,7 +66,8 @@ class PieceRunner(QObject):
             self._runner.close()
             self._runner.deleteLater()
             self._runner = self._make_runner()
-        pieces, self._pieces = self._pieces, None
+        pieces = self._pieces
+        self._pieces = None
         if pieces is not None:
             pieces.close()
 
@@ -195,9 +196,12 @@ class JobRunner(QObject):
             if wait > 0 and self._end is None and not self._items:
                 QTimer.singleShot(round(1000 * wait) + 1, self._deliver)
                 return
-            news, self._news = self._news, None
-            items, self._items = self._items, []
-            end, self._end = self._end, None
+            news = self._news
+            self._news = None
+            items = self._items
+            self._items = []
+            end = self._end
+            self._end = None
             self._woken = False
         if news is not None:
             self._delivered_s = time.monotonic()

@@ -113,7 +113,8 @@ class View3D(QtInteractor):
         """How long the last frame took to draw, in seconds."""
         # Each movement of the mouse would be drawn at once, and then once more by Qt.
         self._Iren.EnableRenderOff()
-        event, wanted = "RenderEvent", self._drawing_wanted
+        event = "RenderEvent"
+        wanted = self._drawing_wanted
         self._Iren.AddObserver(event, lambda *_: wanted())  # type: ignore[arg-type]  # a name, too
 
     def _drawing_wanted(self) -> None:
@@ -233,7 +234,8 @@ class View3D(QtInteractor):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         where = event.position().toPoint()
-        pressed, self._pressed = self._pressed, None
+        pressed = self._pressed
+        self._pressed = None
         still = pressed is not None and (
             (where - pressed).manhattanLength() < QApplication.startDragDistance()
         )

@@ -42,7 +42,9 @@ class Ruler(QWidget):
     def __init__(self, upright: bool) -> None:
         super().__init__()
         self.upright = upright
-        self.low, self.high, self.name = 0.0, 1.0, ""
+        self.low = 0.0
+        self.high = 1.0
+        self.name = ""
         if upright:
             self.setFixedWidth(58)
         else:
@@ -51,7 +53,9 @@ class Ruler(QWidget):
     def show_range(self, low: float, high: float, name: str) -> None:
         """Set the ends of the axis and its name."""
         if (low, high, name) != (self.low, self.high, self.name):
-            self.low, self.high, self.name = low, high, name
+            self.low = low
+            self.high = high
+            self.name = name
             self.update()
 
     def ticks(self) -> list[float]:
@@ -84,7 +88,8 @@ class Ruler(QWidget):
         painter.end()
 
     def _draw_tick(self, painter: QPainter, share: float, text: str) -> None:
-        wide, high = self.width(), self.height()
+        wide = self.width()
+        high = self.height()
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         if self.upright:
             y = high * (1.0 - share)
@@ -145,7 +150,8 @@ class FlatViews(QWidget):
     def __init__(self, viewing: Viewing, scheme: ColorScheme, multi_samples: int) -> None:
         super().__init__()
         self.setObjectName("flats")
-        self.viewing, self.scheme = viewing, scheme
+        self.viewing = viewing
+        self.scheme = scheme
         self._multi_samples = multi_samples
         self.first: FlatView | CurveView | None = None
         """`first`, `second`: the flat views of the first and the second 3D view, each None if there
@@ -212,7 +218,8 @@ class FlatViews(QWidget):
         return view
 
     def _drop_second(self) -> None:
-        second, self.second = self.second, None
+        second = self.second
+        self.second = None
         if second is not None and isinstance(self.first, FlatView):
             self.first.link(None)
             second.close_view()

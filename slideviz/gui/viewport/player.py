@@ -86,7 +86,8 @@ class Player(QWidget):
         self.loop.setCheckable(True)
         self.buttons["loop"] = self.loop
         self.speed = 1.0
-        menu, group = QMenu(), QActionGroup(self)
+        menu = QMenu()
+        group = QActionGroup(self)
         self.speed_button = tool_button(
             "How fast the steps are played", menu=menu, name="player_speed"
         )
@@ -150,7 +151,8 @@ class Player(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        narrow, narrowest = self.width() < NARROW, self.width() < NARROWEST
+        narrow = self.width() < NARROW
+        narrowest = self.width() < NARROWEST
         for part in (self.slider, self.buttons["first"], self.buttons["last"]):
             part.setHidden(narrowest)
         if narrow != self._narrow:

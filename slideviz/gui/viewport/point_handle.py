@@ -31,7 +31,8 @@ from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
 HANDLE_COLOR = "#2f6fb5"  # color of a handle that the mouse is not over
-POINT_PX, RIM_PX = 11.0, 15.0  # diameters of a handle's point and of the rim around it, in pixels
+POINT_PX = 11.0  # diameter of a handle's point, in pixels
+RIM_PX = 15.0  # and of the rim around it
 REACH_PX = 10.0  # distance from a point up to which the mouse takes it, in pixels
 EDGE_PX = 22.0
 """Distance that a handle's points keep from the view's edges and the legend, in pixels."""
@@ -53,8 +54,10 @@ class PointHandle(QObject, Generic[Grasp]):
 
     def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:
         super().__init__(view)
-        self.view, self.scene = view, scene
-        self._moved, self._dragging = moved, dragging
+        self.view = view
+        self.scene = scene
+        self._moved = moved
+        self._dragging = dragging
         self.section: Section | None = None
         self._scheme = scene.scheme
         self._part: Part | None = None
@@ -65,7 +68,9 @@ class PointHandle(QObject, Generic[Grasp]):
         self._soon = single_shot(self, self.report)
         view.installEventFilter(self)
         # Each drawing may have another camera or size.
-        watched, event, put = view.renderer, "StartEvent", self.put
+        watched = view.renderer
+        event = "StartEvent"
+        put = self.put
         tag = watched.AddObserver(event, lambda *_: put())
         self._unwatch = lambda: watched.RemoveObserver(tag)
 
@@ -85,7 +90,8 @@ class PointHandle(QObject, Generic[Grasp]):
 
     def show(self, section: Section, scheme: ColorScheme, _mesh: Mesh, _deformed: Mesh) -> None:
         """Show the handle of a section in a color scheme."""
-        self.section, self._scheme = section, scheme
+        self.section = section
+        self._scheme = scheme
         self.put()
 
     # Subclasses ------------------------------------------------------------------------
@@ -294,7 +300,8 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
         """Return the ball's place: the patch's middle, or if that is out of view, a visible one."""
         if self._start is not None:
             return self._start[0][1]
-        section, patch = self.section, self._patch
+        section = self.section
+        patch = self._patch
         assert section is not None
         assert patch is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
@@ -311,7 +318,8 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
     def parts(self) -> list[tuple[Part, FloatArray]]:
         """Return the ball, as the handle's middle."""
         assert self.section is not None
-        size, place = self.section.size, self.place
+        size = self.section.size
+        place = self.place
         at, slope, _ = pixel_and_slope(self.pixels_of, self.section, place, size)
         self._arrow = slope / np.linalg.norm(slope)
         return [("middle", at[None])]
@@ -360,7 +368,9 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
 
 
 _CORNERS = 32  # number of corners of the polygon that is drawn as a point
-_FAR_PX, _HEAD_PX, _SHAFT_PX = 25.0, 8.0, 2.5
+_FAR_PX = 25.0
+_HEAD_PX = 8.0
+_SHAFT_PX = 2.5
 """Of an arrow, in pixels: distance of its tip from the middle, head length, shaft thickness."""
 
 _NECK_PX = _FAR_PX - _HEAD_PX  # distance from the middle to where an arrow's head begins, in pixels
@@ -378,7 +388,9 @@ class Overlay:
         self.view = view
         self._layers: dict[str, tuple[pv.PolyData, vtkActor2D]] = {}
         for layer, name in enumerate(("handle:rim", "handle:points", "handle:held")):
-            shape, mapper, actor = pv.PolyData(), vtkPolyDataMapper2D(), vtkActor2D()
+            shape = pv.PolyData()
+            mapper = vtkPolyDataMapper2D()
+            actor = vtkActor2D()
             mapper.SetInputData(shape)
             actor.SetMapper(mapper)
             actor.SetLayerNumber(layer)

@@ -48,7 +48,8 @@ class Handles:
     """
 
     def __init__(self, moved: Moved, dragging: Dragging) -> None:
-        self._moved, self._dragging = moved, dragging
+        self._moved = moved
+        self._dragging = dragging
         self._of: dict[View3D, Handle] = {}
 
     def of(self, view: View3D) -> Handle | None:
@@ -96,8 +97,10 @@ class PlaneHandle:
     """
 
     def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:
-        self.view, self.scene = view, scene
-        self._moved, self._dragging = moved, dragging
+        self.view = view
+        self.scene = scene
+        self._moved = moved
+        self._dragging = dragging
         self.section: Section | None = None
         self.shape = vtkImplicitPlaneRepresentation()
         self.shape.SetPlaceFactor(1.0)
@@ -122,7 +125,8 @@ class PlaneHandle:
     def show(self, section: Section, scheme: ColorScheme, mesh: Mesh, _deformed: Mesh) -> None:
         self.section = section
         self._color(scheme)
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        low = mesh.points.min(axis=0)
+        high = mesh.points.max(axis=0)
         margin = _MARGIN * (high - low).max()
         bounds = np.stack([low - margin, high + margin], axis=1).ravel().tolist()
         if bounds != self._bounds:
@@ -247,7 +251,8 @@ class SectionViews(QSplitter):
 
     def look_along(self) -> None:
         """Turn the camera to face the selected section, from outside if it is about an axis."""
-        section, session = self.section, self.store.session
+        section = self.section
+        session = self.store.session
         if section is None or session.frame is None or session.frame.mesh.dim == 2:
             return
         scene = self.viewing.scene
@@ -279,7 +284,8 @@ class SectionViews(QSplitter):
         self._sync_flat(session)
 
     def _sync_handles(self, session: Session) -> None:
-        mesh, section = session.mesh, self.section
+        mesh = session.mesh
+        section = self.section
         wanted = session.view.handle and session.frame is not None and not self._closed
         usable = section is not None and section.shown and can_cut(mesh, section)
         if wanted and usable and section is not None and mesh is not None:
@@ -325,7 +331,8 @@ class SectionViews(QSplitter):
 
         It is always below if two views are compared, and for a curve (``extent`` None).
         """
-        wide, share = False, _SHARE
+        wide = False
+        share = _SHARE
         if extent is not None and not compared:
             wide, share = arrangement_for(extent, (self.width(), self.height()))
         self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
@@ -334,7 +341,8 @@ class SectionViews(QSplitter):
         self.setSizes([size - flat, flat])
 
     def _drop_flats(self) -> None:
-        flats, self.flats = self.flats, None
+        flats = self.flats
+        self.flats = None
         if flats is None:
             return
         sees_all = self.viewing.scene.camera.sees_all()

@@ -28,7 +28,8 @@ class CoarseWhileMoving(QObject):
 
     def __init__(self, view: View3D, scene: Scene) -> None:
         super().__init__(view)
-        self.view, self.scene = view, scene
+        self.view = view
+        self.scene = scene
         self._timer = single_shot(self, self._draw_fully, STILL_MS)
         view.signals.moving.connect(self._draw_coarsely)
         view.signals.released.connect(self._draw_fully)
@@ -54,7 +55,9 @@ class CellMouse(QObject):
 
     def __init__(self, view: View3D, scene: Scene | FlatScene, store: Store) -> None:
         super().__init__(view)
-        self.view, self.scene, self.store = view, scene, store
+        self.view = view
+        self.scene = scene
+        self.store = store
         view.setMouseTracking(True)
         view.installEventFilter(self)
         view.signals.cell_clicked.connect(self.mark)
@@ -100,7 +103,9 @@ class BoundaryMouse(QObject):
 
     def __init__(self, view: View3D, scene: Scene, store: Store) -> None:
         super().__init__(view)
-        self.view, self.scene, self.store = view, scene, store
+        self.view = view
+        self.scene = scene
+        self.store = store
         view.signals.clicked.connect(self._select)
         view.signals.menu_wanted.connect(self._show_menu)
 

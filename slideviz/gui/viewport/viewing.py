@@ -261,7 +261,8 @@ class Viewing(QWidget):
     def _resized(self, scene: Scene) -> None:
         """Draw a view after its size changed; fit the mesh, or show a saved view, again."""
         camera = self._leader.camera
-        fitted, restored = camera.fitted, camera.restored
+        fitted = camera.fitted
+        restored = camera.restored
         scene.resized()
         if fitted:
             camera.fit()
@@ -285,7 +286,9 @@ class Viewing(QWidget):
         if self.second is None:
             return
         self.second_leaves.emit()
-        second, self.second, self.second_scene = self.second, None, None
+        second = self.second
+        self.second = None
+        self.second_scene = None
         sees_all = self.scene.camera.sees_all()
         self._link.end()
         self._link = None
@@ -395,7 +398,8 @@ class Viewing(QWidget):
         another one only if all of the shown step is. Otherwise the camera stays: a jump would look
         like a motion of the mesh.
         """
-        meshes, leader = [frame.mesh for frame in self.store.session.frames], self._leader
+        meshes = [frame.mesh for frame in self.store.session.frames]
+        leader = self._leader
         fitted = leader.camera.fitted
         cameras = [scene.camera for scene in self._scenes()]
         if any(
@@ -415,7 +419,8 @@ class Viewing(QWidget):
 
     def fly_back(self) -> None:
         """Fly the camera back to its place before `fly_to`, or show the whole mesh."""
-        before, self._before = self._before, None
+        before = self._before
+        self._before = None
         # A fitted view is fitted again where the window has another size now.
         if before is None or self._fitted_at not in (None, self.size()):
             self.fit()

@@ -138,7 +138,8 @@ class Banner(QFrame):
             self._row.insertWidget(self._row.count() - 1, button)
 
     def _closed(self) -> None:
-        later, self._later = self._later, None
+        later = self._later
+        self._later = None
         self.hide()
         if later is not None:
             later()

@@ -171,7 +171,8 @@ def reveal(field: QWidget | None) -> None:
 def on_screen(content: QWidget, dialog: QWidget) -> QWidget:
     """Return the content of a dialog; in a scroll area if the screen is too small."""
     # The dialog has margins, a title, and buttons below.
-    room, wanted = dialog.screen().availableSize() - QSize(40, 120), content.sizeHint()
+    room = dialog.screen().availableSize() - QSize(40, 120)
+    wanted = content.sizeHint()
     if wanted.boundedTo(room) == wanted:
         return content
     area = PanelScroll(content)

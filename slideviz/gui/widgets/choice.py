@@ -71,7 +71,8 @@ class Choice(QComboBox):
         """Return the style option to paint, its text cut with an ellipsis if it is too long."""
         option = QStyleOptionComboBox()
         self.initStyleOption(option)
-        part, kind = QStyle.SubControl.SC_ComboBoxEditField, QStyle.ComplexControl.CC_ComboBox
+        part = QStyle.SubControl.SC_ComboBoxEditField
+        kind = QStyle.ComplexControl.CC_ComboBox
         room = self.style().subControlRect(kind, option, part, self).width() - MARGIN
         option.currentText = option.currentText or self.placeholderText()
         if not option.currentIcon.isNull():
@@ -81,7 +82,8 @@ class Choice(QComboBox):
         return option
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter, option = QStylePainter(self), self._option()
+        painter = QStylePainter(self)
+        option = self._option()
         painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
 

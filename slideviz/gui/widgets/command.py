@@ -29,7 +29,8 @@ def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
 
 def fill_compare(menu: QMenu, store: Store) -> None:
     """Fill the menu with what the shown run can be compared with, and the end of comparison."""
-    beside, shown = store.session.view.beside, store.session.shown
+    beside = store.session.view.beside
+    shown = store.session.shown
     _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
     menu.addSeparator()
     end = menu.addAction("End the comparison")

@@ -90,7 +90,8 @@ class ErrorReporter(QObject):
 
     def _take(self, error: BaseException) -> None:
         self.count += 1
-        key, now = _identity(error), self._clock()
+        key = _identity(error)
+        now = self._clock()
         times, last = self._known.get(key, (0, float("-inf")))
         fresh = now - last >= REST_S
         self._known[key] = (1 if fresh else times + 1, now)

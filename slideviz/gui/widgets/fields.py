@@ -399,7 +399,8 @@ class NumberBox(QSpinBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._tip, self.fault = "", ""
+        self._tip = ""
+        self.fault = ""
         self._before = self.value()
         # No single signal covers each change of the text, by the user or by the program.
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
@@ -444,7 +445,8 @@ class NumberBox(QSpinBox):
 
     def _complete(self) -> None:
         """Complete the beginning of the text for the lowest value; what was added is selected."""
-        typed, word = self.text(), self.specialValueText()
+        typed = self.text()
+        word = self.specialValueText()
         if typed and word.startswith(typed):
             self.setValue(self.minimum())
             self.lineEdit().setSelection(len(typed), len(word))
@@ -456,7 +458,8 @@ class NumberBox(QSpinBox):
         super().focusInEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        typed, bad = self.text(), self.fault
+        typed = self.text()
+        bad = self.fault
         super().focusOutEvent(event)
         _clear_undo(self.lineEdit())
         if bad:

@@ -21,7 +21,9 @@ class FieldWatch(QObject):
 
     def __init__(self, panel: QWidget, store: Store, place: PanelPlace) -> None:
         super().__init__(panel)
-        self.panel, self.store, self.place = panel, store, place
+        self.panel = panel
+        self.store = store
+        self.place = place
         self._fields: list[CheckedField | NumberBox] = [
             *panel.findChildren(CheckedField),
             *panel.findChildren(NumberBox),
@@ -96,7 +98,8 @@ class Panel(QWidget):
 
         def changed(_old: Session, new: Session) -> None:
             nonlocal shown
-            before, shown = shown, select(new)
+            before = shown
+            shown = select(new)
             if shown != before:
                 fill(new)
 

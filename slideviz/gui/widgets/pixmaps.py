@@ -36,7 +36,8 @@ def drawn_for(renderer: OffscreenRenderer, box: tuple[int, int]) -> tuple[int, i
 
 def fitted(image: QImage, box: tuple[int, int]) -> QImage:
     """Return an image scaled to fit into a box (width, height), its aspect ratio kept."""
-    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+    keep = Qt.AspectRatioMode.KeepAspectRatio
+    smooth = Qt.TransformationMode.SmoothTransformation
     return image.scaled(QSize(*box), keep, smooth)
 
 

@@ -218,7 +218,8 @@ class PlotCanvas(QWidget):
     def _show_image(self) -> None:
         if self._coming is None or not self._coming.done():
             return
-        coming, self._coming = self._coming, None
+        coming = self._coming
+        self._coming = None
         self._look_after.stop()
         self._last = time.monotonic()
         self._picture = coming.result()
@@ -252,7 +253,8 @@ class PlotCanvas(QWidget):
 
     def axes_rows(self) -> tuple[float, float]:
         """Return top and height of the axes in pixels of the widget."""
-        box, scale = self.figure.axes[0].get_window_extent(), self._scale[1]
+        box = self.figure.axes[0].get_window_extent()
+        scale = self._scale[1]
         return self.height() - box.y1 / scale, box.height / scale
 
     # Qt --------------------------------------------------------------------------------

@@ -119,7 +119,8 @@ def ask_unsaved(
         tick = QTimer(box)
         tick.timeout.connect(lambda: show(now()))
         tick.start(ROWS_MS)
-    several, going = len(can_save) > 1, "run" in can_save
+    several = len(can_save) > 1
+    going = "run" in can_save
     words = {"case": "Save &case…", "mesh": "Save &mesh…", "table": "Save &table…"}
     words["run"] = "&Stop it"
     words["all"] = "Save &both…" if len(can_save) == 2 else "Save a&ll…"
@@ -160,9 +161,11 @@ def ask_sample(
 
     ``samples`` has a description, ``sizes`` the size that is offered first, by name.
     """
-    dialog, name = QDialog(parent), Choice({name: name for name in samples})
+    dialog = QDialog(parent)
+    name = Choice({name: name for name in samples})
     dialog.setWindowTitle("Open a sample")
-    size, about = NumberBox(), hint_label()
+    size = NumberBox()
+    about = hint_label()
     size.setRange(2, 10_000_000)
     size.setGroupSeparatorShown(True)
 
@@ -172,7 +175,8 @@ def ask_sample(
 
     name.currentIndexChanged.connect(lambda _: show(name.currentData()))
     show(name.currentData())
-    kinds, form = QDialogButtonBox.StandardButton, QFormLayout(dialog)
+    kinds = QDialogButtonBox.StandardButton
+    form = QFormLayout(dialog)
     form.addRow("Sample", name)
     form.addRow("Size", size)
     form.addRow(about)
@@ -217,7 +221,8 @@ def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
 
 def _agreed(parent: QWidget, icon: QMessageBox.Icon, title: str, text: str) -> bool:
     """Return whether the user answers a question with yes; its text is plain text."""
-    yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.Cancel
+    yes = QMessageBox.StandardButton.Yes
+    no = QMessageBox.StandardButton.Cancel
     box = QMessageBox(icon, title, text, yes | no, parent)
     box.setTextFormat(Qt.TextFormat.PlainText)
     box.setDefaultButton(no)

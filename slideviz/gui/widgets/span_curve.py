@@ -27,7 +27,10 @@ TIP = (
     "far with Shift), Insert adds one."
 )
 REACH = 9.0  # greatest distance of a click from the point that it takes, in pixels
-LEFT, RIGHT, TOP, BOTTOM = 42, 12, 10, 20  # room around the axes, in pixels
+LEFT = 42  # room around the axes, in pixels
+RIGHT = 12
+TOP = 10
+BOTTOM = 20
 APART = 0.01  # least distance of two points along the span, and the step of a span
 MARGIN = 0.15  # room beside the outermost values, relative to their range
 RANGES = {"°": 4.0, "length": 0.02, "factor": 0.2, "part": 0.1}
@@ -49,7 +52,10 @@ class SpanCurveField(QWidget):
         super().__init__()
         self._motion: SpanMotion | None = None
         self._points: Points = ((0.0, 0.0), (1.0, 0.0))
-        self._neutral, self._least, self._unit, self._extent = 0.0, 1.0, "", 1.0
+        self._neutral = 0.0
+        self._least = 1.0
+        self._unit = ""
+        self._extent = 1.0
         self._at = len(self._points) - 1  # the chosen point
         self._before: Points | None = None  # the points before a drag
         self._range = self._fit()
@@ -126,13 +132,15 @@ class SpanCurveField(QWidget):
 
     def place(self, span: float, value: float) -> QPointF:
         """Return where in the widget a span and a value are."""
-        axes, (low, high) = self._axes(), self._range
+        axes = self._axes()
+        (low, high) = self._range
         right = axes.left() + axes.width() * (value - low) / (high - low)
         return QPointF(right, axes.bottom() - axes.height() * span)
 
     def _under(self, at: QPointF) -> tuple[float, float]:
         """Return span and value at a place, the value in round steps."""
-        axes, (low, high) = self._axes(), self._range
+        axes = self._axes()
+        (low, high) = self._range
         value = low + (high - low) * (at.x() - axes.left()) / max(axes.width(), 1.0)
         span = (axes.bottom() - at.y()) / max(axes.height(), 1.0)
         return min(max(round(span, 2), 0.0), 1.0), self._rounded(value)
@@ -147,13 +155,15 @@ class SpanCurveField(QWidget):
 
     # Changes ---------------------------------------------------------------------------
     def _set(self, points: Points, at: int) -> None:
-        self._points, self._at = points, at
+        self._points = points
+        self._at = at
         self._soon.start()
         self._describe()
 
     def _move(self, span: float, value: float) -> None:
         """Move the chosen point; along the span it stays between its neighbours."""
-        points, at = list(self._points), self._at
+        points = list(self._points)
+        at = self._at
         low = points[at - 1][0] + APART if at else 0.0
         high = points[at + 1][0] - APART if at + 1 < len(points) else 1.0
         if low <= high:
@@ -176,7 +186,8 @@ class SpanCurveField(QWidget):
     def _insert(self) -> None:
         """Add a point on the curve, halfway from the chosen one to the next, or to the wall."""
         spans = [0.0, *(span for span, _ in self._points), 1.0]
-        here, after = spans[self._at + 1], spans[self._at + 2]
+        here = spans[self._at + 1]
+        after = spans[self._at + 2]
         if after - here < 2.0 * APART and self._at:  # none above: below
             after = spans[self._at]
         span = round(0.5 * (here + after), 2)
@@ -223,7 +234,9 @@ class SpanCurveField(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         span, value = self._points[self._at]
         far = 10.0 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-        last, keys, key = len(self._points) - 1, Qt.Key, event.key()
+        last = len(self._points) - 1
+        keys = Qt.Key
+        key = event.key()
         if key in (keys.Key_Left, keys.Key_Right):
             step = far * self._step * (1 if key == keys.Key_Right else -1)
             self._move(span, self._rounded(value + step))
@@ -252,7 +265,9 @@ class SpanCurveField(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        colors, axes, painter = self.palette(), self._axes(), QPainter(self)
+        colors = self.palette()
+        axes = self._axes()
+        painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(axes, colors.base())
         self._paint_ticks(painter, axes)
@@ -269,7 +284,8 @@ class SpanCurveField(QWidget):
         painter.end()
 
     def _paint_ticks(self, painter: QPainter, axes: QRectF) -> None:
-        colors, flags = self.palette(), Qt.AlignmentFlag
+        colors = self.palette()
+        flags = Qt.AlignmentFlag
         thin = QPen(colors.color(QPalette.ColorRole.Mid), 1.0)
         letters = QPen(colors.color(QPalette.ColorRole.Text))
         at = ticks(*self._range, max(2, int(axes.width() // 50)))
@@ -299,8 +315,10 @@ class SpanCurveField(QWidget):
 
     def _paint_words(self, painter: QPainter, axes: QRectF) -> None:
         """Write span and value beside the chosen point, on the side with more room."""
-        place, words = self.place(*self._points[self._at]), self._words()
-        wide, high = painter.fontMetrics().horizontalAdvance(words), painter.fontMetrics().ascent()
+        place = self.place(*self._points[self._at])
+        words = self._words()
+        wide = painter.fontMetrics().horizontalAdvance(words)
+        high = painter.fontMetrics().ascent()
         left = place.x() > axes.center().x()
         x = place.x() - wide - 9.0 if left else place.x() + 9.0
         y = min(max(place.y() + 0.4 * high, axes.top() + high), axes.bottom() - 3.0)

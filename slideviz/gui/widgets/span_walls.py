@@ -46,13 +46,18 @@ class SpanWalls(Panel):
             self.sync(self.store.session)
 
     def sync(self, session: Session) -> None:
-        mesh, case, self._by_name = session.mesh, session.case, None
-        span, names = case.span, dict[str, str]()  # of boundaries in the mesh, by those in the file
+        mesh = session.mesh
+        case = session.case
+        self._by_name = None
+        span = case.span
+        names = dict[str, str]()  # of boundaries in the mesh, by those in the file
         if mesh is not None:
-            zone, names = mesh, {name: name for name in mesh.marker_names}
+            zone = mesh
+            names = {name: name for name in mesh.marker_names}
             for part in mesh.zone_parts if self._blade else ():
                 if {*self._blade} <= {*mesh.marker_names[part.markers]}:
-                    zone, names = part.mesh, names_from(mesh, part)
+                    zone = part.mesh
+                    names = names_from(mesh, part)
             with suppress(CaseError):  # names that do not say which
                 hub, shroud = span_ends(case.change(span=None), zone)
                 self._by_name = names[hub], names[shroud]

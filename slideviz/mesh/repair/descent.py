@@ -12,7 +12,8 @@ from slideviz.system.jit_cache import njit
 
 CORRECTIONS = 15  # pairs of steps and changes of the gradient that L-BFGS remembers
 
-ARMIJO, WOLFE = 1e-4, 0.9
+ARMIJO = 1e-4
+WOLFE = 0.9
 """A step must bring this part of the decrease that the slope promises, and leave at most this part
 of the slope."""
 
@@ -69,14 +70,16 @@ class Memory:
         self._precondition = precondition
         self._steps, self._changes = np.empty((2, CORRECTIONS, count))
         self._products, self._factors = np.empty((2, CORRECTIONS))
-        self._order, self._scale = np.empty(0, np.int64), 1.0
+        self._order = np.empty(0, np.int64)
+        self._scale = 1.0
 
     def __len__(self) -> int:
         return len(self._order)
 
     def clear(self) -> None:
         """Forget all pairs."""
-        self._order, self._scale = self._order[:0], 1.0
+        self._order = self._order[:0]
+        self._scale = 1.0
 
     def add(self, step: FloatArray, change: FloatArray) -> None:
         """Take a pair (b, d), (b, d), in place of the oldest; none without positive curvature."""
@@ -91,7 +94,8 @@ class Memory:
 
     def inverse_times(self, gradient: FloatArray) -> FloatArray:
         """Return the inverse Hessian times a gradient (b, d)."""
-        pairs, out = (self._steps, self._changes, self._products, self._order), gradient.copy()
+        pairs = (self._steps, self._changes, self._products, self._order)
+        out = gradient.copy()
         _first_loop(*pairs, out.ravel(), self._factors)
         out = self._scale * self._precondition(out)
         _second_loop(*pairs, out.ravel(), self._factors)
@@ -139,7 +143,9 @@ def descend(
         length, new_value, new_gradient = step
         s = length * direction
         memory.add(s, new_gradient - gradient)
-        x, value, gradient = x + s, new_value, new_gradient
+        x = x + s
+        value = new_value
+        gradient = new_gradient
         values.append(value)
         least = decrease()
         if len(values) > WINDOW and values[-1 - WINDOW] - value <= least * abs(value):
@@ -159,7 +165,9 @@ def _search(
 
     By bisection (A. Lewis, M. Overton, Nonsmooth optimization via quasi-Newton methods, 2013).
     """
-    low, high, step = 0.0, most, min(1.0, most)
+    low = 0.0
+    high = most
+    step = min(1.0, most)
     best = None
     for _ in range(TRIES):
         new_value, gradient = function(x + step * direction)

@@ -62,9 +62,11 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     length = np.sqrt(np.einsum("mcii->mci", gram))
     longest = np.maximum(length.max(axis=(1, 2), keepdims=True), np.finfo(float).tiny ** 0.25)
     length = np.maximum(length, LEAST_LENGTH * longest)
-    size, jacobian = length.prod(axis=2), found[CORNER_AT[vtk]].T
+    size = length.prod(axis=2)
+    jacobian = found[CORNER_AT[vtk]].T
     flat = ~(jacobian > LEAST_SINE * size)
-    edges[flat], jacobian[flat] = np.eye(d), 1.0
+    edges[flat] = np.eye(d)
+    jacobian[flat] = 1.0
     if d == 2:
         dual = np.stack([edges[..., 1, ::-1], edges[..., 0, ::-1]], axis=2) * [[1, -1], [-1, 1]]
     else:
@@ -108,11 +110,14 @@ def _squares(at, corner, shape, count, total):  # type: ignore[no-untyped-def]
     d = at.shape[0]
     total[:] = 0.0
     for s in range(d * (d + 1) // 2):
-        o, a, b = corner[0], corner[1 + s % d], corner[1 + (s if s < d else (s - d + 1) % d)]
+        o = corner[0]
+        a = corner[1 + s % d]
+        b = corner[1 + (s if s < d else (s - d + 1) % d)]
         factor = 1.0 if s < d else 2.0
         for axis in range(d):
             for c in range(count):
-                one, two = at[axis, a, c] - at[axis, o, c], at[axis, b, c] - at[axis, o, c]
+                one = at[axis, a, c] - at[axis, o, c]
+                two = at[axis, b, c] - at[axis, o, c]
                 total[c] += factor * shape[1 + s, c] * (one * two)
 
 
@@ -121,7 +126,9 @@ def _pull_squares(at, corner, shape, count, weight, slope):  # type: ignore[no-u
     """Add the slopes of ``tr(JᵀJ)`` of a corner, times ``weight`` (LANES,), to (d, n, LANES)."""
     d = at.shape[0]
     for s in range(d * (d + 1) // 2):
-        o, a, b = corner[0], corner[1 + s % d], corner[1 + (s if s < d else (s - d + 1) % d)]
+        o = corner[0]
+        a = corner[1 + s % d]
+        b = corner[1 + (s if s < d else (s - d + 1) % d)]
         share = 1.0 if s < d else 2.0
         for axis in range(d):
             for c in range(count):
@@ -141,13 +148,22 @@ def write_energy(  # type: ignore[no-untyped-def]
 
     ``low`` and ``high`` are the range of the cells.
     """
-    d, n, parts, outer = points.shape[1], nodes.shape[1], len(scale), len(table)
+    d = points.shape[1]
+    n = nodes.shape[1]
+    parts = len(scale)
+    outer = len(table)
     power = 2.0 / d
-    at, slope = np.empty((d, n, LANES)), np.empty((d, n, LANES))
-    found, pull = np.empty((parts, LANES)), np.empty((parts, LANES))
-    none, total, weight = np.zeros((parts, LANES)), np.empty(LANES), np.empty(LANES)
-    value, lowest = np.empty(LANES), np.empty(LANES)
-    factors, shapes = np.empty((parts, LANES)), np.empty((*shape.shape[:2], LANES))
+    at = np.empty((d, n, LANES))
+    slope = np.empty((d, n, LANES))
+    found = np.empty((parts, LANES))
+    pull = np.empty((parts, LANES))
+    none = np.zeros((parts, LANES))
+    total = np.empty(LANES)
+    weight = np.empty(LANES)
+    value = np.empty(LANES)
+    lowest = np.empty(LANES)
+    factors = np.empty((parts, LANES))
+    shapes = np.empty((*shape.shape[:2], LANES))
     for first in range(low, high, LANES):
         count = min(LANES, high - first)
         gather(points, nodes, first, count, at)
@@ -193,11 +209,18 @@ def write_curvatures(  # type: ignore[no-untyped-def]
 
     That is the part without second derivatives of chi and D. Else as `write_energy`.
     """
-    d, n, parts, outer = points.shape[1], nodes.shape[1], len(scale), len(table)
+    d = points.shape[1]
+    n = nodes.shape[1]
+    parts = len(scale)
+    outer = len(table)
     power = 2.0 / d
-    at, slope = np.empty((d, n, LANES)), np.empty((d, n, LANES))
-    found, unit = np.empty((parts, LANES)), np.zeros((parts, LANES))
-    none, total, bend = np.zeros((parts, LANES)), np.empty(LANES), np.empty((parts, LANES))
+    at = np.empty((d, n, LANES))
+    slope = np.empty((d, n, LANES))
+    found = np.empty((parts, LANES))
+    unit = np.zeros((parts, LANES))
+    none = np.zeros((parts, LANES))
+    total = np.empty(LANES)
+    bend = np.empty((parts, LANES))
     blocks = np.empty((n, d, d, LANES))
     for first in range(low, high, LANES):
         count = min(LANES, high - first)

@@ -75,7 +75,8 @@ class Freedom:
             assert whole is not None
             return whole(np.searchsorted(places, some), points)
 
-        bound, curved = places[self.bound], places[self.curved]
+        bound = places[self.bound]
+        curved = places[self.curved]
         return Freedom(sealed(place), bound, self.maps, curved, None if whole is None else project)
 
     def without(self, held: IntArray) -> Freedom:

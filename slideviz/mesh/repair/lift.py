@@ -38,7 +38,9 @@ def lift_energy(
 
     def work(part: Targets, here: slice, whole: slice, slopes: FloatArray) -> None:
         cells = slice(whole.start + here.start, whole.start + here.stop)
-        nodes, turn, before = part.nodes[here], signs[cells], sums[cells]
+        nodes = part.nodes[here]
+        turn = signs[cells]
+        before = sums[cells]
         size, skew, status = cell_quality(points, part.vtk, nodes, turn, before, metric)
         with np.errstate(all="ignore"):
             inverse = 1.0 / (np.sqrt(size) * skew if sized else skew)

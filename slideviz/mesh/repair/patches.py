@@ -23,7 +23,8 @@ from slideviz.system.threads import cores
 
 CHUNK = 4 * LANES  # least number of cells that a thread works on at a time
 
-SAFE, NEAR = 4.0, 0.9  # longest step that is looked at, and the part of the safe one that is taken
+SAFE = 4.0  # longest step that is looked at
+NEAR = 0.9  # part of the safe step that is taken
 
 FLAT = 1e-12  # curvature of a block, over its largest one, below which a direction counts as held
 
@@ -35,7 +36,8 @@ def find_patches(
 
     ``bad`` is a mask (m,) of cells; patches are these and ``rings`` rings of cells by nodes.
     """
-    place, count = freedom.place, len(freedom.place)
+    place = freedom.place
+    count = len(freedom.place)
     chosen = bad.copy()
     for _ in range(rings):
         near = with_images(place, _nodes_of(cells, chosen, count))
@@ -45,7 +47,8 @@ def find_patches(
     inside &= ~with_images(place, ~inside)
     ids = np.flatnonzero(chosen)
     part = cells.take(ids)
-    first, sizes = part.connectivity[part.offsets[:-1]], np.diff(part.offsets)
+    first = part.connectivity[part.offsets[:-1]]
+    sizes = np.diff(part.offsets)
     label = components(count, np.repeat(first, sizes), part.connectivity)
     label = _with_representative(place, label)[first]
     return [ids[label == one] for one in np.unique(label)], inside
@@ -74,7 +77,8 @@ def _with_representative(place: IntArray, label: IntArray) -> IntArray:
     first[place[own[::-1]]] = own[::-1]
     count = len(label)
     pairs = first[place[own]]
-    a, b = np.r_[np.arange(count), own], np.r_[count + label, pairs]
+    a = np.r_[np.arange(count), own]
+    b = np.r_[count + label, pairs]
     return components(2 * count, a, b)[:count]
 
 
@@ -89,7 +93,9 @@ class Patch:
         Each block of the freedom moves. The nodes of the cells count from 0. ``pool`` does chunks
         of cells.
         """
-        self.start, self.freedom, self.parts = points, freedom, parts
+        self.start = points
+        self.freedom = freedom
+        self.parts = parts
         self.blocks = int(freedom.place.max(initial=-1)) + 1
         self.maps = np.array(freedom.maps)
         self.still = np.zeros((self.blocks, points.shape[1]))
@@ -100,19 +106,24 @@ class Patch:
         owner = freedom.place[self._flat]
         order = np.argsort(owner, kind="stable")
         begins = np.searchsorted(owner[order], np.arange(self.blocks + 1))
-        self._order, self._begins = order, begins
+        self._order = order
+        self._begins = begins
         self._slopes = np.empty((len(self._flat), points.shape[1]))
         sizes = [len(part.nodes) for part in parts]
         self.values, self.least = np.empty(sum(sizes)), np.empty(sum(sizes))
-        self._chunks, first, entry = [], 0, 0
+        self._chunks = []
+        first = 0
+        entry = 0
         for part, size in zip(parts, sizes, strict=True):
             width = part.nodes.shape[1]
             slopes = self._slopes[entry : entry + size * width].reshape(size, width, -1)
             step = self._step(size)
             for low in range(0, size, step):
-                here, whole = slice(low, min(low + step, size)), slice(first, first + size)
+                here = slice(low, min(low + step, size))
+                whole = slice(first, first + size)
                 self._chunks.append((part, here, whole, slopes))
-            first, entry = first + size, entry + size * width
+            first = first + size
+            entry = entry + size * width
 
     @staticmethod
     def _step(cells: int) -> int:
@@ -149,7 +160,8 @@ class Patch:
         points = self.points(unknowns)
 
         def work(part: Targets, here: slice, whole: slice, slopes: FloatArray) -> None:
-            table, at = CORNERS[part.vtk], CORNER_AT[part.vtk]
+            table = CORNERS[part.vtk]
+            at = CORNER_AT[part.vtk]
             cells = part.nodes, table, at, part.scale, part.shape
             out = self.values[whole], slopes, self.least[whole]
             write_energy(part.vtk, points, *cells, epsilon, here.start, here.stop, *out)
@@ -162,7 +174,9 @@ class Patch:
 
         ``signs`` (m,) are those of the cells, in the order of the parts.
         """
-        points, first, least = self.points(unknowns), 0, SAFE
+        points = self.points(unknowns)
+        first = 0
+        least = SAFE
         way = np.zeros_like(points)
         _move(self.freedom.place, self.row, self.maps, direction, way)
         for part in self.parts:
@@ -174,7 +188,8 @@ class Patch:
 
     def curvature(self, epsilon: float) -> FloatArray:
         """Return the inverse (b, d, d) of each block of the positive Hessian, where it can move."""
-        points, d = self.start, self.start.shape[1]
+        points = self.start
+        d = self.start.shape[1]
         total = np.zeros((self.blocks, d, d))
         blocks = {part.vtk: np.empty((*part.nodes.shape, d, d)) for part in self.parts}
 
@@ -203,7 +218,8 @@ def _move(place, row, maps, unknowns, out):  # type: ignore[no-untyped-def]
     """Add the displacements of unknowns (b, d) to the points ``out`` (k, d)."""
     d = out.shape[1]
     for i in range(len(out)):
-        block, m = place[i], row[i]
+        block = place[i]
+        m = row[i]
         if block < 0:
             continue
         for a in range(d):

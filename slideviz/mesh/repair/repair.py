@@ -35,13 +35,20 @@ FEW = 5000  # most cells of a patch that grows to the last two
 
 POOR = 2  # number of sizes that are tried for patches whose cells are all proved, but some too low
 
-ROUNDS, VAIN = 40, 10  # most outer rounds of a patch, and those in a row that may mend nothing
+ROUNDS = 40  # most outer rounds of a patch
+VAIN = 10  # rounds in a row that may mend nothing
 
-ITERATIONS, DECREASE, ENOUGH, POLISH = 200, 5e-3, 0.01, 1e-4
+ITERATIONS = 200
+DECREASE = 5e-3
+ENOUGH = 0.01
+POLISH = 1e-4
 """Most iterations of a descent, and the least relative decrease of the energy in ten of them: while
 a cell is folded, when none is, and in the last descent, which brings cells near their targets."""
 
-LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
+LIFTS = 40
+LIFTED = 1e-3
+BETA = 1.01
+GAIN = 0.003
 """Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
 over the largest 1 / quality, and the least relative gain, of which two rounds may bring less."""
 
@@ -238,8 +245,12 @@ class _Rounds:
         metric: SkewMetric,
         pool: ThreadPoolExecutor,
     ) -> None:
-        self.regions, self.cells, self.ratings = regions, cells, ratings
-        self.below, self.metric, self.pool = below, metric, pool
+        self.regions = regions
+        self.cells = cells
+        self.ratings = ratings
+        self.below = below
+        self.metric = metric
+        self.pool = pool
         self.impossible = dict[int, Impossible]()
         self.reached = True  # whether no cell that can be mended is below the limit of the round
 
@@ -250,9 +261,11 @@ class _Rounds:
             region = self.regions.near(bad, RINGS[stage]) if len(bad) else None
             if region is None:
                 return
-            mesh, reference = region.mesh, region.reference
+            mesh = region.mesh
+            reference = region.reference
             sums, signs = reference_of(mesh if reference is None else reference)
-            wanted, points = np.isin(region.cells, bad), np.array(mesh.points)
+            wanted = np.isin(region.cells, bad)
+            points = np.array(mesh.points)
             if not stage:
                 for one in _impossible(region, wanted, signs, sums, self.metric):
                     self.impossible[one.cell] = one
@@ -301,10 +314,12 @@ def _impossible(
     All their nodes are held, or those of a corner that folds, or of a side that folds on itself.
     """
     out = list[Impossible]()
-    points, held = region.mesh.points, region.freedom.place < 0
+    points = region.mesh.points
+    held = region.freedom.place < 0
     for vtk, (ids, table) in region.mesh.cells.by_type.items():
         few = np.flatnonzero(bad[ids] & (held[table].sum(axis=1) >= points.shape[1]))
-        cells, nodes = ids[few], table[few]
+        cells = ids[few]
+        nodes = table[few]
         status = cell_quality(points, vtk, nodes, signs[cells], sums[cells], metric)[2]
         for cell, own, proved in zip(cells, nodes, status == VALID, strict=True):
             wrong = own if held[own].all() else None
@@ -359,13 +374,17 @@ class _Mending:
         self, work: _Work, cells: IntArray, free: NDArray[np.bool_], tell: Callable[[float], object]
     ) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
-        self.work, self.tell, self.round = work, tell, 0
-        shapes, nodes = work.reference, work.mesh.cells.take(cells).nodes
+        self.work = work
+        self.tell = tell
+        self.round = 0
+        shapes = work.reference
+        nodes = work.mesh.cells.take(cells).nodes
         # In the order of coordinates sums have the same bits, however the mesh is numbered.
         at = work.mesh.points[nodes] if shapes is None else shapes.points[nodes]
         self.nodes = nodes[np.lexsort(at.T)]
         cells = cells[~work.hopeless[cells]]
-        tables, order = dict[int, IntArray](), []
+        tables = dict[int, IntArray]()
+        order = []
         for vtk, (some, table) in work.mesh.cells.take(cells).by_type.items():
             local = places(self.nodes, table)
             rank = np.lexsort(np.sort(local, axis=1).T)
@@ -396,14 +415,17 @@ class _Mending:
 
     def score(self, points: FloatArray) -> tuple[int, float]:
         """Return (minus the number of cells not proved, the lowest quality) at points (k, d)."""
-        unproved, lowest, first = 0, np.inf, 0
+        unproved = 0
+        lowest = np.inf
+        first = 0
         for part in self.parts:
             here = slice(first, first + len(part.nodes))
             cells = part.nodes, self.signs[here], self.sums[here]
             size, skew, status = cell_quality(points, part.vtk, *cells, self.work.metric)
             unproved += int((status != VALID).sum())
             values = np.sqrt(size) * skew if self.work.reference is not None else skew
-            lowest, first = min(lowest, float(values.min())), here.stop
+            lowest = min(lowest, float(values.min()))
+            first = here.stop
         return -unproved, lowest
 
     def good(self, score: tuple[int, float]) -> bool:
@@ -420,7 +442,8 @@ class _Mending:
             self.patch.start = best_points
             points = self._settled(self._descended(self.patch, LIFTED, POLISH), LIFTED)
             if (score := self.score(points)) > best:
-                best_points, best = points, score
+                best_points = points
+                best = score
         # The quality of a cell that is folded in the reference is 0, however it is lifted.
         if best[0] == 0 and best[1] > 0 and not self.good(best):
             best_points, best = self._lifted(best_points, best)
@@ -430,7 +453,9 @@ class _Mending:
         self, best_points: FloatArray, best: tuple[int, float]
     ) -> tuple[FloatArray, tuple[int, float]]:
         """Return the best points (k, d) and their score, after rounds in which epsilon falls."""
-        patch, epsilon, vain = self.patch, 1.0, 0
+        patch = self.patch
+        epsilon = 1.0
+        vain = 0
         for _ in range(ROUNDS):
             before = patch.energy(patch.still, epsilon)[0]
             patch.start = self._settled(self._descended(patch, epsilon), epsilon)
@@ -438,7 +463,8 @@ class _Mending:
             score = self.score(patch.start)
             vain = 0 if score[0] > best[0] else vain + 1
             if score > best:
-                best_points, best = patch.start, score
+                best_points = patch.start
+                best = score
             if best[0] == 0 or vain >= VAIN:
                 break
             depth = float(patch.least.min())
@@ -452,7 +478,8 @@ class _Mending:
 
     def _descended(self, patch: Patch, epsilon: float, least: float | None = None) -> FloatArray:
         """Return points (k, d) of lower energy; ``least`` is the decrease that ends it."""
-        inverse, edges = patch.curvature(epsilon), self._edges(patch)
+        inverse = patch.curvature(epsilon)
+        edges = self._edges(patch)
 
         def decrease() -> float:
             self._progress()
@@ -502,12 +529,16 @@ class _Mending:
         self, best_points: FloatArray, best: tuple[int, float]
     ) -> tuple[FloatArray, tuple[int, float]]:
         """Return the best points (k, d) and their score, after rounds that lift the worst cells."""
-        patch, work, vain, first = self.patch, self.work, 0, best[1]
+        patch = self.patch
+        work = self.work
+        vain = 0
+        first = best[1]
         sized = work.reference is not None
         for count in range(1, ROUNDS + 1):
             patch.start = best_points
             beta = BETA / best[1]
-            inverse, edges = patch.curvature(LIFTED), self._edges(patch)
+            inverse = patch.curvature(LIFTED)
+            edges = self._edges(patch)
 
             def longest(unknowns: FloatArray, direction: FloatArray) -> float:
                 self._progress()
@@ -520,7 +551,8 @@ class _Mending:
                 total, slopes = lift_energy(patch, unknowns, *cells, beta)  # noqa: B023
                 if np.isfinite(total):
                     energy, pull = patch.energy(unknowns, LIFTED)
-                    total, slopes = total + SHAPE * energy, slopes + SHAPE * pull
+                    total = total + SHAPE * energy
+                    slopes = slopes + SHAPE * pull
                 return total, slopes
 
             found = descend(
@@ -535,7 +567,8 @@ class _Mending:
             score = self.score(points)
             vain = 0 if score[1] > best[1] * (1 + GAIN) else vain + 1
             if score > best:
-                best_points, best = points, score
+                best_points = points
+                best = score
             # The lowest quality after all rounds, if it rises as it did so far.
             end = first * (best[1] / first) ** (ROUNDS / count)
             if self.good(best) or vain >= 2 or (count >= TREND and end < work.below):
