@@ -14,6 +14,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 from typing import BinaryIO, Protocol
 
 
@@ -48,6 +49,10 @@ NOTHING_LEFT = "it leaves nothing half-written"
 """The answer of `leftover_message` where no partial file is kept."""
 _drafts: set[Path] = set()  # files and folders to remove when the program ends early
 _processes: set[Process] = set()  # processes to kill when the program ends early
+starting = Lock()
+"""Held while a process is started, whose beginning would fail with a traceback if it were cut off.
+"""
+_PATIENCE = 2.0  # longest time that an early end waits for it, in seconds
 _partial: dict[Path, str] = {}
 """Partial files that stay then, and the sentence on each for the user."""
 
@@ -105,6 +110,7 @@ def killed_at_end(process: Process) -> Iterator[None]:
 
 def clean_up() -> None:
     """Kill the programs that were started and remove all drafts, before the end of the process."""
+    starting.acquire(timeout=_PATIENCE)
     for process in list(_processes):
         with suppress(OSError):
             process.kill()

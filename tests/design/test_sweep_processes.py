@@ -12,6 +12,7 @@ import time
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from functools import partial
+from multiprocessing import Pipe
 from pathlib import Path
 
 import pytest
@@ -210,3 +211,12 @@ def test_no_worker_heeds_ctrl_c_while_it_starts():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
     assert done.stdout == b"True\nFalse\n"
+
+
+@pytest.mark.parametrize("has_mesh", [False, True], ids=["before", "after its mesh"])
+def test_a_worker_whose_parent_has_ended_says_nothing(has_mesh):
+    here, there = Pipe()
+    if has_mesh:
+        here.send(pack_mesh(sample("square", 4).mesh))
+    here.close()
+    assert processes._serve_calls(there, lambda: None) is None

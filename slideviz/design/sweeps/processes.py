@@ -43,7 +43,7 @@ from slideviz.mesh.quality import quality
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
 from slideviz.streaming.run import stream
-from slideviz.system.cleanup import clean_up
+from slideviz.system.cleanup import clean_up, starting
 from slideviz.terms import FileFormat
 
 _KEPT = 2  # number of meshes that a process keeps: that of the sweep, and one of another sweep
@@ -190,7 +190,6 @@ def _libraries() -> Any:
 
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_environment = threading.Lock()
 _STARTS = 2
 """Number of processes in a row that end before their first call, at which no more are started."""
 
@@ -349,7 +348,7 @@ def _settings_of_workers() -> Iterator[None]:
 
     A process inherits the signal mask, so that no signal reaches it before it can set its own.
     """
-    with _environment:
+    with starting:
         before = {name: os.environ.get(name) for name in _THREADS}
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         resource_tracker.ensure_running()  # which would unblock the signal where it starts later
@@ -368,8 +367,11 @@ def _settings_of_workers() -> Iterator[None]:
 def _serve_calls(connection: Connection, begin: Callable[[], None]) -> None:
     """Do the calls that come through a pipe, and send back each result or exception."""
     begin()
-    cache_mesh(connection.recv())
-    connection.send(None)
+    try:
+        cache_mesh(connection.recv())
+        connection.send(None)
+    except (EOFError, OSError):  # the parent has ended meanwhile
+        return
     while True:
         try:
             function, arguments, named = connection.recv()
