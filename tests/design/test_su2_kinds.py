@@ -321,7 +321,7 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
             r"\(NACA_4DIGITS\): the second digit is 0; the largest camber",
         ),
         ("PARABOLIC", (1.0, 12), r"\(PARABOLIC\): the centre is 1; it must not be 0 or 1"),
-        ("PARABOLIC", (1e300, 2), "a.cfg: the variables take nodes farther than can be computed"),
+        ("PARABOLIC", (1e300, 2), "1e.300. is too large to compute with; expected a number up to"),
         ("PARABOLIC", (1e-320, 2), "a.cfg: the variables take nodes farther than can be computed"),
         ("CST", (1, 2, 101), "there is no term 2 of 101; expected .* and n up to 100"),
         ("TRANSLATE_GRID", (0, 0, 0), r"\(TRANSLATE_GRID\): its direction has no length; give one"),

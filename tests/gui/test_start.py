@@ -53,7 +53,9 @@ def test_a_card_opens_its_sample_and_deforms_nothing(driver, small, key):
     assert not driver.session.runs
 
 
-def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(driver, monkeypatch):
+def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(
+    driver, monkeypatch, tmp_path
+):
     assert max(jobs.SIZES.values()) <= 50_000
     assert {"stator", "turbine-row"} <= set(jobs.SIZES)
     made, window = [], driver.window
@@ -62,7 +64,7 @@ def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(driv
     )
     for name, words in window.files.samples.items():
         with pytest.raises(StopIteration):  # as nothing was written
-            jobs.open_sample(name, Path("nowhere"), lambda _: None, lambda: False)
+            jobs.open_sample(name, tmp_path, lambda _: None, lambda: False)
         size = made[-1][1] or SAMPLES[name].size
         assert words.endswith(f"({size})")
         assert words in window.start.sample_buttons[name].toolTip()

@@ -80,8 +80,10 @@ REST_MS = 200
 """Least time between two drawings of a plot or table while steps are played."""
 
 REST_TIMES = 4.0
+"""Pause of a plot after a drawing, relative to the time that the drawing took."""
+
 MOST_REST = 4
-"""Pause of a plot relative to the time its drawing took; and its limit, in units of `REST_MS`."""
+"""Longest pause of a plot after a drawing, in units of `REST_MS`."""
 
 LOOK_MS = 8
 """Interval at which a finished plot is polled for: half the time of a screen's frame."""
