@@ -30,9 +30,9 @@ Result = TypeVar("Result")
 _WORDS = {
     "Any": "value",
     "Callable": "a function",
-    "Case": "a Case, as slideviz.Case.read returns it",
+    "Case": "a Case from slideviz.Case.read",
     "Executor": "an executor of concurrent.futures",
-    "Mesh": "a Mesh, as slideviz.read returns it",
+    "Mesh": "a Mesh from slideviz.read",
     "Motion": "a motion, e.g. Translate(...)",
     "NoneType": "None",
     "Path": "the name of a file",

@@ -17,7 +17,7 @@ from tests import builders
 
 MESH = builders.square(6)
 CASE = sv.Case(roles={"BLOCK": "moving"}, motions=(sv.Translate("BLOCK", (0.02, 0.01)),), steps=1)
-A_MESH, A_CASE = "expected a Mesh, as slideviz.read", "expected a Case, as slideviz.Case.read"
+A_MESH, A_CASE = "expected a Mesh from slideviz.read", "expected a Case from slideviz.Case.read"
 A_FILE = "expected the name of a file"
 
 
@@ -103,7 +103,7 @@ def test_right_arguments_pass_and_are_still_told_of():
         (lambda: CASE.change(generate_quality="NO"), "is 'NO'; expected True or False"),
         (
             lambda: CASE.change(roles=["A"]),
-            """roles is ['A']; expected a role for each marker, as""",
+            """roles is ['A']; expected a role for each marker, e.g.""",
         ),
         (lambda: CASE.change(roles={"A": 3}), "roles['A'] is 3; expected 'moving' or 'fixed'"),
         (lambda: CASE.change(motions=CASE.motions[0]), "motions is of type Translate; expected a"),

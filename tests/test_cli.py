@@ -651,7 +651,9 @@ def test_a_file_without_any_key_is_told_in_one_line(tmp_path, capsys):
     path.write_text('<?xml version="1.0"?>\n' + "<a>\n" * 50)
     assert run(["run", str(path)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "m.vtu: is no case file, for it has no line with a key of slideviz (line 1: '<?x" in line
+    assert (
+        "m.vtu: is not a case file, for it has no line with a key of slideviz (line 1: '<?x" in line
+    )
 
 
 def test_all_wrong_values_are_told_at_once(square, capsys):
@@ -772,7 +774,7 @@ def test_periodic_sides_are_no_walls_without_a_case(tmp_path, capsys):
     mesh = str(tmp_path / "stage.su2")
     sv.write(mesh, stage())
     assert run(["quality", mesh, "--limits", "equal_layers@1:per1 > 0"]) == 1
-    assert "1:per1 is no wall, for it is periodic" in capsys.readouterr().err
+    assert "1:per1 is periodic or internal, so it has no wall" in capsys.readouterr().err
     # Of boundaries that match by chance, as ends of a duct, nothing is left out.
     sv.write(mesh, grid((4, 4)))
     assert run(["quality", mesh, "--limits", "equal_layers@x_m > 0"]) != 1
@@ -836,7 +838,7 @@ def test_a_missed_limit_of_walls_says_where_and_whether_the_undeformed_mesh_miss
     assert run([*call, "--set", "LIMITS=( equal_layers@y_m > 4 )"]) == 4
     assert "may help" not in capsys.readouterr().err
     assert run([*call, "--set", "LIMITS=( growth@x_m < 1.2 )"]) == 1
-    assert "x_m is no wall" in capsys.readouterr().err
+    assert "x_m is periodic or internal" in capsys.readouterr().err
     mesh = ["quality", str(tmp_path / "mesh.su2"), "--limits"]
     assert run([*mesh, "height_ratio > 0.5"]) == 1
     assert "compares with the undeformed mesh; give it (--ref" in capsys.readouterr().err

@@ -278,7 +278,7 @@ class USMesh:
         from slideviz.formats.files import write
 
         if fileName is None:
-            raise CaseError("writeGrid needs the name of a file, as in writeGrid('warped.cgns')")
+            raise CaseError("writeGrid needs the name of a file, e.g. writeGrid('warped.cgns')")
         write(fileName, self.deformer.mesh.with_points(self._points))
 
     # Derivatives ---------------------------------------------------------------------------
@@ -358,8 +358,8 @@ class USMesh:
             places = places[self._indices]
         if len(given) != len(places):
             raise CaseError(
-                f"a vector of the grid has {len(given)} numbers; expected {len(places)}, as "
-                f"{'getSolverGrid' if solver else 'getWarpGrid'} returns"
+                f"a vector of the grid has {len(given)} numbers; expected {len(places)}, the "
+                f"number that {'getSolverGrid' if solver else 'getWarpGrid'} returns"
             )
         sums = np.bincount(places, given, self._points.size)
         return sums.astype(np.float64).reshape(self._points.shape)

@@ -101,7 +101,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
     if len(problems) > _FEW and not names & KEYS.keys():
         line, sentence = min(problems)
         raise CaseError(
-            f"{path}: is no case file, for it has no line with a key of slideviz (line {line}: "
+            f"{path}: is not a case file, for it has no line with a key of slideviz (line {line}: "
             f"{sentence}); a mesh is named in MESH_FILENAME="
         )
     rows: dict[str, Entry] = {}

@@ -46,7 +46,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
     if len(case.interfaces) % 2:
-        yield f"MARKER_ZONE_INTERFACE: {', '.join(case.interfaces)} are no pairs of boundaries"
+        yield f"MARKER_ZONE_INTERFACE: {', '.join(case.interfaces)} are not pairs of boundaries"
         return
     moved = {name: "MOTION" for motion in case.motions for name in named(motion.marker)}
     keys = moved | _keys_of_markers(case) | dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE")
@@ -115,7 +115,7 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
             several = name.split("+")
             if set(several) <= set(moving):
                 markers = ", ".join(several)
-                remedy = f"write several in brackets, as in (({markers}), translate, ...)"
+                remedy = f"write several in brackets, e.g. (({markers}), translate, ...)"
             sentence = (
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; {remedy}"
@@ -288,8 +288,8 @@ _SLIDES = {
 def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each moving halo copy of a boundary that does not move."""
     return tuple(
-        f"{mesh.name}: {copy} is asked to move, but by the mesh's SEND_RECEIVE markers it is a "
-        f"copy of {origin}, which it follows; let {origin} move, too, or alone"
+        f"{mesh.name}: {copy} is a halo copy of {origin} (SEND_RECEIVE) and cannot move by itself; "
+        f"make {origin} moving"
         for copy, origin in (mesh.halo.sides if mesh.halo is not None else ())
         if case.roles.get(copy) == "moving" != case.roles.get(origin)
     )

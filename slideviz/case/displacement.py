@@ -139,7 +139,7 @@ def in_zones(
     ]
     if wrong:
         (at, said), (k, first, _, here) = wrong[0], each[0]
-        said += f"; write zone and node, as {k}:{here[0] - first}"
+        said += f"; write zone and node, e.g. {k}:{here[0] - first}"
         raise CaseError(listed(path, [(at, _with_count(said, len(wrong)))]))
     missing = [k for k in several if not any(head is not None and head[1] == k for head in heads)]
     if missing:

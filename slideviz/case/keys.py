@@ -152,7 +152,7 @@ _ROWS = (
         integer(1),
     ),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
-    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay, as do those in no list."),
+    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay. Boundaries in no list stay, too."),
     role("MARKER_SLIDING", NAMES, "sliding", "Boundaries along which their nodes may slide."),
     role("MARKER_PERIODIC", PAIRS, "periodic", "Periodic boundaries, in pairs of any order."),
     role(
@@ -220,7 +220,7 @@ _ROWS = (
         LIMITS,
         "What the deformed mesh must meet; if it does not, `run` ends with exit code 4. A number "
         "that each cell or wall has must be within its limit everywhere. Numbers of walls are "
-        "those of all boundaries with layers, or, as in growth@blade < 1.5, of one.",
+        "those of all boundaries with layers, or of one, e.g. growth@blade < 1.5.",
         lambda case, limits: case.change(limits=limits),
         lambda case: case.limits or None,
         field="limits",

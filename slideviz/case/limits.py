@@ -347,7 +347,7 @@ def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[Limit
     """Return for each limit whether a mesh meets it.
 
     Raises CaseError for a limit on a number that compares with the undeformed mesh where there is
-    none, and for one at a boundary that is no wall.
+    none, and for one at a boundary that is not a wall.
     """
     problems = [] if measured.boundaries is None else not_walls(limits, measured.boundaries)
     if measured.reference is None and measured.mesh is not None:
@@ -365,8 +365,8 @@ def not_walls(limits: Iterable[Limit], walls: Sequence[str]) -> list[str]:
     """Return a sentence for each limit at a boundary that is none of the ``walls``."""
     named = ", ".join(walls) or "none: all boundaries are periodic or internal"
     return [
-        f"LIMITS: {limit}: {limit.marker} is no wall, for it is periodic or internal; walls are "
-        f"{named}"
+        f"LIMITS: {limit}: {limit.marker} is periodic or internal, so it has no wall layers; "
+        f"walls are {named}"
         for limit in limits
         if limit.marker and limit.marker not in walls
     ]
@@ -475,8 +475,8 @@ def _read_limit(text: str) -> Limit:
     match = _LIMIT.match(text)
     if match is None:
         raise CaseError(
-            f"{shown(text)} is no limit; expected NAME > NUMBER, as min > 0.3, and a comma between "
-            "two limits"
+            f"{shown(text)}: cannot read this limit; write e.g. min > 0.3, and separate limits by "
+            "commas"
         )
     quoted = match["quoted"]
     marker = match["plain"] or "" if quoted is None else quoted.replace('""', '"')

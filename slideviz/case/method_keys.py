@@ -94,8 +94,8 @@ REDUCTION_ROWS = (
         REDUCTION,
         one_of(terms.DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
         "Interpolate with only some of the boundary nodes; with NO the keys below have no effect. "
-        "AUTO does so if there are more than 2000, to a thousandth of the largest displacement, "
-        "or half of the first layer's height beside sliding boundaries.",
+        "AUTO does so if there are more than 2000. Its tolerance is a thousandth of the largest "
+        "displacement, or half of the height of the first layer at sliding boundaries.",
         put_reduction,
         get_reduction,
         "AUTO",
@@ -442,7 +442,7 @@ METHOD_ROWS = (
     ),
     _setting(
         "DEFORM_STIFFNESS_TYPE",
-        "With METHOD= elastic, which cells are stiff, as in SU2: Young's modulus is one over the "
+        "With METHOD= elastic, which cells are stiff, like SU2: Young's modulus is one over the "
         "mean distance of the cell's nodes to the nearest node of a wall (SU2's default), one over "
         "the cell's volume, or the same everywhere. Walls are moving boundaries, and fixed ones "
         f"whose names have none of {', '.join(terms.NOT_WALLS)}.",

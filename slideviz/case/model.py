@@ -22,7 +22,7 @@ _NUMBERS = (
     "idw_fixed_weight", "deform_coeff",
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
-_ROLES = 'a role for each marker, as {"blade": "moving"}'
+_ROLES = 'a role for each marker, e.g. {"blade": "moving"}'
 
 
 def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
@@ -91,7 +91,7 @@ class Case(CheckedFields):
     mesh_out_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     zone: int | None = None
     roles: Annotated[Mapping[str, terms.Role], _ROLES] = field(default_factory=dict)
-    motions: Annotated[tuple[Motion, ...], "a tuple of motions, as Translate(...)"] = ()
+    motions: Annotated[tuple[Motion, ...], "a tuple of motions, e.g. Translate(...)"] = ()
     interfaces: tuple[str, ...] = ()
     zone_settings: tuple[Case, ...] = ()
     ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()

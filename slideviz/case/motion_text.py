@@ -49,7 +49,7 @@ def _groups(words: list[Word], text: str) -> list[list[Word]]:
             groups[-1].append(word)
         elif depth < 0 or not any(word.is_sign(sign) for sign in "();,"):
             raise CaseError(
-                f"{shown(text)}: each motion needs a pair of brackets, as in "
+                f"{shown(text)}: each motion needs a pair of brackets, e.g. "
                 "(BLADE, translate, 0.1, 0.0) ; (TIP, rotate, 5, centroid)"
             )
         if word.is_sign("("):
@@ -86,7 +86,7 @@ def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
     end = next(place for place, word in enumerate(items) if word.is_sign(")"))
     names = tuple(word.text for word in items[1:end])
     if not all(names) or not names or any(word.is_sign("(") for word in items[1:end]):
-        raise CaseError("its first brackets are no list of markers; write ((A, B), rotate, ...)")
+        raise CaseError("its first brackets are not a list of markers; write ((A, B), rotate, ...)")
     if len(set(names)) < len(names):
         raise CaseError(f"({', '.join(names)}) names a marker twice; name each once")
     return names if len(names) > 1 else names[0], items[end + 1 :]

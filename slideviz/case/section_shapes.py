@@ -111,7 +111,7 @@ SECTION_SHAPES = {
             numbers="nx, ny, nz, x, y, z",
             meaning="normal and a point",
             option="normal and a point: nx,ny,nz,x,y,z (2D: nx,ny,x,y); or an axis and a "
-            "coordinate, as in z=0.5",
+            "coordinate, e.g. z=0.5",
             key="C",
             tip_to_add="Show the cells that a plane, in 2D a line, cuts, and put it where you "
             "want.",
@@ -147,12 +147,12 @@ SECTION_SHAPES = {
                 "radius",
                 unit="the mesh's length unit",
                 remedy="give the distance of the section from its axis",
-                example="a radius, as in 0.25, r=0.25 or 0.25,x",
+                example="a radius, e.g. 0.25, r=0.25 or 0.25,x",
             ),
             flat="unrolled",
             numbers="r, ax, ay, az, x, y, z",
             meaning="radius, axis and a point on it",
-            option="radius, as in 0.25 or r=0.25, " + _AXIS.format(point="a point on it"),
+            option="radius, e.g. 0.25 or r=0.25, " + _AXIS.format(point="a point on it"),
             key="Shift+C",
             tip_to_add="Show the cells that a cylinder about the axis cuts, and unroll it; in 2D a "
             "circle.",
@@ -190,14 +190,14 @@ SECTION_SHAPES = {
                 "half angle",
                 unit="degrees",
                 remedy="give the angle in degrees between its axis and its lines",
-                example="a half angle in degrees, as in 15, a=15 or 15,0,0,1,0,0,-2",
+                example="a half angle in degrees, e.g. 15, a=15 or 15,0,0,1,0,0,-2",
                 high=90.0,
                 usual=20.0,
             ),
             flat="unrolled",
             numbers="a, ax, ay, az, x, y, z",
             meaning="half angle in degrees, axis along which it opens and apex",
-            option="half angle in degrees, as in 15 or a=15, "
+            option="half angle in degrees, e.g. 15 or a=15, "
             + _AXIS.format(point="the apex")
             + "; it opens along the axis",
             one_way=True,
@@ -227,7 +227,7 @@ SECTION_SHAPES = {
                 "span",
                 unit="parts of the way from hub to shroud",
                 remedy="give a number between 0, the hub, and 1, the shroud: 0.5 for 50 %",
-                example="a span, as in 0.5 or s=0.5",
+                example="a span, e.g. 0.5 or s=0.5",
                 high=1.0,
                 usual=0.5,
                 picks=(0.1, 0.5, 0.9),
@@ -235,7 +235,7 @@ SECTION_SHAPES = {
             flat="unrolled",
             numbers="s, ax, ay, az, x, y, z",
             meaning="span between the walls of SPAN, axis and a point on it",
-            option="constant span between hub (0) and shroud (1), as in 0.5, "
+            option="constant span between hub (0) and shroud (1), e.g. 0.5, "
             + _AXIS.format(point="a point on it"),
             one_way=True,
             tip_to_add="Show the cells on a surface of constant span, and lay it flat to m′ and θ.",

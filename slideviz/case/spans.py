@@ -42,7 +42,7 @@ def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str
         shrouds = ", ".join(ends[1]) or "none"
         raise CaseError(
             f"{mesh.name}: the names of boundaries do not say between which the span goes (hub: "
-            f"{hubs}; shroud or casing: {shrouds}); name two, as in {remedy}, of "
+            f"{hubs}; shroud or casing: {shrouds}); name two, e.g. {remedy}, of "
             f"{', '.join(names)}"
         )
     return ends[0][0], ends[1][0]
@@ -65,7 +65,7 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
         if pair.kind != "rotational":
             raise CaseError(
                 f"{mesh.name} repeats by a translation ({pair.describe()}), so it has no axis "
-                "for a span; move its boundaries otherwise, as with rotate or ffd-twist"
+                "for a span; move its boundaries in another way, e.g. by rotate or ffd-twist"
             )
         axis = pair.axis
         origin = pair.origin

@@ -314,7 +314,7 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
         ("HICKS_HENNE", (1, 1.0), r"a\.cfg: variable 1 \(HICKS_HENNE\): the peak is at x = 1; it"),
         ("HICKS_HENNE_CAMBER", "(0.0)", "the peak is at x = 0; it must lie between 0 and 1"),
         ("SURFACE_BUMP", (0.2, 0.5, 0.6), "the peak is at x = 0.6; it must lie between 0.2 and 0"),
-        ("CST", (1, 4, 3), "there is no term 4 of 3; expected whole numbers, 1 to n of n"),
+        ("CST", (1, 4, 3), "CST term 4 of 3 is out of range; write whole numbers"),
         (
             "NACA_4DIGITS",
             (2, 0, 12),
@@ -323,7 +323,7 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
         ("PARABOLIC", (1.0, 12), r"\(PARABOLIC\): the centre is 1; it must not be 0 or 1"),
         ("PARABOLIC", (1e300, 2), "1e.300. is too large to compute with; expected a number up to"),
         ("PARABOLIC", (1e-320, 2), "a.cfg: the variables take nodes farther than can be computed"),
-        ("CST", (1, 2, 101), "there is no term 2 of 101; expected .* and n up to 100"),
+        ("CST", (1, 2, 101), "CST term 2 of 101 is out of range; .* k <= n <= 100"),
         ("TRANSLATE_GRID", (0, 0, 0), r"\(TRANSLATE_GRID\): its direction has no length; give one"),
     ],
 )

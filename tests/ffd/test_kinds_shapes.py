@@ -214,9 +214,9 @@ def test_forms_of_a_plane_mesh_and_of_short_axes_are_read():
     [
         ("(a, ffd-camber, BOX, 1)", "expected the box, the column of control points i, j"),
         ("(a, ffd-thickness)", "in 2D ffd-thickness, BOX, 2, 0.01"),
-        ("(a, ffd-thickness, BOX, 1.5, 0, 0.1)", r"the control point \(1.5, 0\) is none; expected"),
+        ("(a, ffd-thickness, BOX, 1.5, 0, 0.1)", r"invalid control point \(1.5, 0\); write int"),
         ("(a, ffd-twist, BOX, 1, 5, y, 0, 0)", "expected the box, the plane j of control points"),
-        ("(a, ffd-twist, BOX, -2, 5, y, 0, 0, 0)", r"the control point \(-2\) is none"),
+        ("(a, ffd-twist, BOX, -2, 5, y, 0, 0, 0)", r"invalid control point \(-2\)"),
         ("(a, ffd-twist, BOX, 1, 5, 0, 0, 0, 1, 1, 1)", "has no direction"),
     ],
 )

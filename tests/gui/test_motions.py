@@ -185,7 +185,7 @@ def test_a_curve_over_span_is_typed_checked_and_shown_with_its_ghost(driver, tmp
     assert np.linalg.norm(moved, axis=1).max() > 0.01
     driver.type(form.curve, "0:0, 0.5")
     assert form.curve.property("bad")
-    assert "expected span:value" in form.curve.toolTip()
+    assert "write span:value" in form.curve.toolTip()
     assert driver.session.case.motions == (motion,)
     driver.choose(form.about, "point")
     assert driver.session.case.motions[0].point is not None

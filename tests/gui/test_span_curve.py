@@ -181,7 +181,7 @@ def test_a_motion_over_the_span_is_dragged_typed_and_undone(editor, driver, qtbo
         ("0:0, 2:3", "the spans 0, 2 do not ascend from 0 (hub) to 1 (shroud)"),
         ("0:0, 1:x", "'x' is not a number"),
         ("abc", "'abc' is not a number"),
-        ("0:0, 1", "'0:0, 1' is no curve over the span; expected span:value"),
+        ("0:0, 1", "'0:0, 1' is not a curve over the span; write span:value"),
     ],
 )
 def test_an_invalid_curve_keeps_runs_from_starting(editor, driver, typed, rule):

@@ -72,5 +72,5 @@ def test_the_command_draws_it_and_reports_the_means(tmp_path, monkeypatch, capsy
     assert "do not say between which the span goes" in capsys.readouterr().err
     assert run(["section", "cube.su2", "--span", "0.5", "-o", "m.png"]) == 1
     said = capsys.readouterr().err
-    assert "name two, as in --between HUB,SHROUD, of " in said
+    assert "name two, e.g. --between HUB,SHROUD, of " in said
     assert "SPAN=" not in said

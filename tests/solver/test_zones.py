@@ -297,7 +297,7 @@ def test_named_pairs_are_the_interfaces(tmp_path):
     assert any("coincide nowhere" in text for text in told)
     with pytest.raises(CaseError, match=r"MARKER_ZONE_INTERFACE: .* has no marker 'cor'; did you"):
         last(case.change(interfaces=("BLOCK", "cor")), mesh)
-    with pytest.raises(CaseError, match="MARKER_ZONE_INTERFACE: BLOCK are no pairs of boundaries"):
+    with pytest.raises(CaseError, match="MARKER_ZONE_INTERFACE: BLOCK are not pairs of boundaries"):
         last(case.change(interfaces=("BLOCK",)), mesh)
     path.write_text(path.read_text().replace(", 2:core", ""))
     with pytest.raises(

@@ -333,8 +333,8 @@ def term_of(k: float, n: float) -> tuple[int, int]:
     """Return term k of n of an airfoil's shape as integers; raises CaseError if there is none."""
     if k != int(k) or n != int(n) or not 1 <= k <= n <= MOST_TERMS:
         raise CaseError(
-            f"there is no term {k:g} of {n:g}; expected whole numbers, 1 to n of n, and n up to "
-            f"{MOST_TERMS}"
+            f"CST term {k:g} of {n:g} is out of range; write whole numbers with "
+            f"1 <= k <= n <= {MOST_TERMS}"
         )
     return int(k), int(n)
 

@@ -395,7 +395,7 @@ def _integers(words: list[Word]) -> list[int]:
     values = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in values):
         text = ", ".join(word.text for word in words)
-        raise CaseError(f"the control point ({text}) is none; expected whole numbers from -1")
+        raise CaseError(f"invalid control point ({text}); write integers from 0, or -1 for all")
     return [int(value) for value in values]
 
 

@@ -311,7 +311,8 @@ def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> tuple[Target
     else:
         raise CaseError(
             f"{printable(path)}: it has no {'curve' if mesh.dim == 2 else 'surface'}, and "
-            f"{mesh.name} has {mesh.dim} dimensions; give what its boundary is to lie on"
+            f"{mesh.name} has {mesh.dim} dimensions; give an STL or VTU surface, or a mesh with "
+            "that boundary"
         )
     # Files such as STL have the corners of each facet.
     points, place = np.unique(read.points[:, : mesh.dim], axis=0, return_inverse=True)

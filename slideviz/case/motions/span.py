@@ -183,7 +183,7 @@ def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
         return (0.0,), (number(words[0]),)
     if not words or any(word.count(":") != 1 for word in words):
         raise CaseError(
-            f"{shown(text)} is no curve over the span; expected span:value, as in 0:0, 0.5:1.5, "
+            f"{shown(text)} is not a curve over the span; write span:value, e.g. 0:0, 0.5:1.5, "
             "1:4, or a single value"
         )
     spans, values = zip(*(word.split(":") for word in words), strict=True)
