@@ -232,7 +232,9 @@ def test_indices_of_the_grid_must_exist(wrong):
 
 def test_vectors_must_be_as_long_as_the_grid():
     warp, mesh = warped()
-    with pytest.raises(CaseError, match=rf"has 5 numbers; expected {mesh.points.size}, the number that getS"):
+    with pytest.raises(
+        CaseError, match=rf"has 5 numbers; expected {mesh.points.size}, the number that getS"
+    ):
         warp.warpDeriv(np.ones(5))
 
 
