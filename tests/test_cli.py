@@ -698,16 +698,6 @@ def test_a_refusal_comes_alone(square, capsys):
     assert "note: there already, and replaced by this run: " in capsys.readouterr().err
 
 
-def test_a_quiet_run_that_is_finished_says_nothing(square, capsys):
-    words = ["run", str(square / "square.cfg"), "-o", str(square / "out.su2"), "--stream"]
-    assert run([*words, "-q"]) == 0
-    capsys.readouterr()
-    assert run([*words, "--resume", "-q"]) == 0
-    assert "".join(capsys.readouterr()) == ""
-    assert run([*words, "--resume"]) == 0
-    assert "is finished" in capsys.readouterr().err
-
-
 def test_a_list_of_markers_that_takes_what_a_motion_names_is_blamed():
     case = sv.Case(
         roles=dict.fromkeys("ab", "moving"),
@@ -725,7 +715,7 @@ def test_a_limit_that_is_not_met_gives_code_4_and_its_cells(square, tmp_path, ca
     report = tmp_path / "report.json"
     limits = "LIMITS=( min > 0.39, inverted = 0 )"
     call = ["run", str(square / "square.cfg"), "-q", "--set", limits, "-o", str(tmp_path / "o.su2")]
-    for streamed in ([], ["--stream", "--resume"], ["--stream", "--resume"]):
+    for streamed in ([], ["--stream"]):
         assert run([*call, "--json", str(report), *streamed]) == 4
         low, folded = json.loads(report.read_text())["limits"]
         assert low["limit"] == "min > 0.39"

@@ -139,7 +139,7 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
     rank = _number(dict(_LAUNCHERS)[variable])
     if rank:
         _silence()
-    if argv[:1] != ["run"] or not {"--stream", "--resume"} & set(argv):
+    if argv[:1] != ["run"] or "--stream" not in argv:
         if rank:
             return DONE  # no error here: mpirun would end rank 0 before it has printed why
         raise SlidevizError(

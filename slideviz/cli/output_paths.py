@@ -27,7 +27,6 @@ _INPUTS = {
     "designs": "the table of designs",
 }
 """Words for the input files of a command line, by the name of their argument."""
-REPLACED = "there already, and replaced by this run"
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ def _print_replaced(unnamed: list[OutputPath]) -> None:
             more = f" and {len(old) - 1} more" if len(old) > 1 else ""
             old_files.append(f"{old[0]}{more} ({one.option})")
     if old_files:
-        say("note", f"{REPLACED}: {', '.join(old_files)}")
+        say("note", f"there already, and replaced by this run: {', '.join(old_files)}")
 
 
 def _paths(one: OutputPath) -> Iterator[Path]:

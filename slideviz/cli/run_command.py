@@ -25,11 +25,7 @@ from slideviz.cli.run_outcome import (
     CELLS,
     QUALITY_BYTES,
     advice_for,
-    finished,
-    note_finished,
     report_outcome,
-    report_warnings,
-    save_report,
     write_qualities,
 )
 from slideviz.cli.terminal import say
@@ -80,9 +76,6 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     add_shared(
         call, "stream", help="for meshes larger than memory (SU2): only the boundary is in memory"
     )
-    call.add_argument(
-        "--resume", action="store_true", help="continue an interrupted run with --stream"
-    )
     add_shared(call, "quiet", "force")
     call.set_defaults(command=run, holds=True)
 
@@ -90,7 +83,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
     from slideviz.case.zones import with_marker_names
-    from slideviz.cli.output_paths import REPLACED, qualities_path
+    from slideviz.cli.output_paths import qualities_path
     from slideviz.cli.report import metrics_report, run_report
     from slideviz.errors import CaseError
 
@@ -105,15 +98,6 @@ def run(arguments: argparse.Namespace) -> int:
     streamed = is_to_be_streamed(arguments, case, output, kind)
     if streamed and arguments.metrics:
         raise CaseError("--metrics needs the mesh in memory; leave it out for a streamed run")
-    about = _about(case) if streamed else ""
-    results = [path for path in (output, qualities) if path]
-    if arguments.resume and (known := finished(about, results)):
-        arguments.begun(REPLACED)
-        if not arguments.quiet:
-            why = "the run of this case, mesh and version is finished; there is nothing to do"
-            say("note", f"{output}: {why}")
-        save_report(arguments, known[0])
-        return report_warnings(*known, quiet=arguments.quiet)
     done = (_stream if streamed else _deform)(arguments, case, output, kind)
     case = with_marker_names(case, done.mesh)
     found = done.quality
@@ -159,8 +143,6 @@ def run(arguments: argparse.Namespace) -> int:
         }
     in_memory = None if streamed else done.mesh
     advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
-    if streamed:
-        note_finished(about, results, report, folded, advice)
     files = {"mesh": output, CELLS: qualities}
     return report_outcome(arguments, report, files, found, before, folded, advice=advice)
 
@@ -193,12 +175,6 @@ def _fields(
     values = _metrics_of(arguments, mesh, found, base)
     cells, points = metric_data(values, layers, arguments.metrics)
     return data | cells, points
-
-
-def _about(case: Case) -> str:
-    from slideviz.streaming.run import about_run
-
-    return about_run(case)
 
 
 def _deform(
@@ -254,9 +230,7 @@ def _stream(
             output,
             file_format=kind,
             report=bar.phase,
-            note=partial(say, "" if arguments.quiet else "note"),
             warn=partial(say, "warning"),
-            resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,
             later=QUALITY_BYTES if case.generate_quality else 0,
@@ -267,12 +241,12 @@ def _stream(
 def require_streamable(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> None:
-    """Raise where ``--stream`` or ``--resume`` is given for a run that cannot be streamed.
+    """Raise where ``--stream`` is given for a run that cannot be streamed.
 
     Raises CaseError or MeshError if an option or the method needs the mesh in memory, or mesh or
     output are no SU2 meshes.
     """
-    if not (arguments.stream or arguments.resume):
+    if not arguments.stream:
         return
     from slideviz.errors import CaseError
     from slideviz.streaming.run import require_stream
@@ -300,8 +274,6 @@ def is_to_be_streamed(
         return True
     able = _is_su2(output, kind) and not _needing_memory(arguments)
     why = missing_memory(case) if able else ""
-    if arguments.resume:
-        why = why or "--resume needs a run with --stream"
     if why and not arguments.quiet:
         say("note", f"{why}; it is streamed")
     return bool(why)

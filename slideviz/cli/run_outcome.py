@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.errors import Note, SlidevizError
 from slideviz.system.atomic import atomic_write
-from slideviz.system.file_checks import read_json
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -29,58 +23,6 @@ _ROWS = 1 << 18
 
 Folded = Mapping[int, tuple[int, int]]
 """VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
-
-
-def note_finished(about: str, files: list[Path], report: dict, folded: Folded, advice: str) -> None:
-    """Write the note of a finished run beside the first of its files, if it can be written.
-
-    ``about`` is the hash of case, mesh and version (`slideviz.streaming.run.about_run`),
-    ``advice`` what may help against inverted cells or missed limits (`advice_for`).
-    """
-    note: dict[str, Any] = {
-        "about": about,
-        "files": _states(files),
-        "report": report,
-        "harmless": [text for text in report["warnings"] if isinstance(text, Note)],
-        "folded": [[cell, *row] for cell, row in folded.items()],
-        "advice": advice,
-    }
-    note["digest"] = _digest(note)
-    with suppress(OSError, SlidevizError):
-        _note_of(files[0]).unlink(missing_ok=True)  # it might be a link to another file
-        with atomic_write(_note_of(files[0])) as file:
-            file.write(json.dumps(note).encode())
-
-
-def finished(about: str, files: list[Path]) -> tuple[dict, Folded, str] | None:
-    """Return report, inverted cells and advice of a finished run; None without a valid note."""
-    try:
-        note = read_json(_note_of(files[0]))
-        is_whole = note.pop("digest") == _digest(note)
-        if not is_whole or note["about"] != about or note["files"] != _states(files):
-            return None
-        report = note["report"]
-        harmless = note["harmless"]
-        report["warnings"] = [Note(t) if t in harmless else t for t in report["warnings"]]
-        folded = {cell: (vtk, step) for cell, vtk, step in note["folded"]}
-        return report, folded, note["advice"]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None
-
-
-def _digest(note: dict[str, Any]) -> str:
-    """Return a digest of a note: one that was changed since it was written does not count."""
-    return blake2b(json.dumps(note, sort_keys=True).encode(), digest_size=16).hexdigest()
-
-
-def _note_of(output: Path) -> Path:
-    real = Path(os.path.realpath(output))
-    return real.with_name(f".{real.name}.finished")
-
-
-def _states(files: list[Path]) -> list[list[str | int]]:
-    stats = [(path.name, path.stat()) for path in files]
-    return [[name, state.st_size, state.st_mtime_ns] for name, state in stats]
 
 
 def report_outcome(
@@ -100,33 +42,17 @@ def report_outcome(
     ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
     ``advice``: what may help against inverted cells or missed limits, from `advice_for`.
     """
-    if not save_report(arguments, report) and not arguments.quiet:
+    from slideviz.cli.report import print_remarks, save_history, save_json
+    from slideviz.cli.terminal import INVERTED
+
+    if arguments.history:
+        save_history(arguments.history, report)
+    if not save_json(arguments.json, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files, getattr(arguments, "metrics", ()))
-    return report_warnings(report, folded, advice, quiet=arguments.quiet)
-
-
-def save_report(arguments: argparse.Namespace, report: dict) -> bool:
-    """Write the report and the convergence on request; return whether the report was printed."""
-    from slideviz.cli.report import save_history, save_json
-
-    if arguments.history:
-        save_history(arguments.history, report)
-    return save_json(arguments.json, report)
-
-
-def report_warnings(report: dict, folded: Folded, advice: str, *, quiet: bool) -> int:
-    """Print the warnings of a run and its inverted cells to stderr; return the exit code.
-
-    ``report``, ``folded``, ``advice``: as `report_outcome` gets them. ``quiet``: leave out notes;
-    warnings stay.
-    """
-    from slideviz.cli.report import print_remarks
-    from slideviz.cli.terminal import INVERTED
-
-    print_remarks(report["warnings"], quiet=quiet)
+    print_remarks(report["warnings"], quiet=arguments.quiet)
     if report["quality"]["inverted"]:
         report_limits(report["limits"])
         print(f"slideviz: {_inverted_sentence(report, folded, advice)}", file=sys.stderr)

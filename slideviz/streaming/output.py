@@ -1,7 +1,6 @@
 """The deformed mesh of a streamed run: its points are written, the quality of its cells measured.
 
-All ranks write parts of one file with ``pwrite``. Each part is on the disk before it is noted as
-done, so that a stopped run can go on from there. MPI-IO would not do: its ``MPI_File_sync``, after
+All ranks write parts of one file with ``pwrite``. MPI-IO would not do: its ``MPI_File_sync``, after
 which others see what was written, is a call of all ranks together, while a part is done by one.
 Nor is its gathering of small writes needed: parts are long.
 """
@@ -9,7 +8,6 @@ Nor is its gathering of small writes needed: parts are long.
 from __future__ import annotations
 
 import os
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -18,8 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from slideviz.errors import MeshError
-from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
+from slideviz.formats.binary_copy import HEAD
 from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.quality import Quality
 from slideviz.rbf.problem import PhaseTimer
@@ -34,8 +31,8 @@ from slideviz.streaming.quality import (
 )
 from slideviz.streaming.source import FileSource, PointTable, ZoneSource
 from slideviz.streaming.stream_input import StreamInput, patched_text
+from slideviz.streaming.target_file import TargetFile, copying
 from slideviz.system.atomic import atomic_write
-from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool
 from slideviz.system.threads import Tick
 from slideviz.terms import SkewMetric
@@ -43,8 +40,7 @@ from slideviz.terms import SkewMetric
 CHUNK = 1 << 20  # most nodes or cells of a part: one part is in memory at a time
 FEWEST = 1 << 16  # fewest nodes or cells of a part, but for the last
 PARTS = 1024
-"""Parts of a file, within the two limits above: enough for many ranks. It does not depend on the
-number of ranks, for a stopped run may go on with another number of them."""
+"""Parts of a file, within the two limits above: enough for many ranks."""
 Part = tuple[int, int]  # a range of nodes or cells: the first, and the one after the last
 T = TypeVar("T")
 
@@ -61,12 +57,11 @@ class Output:
         mesh_input: StreamInput,
         metric: SkewMetric,
         output: Path,
+        target: TargetFile,
         timer: PhaseTimer,
         ranks: SerialPool,
-        about: str,
         *,
         is_text: bool,
-        resume: bool,
         replaces: Path | None,
     ) -> None:
         self._stack = stack
@@ -80,95 +75,38 @@ class Output:
         self.zones = tuple(replace(one, first_cell=0, first_point=0) for one in every)
         """The zones of the undeformed mesh, each with numbers of its own."""
         self._cells = [slice(one.first_cell, one.first_cell + one.n_cells) for one in every]
-        sizes = [zone.n_points for zone in self.zones]
-        self._parts = [(k, part) for k, size in enumerate(sizes) for part in parts(size)]
-        about = f"{about} {is_text} {[parts(size)[:1] for size in sizes]}"
+        self._target = target
         if is_text:
-            require_no_input(output, MeshError, replaces)
-            partial = partial_file(output, mesh_input.path.stat().st_size, about, resume=resume)
+            os.ftruncate(target.file.fileno(), mesh_input.path.stat().st_size)
+            self._ready: Callable[[Tick], None] = lambda _: None
         else:
-            tables = [zone.points for zone in self.zones]
-            partial = partial_copy(
-                output,
-                mesh_input.path,
-                about,
-                [(one.byte(0), one.byte(one.place.n_points)) for one in tables],
-                resume=resume,
-                replaces=replaces,
-                ranks=ranks,
-            )
-        self._partial = stack.enter_context(partial)
+            self._ready = stack.enter_context(copying(mesh_input.path, target.path, ranks))
         self._is_ready = False
         self._is_oriented: set[int] = set()
         self._metric = metric
         self._collectors: list[QualityCollector] = []
 
-    def _opened(self) -> Partial:
+    def _opened(self) -> TargetFile:
         """Return the file for the deformed points when it can be written; of a text only points."""
         if not self._is_ready:
             with self._timer.phase("write") as tick:
-                self._partial.ready(tick)
-                self._check(self._partial, tick)
+                self._ready(tick)
             self._is_ready = True
-        return self._partial
+        return self._target
 
-    def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
-        """Take those parts as not done whose bytes do not have their checksum."""
-        if len(partial.sums) != len(self._parts):
-            partial.sums = [None] * len(self._parts)
-        sums = partial.sums
-        for k, zone in enumerate(self.zones):
-            done = [at for at in self._parts_of(k) if sums[at] is not None]
-            todo = [self._parts[at][1] for at in done]
-            with self._ranks.sharing(checksum_reader, *zone.undeformed, partial.path) as do:
-                for at, found in zip(done, do(todo), strict=True):
-                    if found != sums[at]:
-                        partial.note([*sums[:at], None, *sums[at + 1 :]])
-                        sums = partial.sums
-                    tick((at + 1) / len(sums))
-
-    def _parts_of(self, zone: int) -> list[int]:
-        """Return the places in the list of all parts of those of a zone, by its place."""
-        return [at for at, (k, _) in enumerate(self._parts) if k == zone]
-
-    def resume_message(self) -> str:
-        """Return a sentence on how much of a stopped run can be used."""
-        done = self._opened().done
-        total = len(self._parts)
-        if done:
-            return f"{self._path.name}: continues after {done} of {total} parts"
-        if self._input.is_reused:
-            return (
-                f"{self._path.name}: continues with the text that was read; no part is written yet"
-            )
-        return (
-            f"{self._path.name}: there is nothing to resume of this case, mesh and version; the "
-            f"run starts from the beginning"
-        )
-
-    def displace(self, zone: int, displacer: InteriorDisplacer | None, *, final: bool) -> None:
-        """Write all points of a zone after the last step, but for parts that a stopped run wrote.
-
-        Points that are not ``final`` are those of a trial number of steps: all are written, and a
-        stopped run does not go on with them. Without ``displacer`` they are the undeformed ones.
-        """
-        partial = self._opened()
-        mine = self._parts_of(zone)
-        if not final and any(partial.sums[at] is not None for at in mine):
-            partial.note([None if at in mine else one for at, one in enumerate(partial.sums)])
+    def displace(self, zone: int, displacer: InteriorDisplacer | None) -> None:
+        """Write all points of a zone after the last step; without ``displacer`` the undeformed."""
+        target = self._opened()
+        source = self.zones[zone]
         # Ranks must see what others write, and none write a page back with old bytes of others.
-        synced = final or self._ranks.size > 1
-        arguments = *self.zones[zone].undeformed, partial.path, displacer, synced
+        arguments = *source.undeformed, target.path, displacer, self._ranks.size > 1
+        todo = parts(source.n_points)
         with (
             self._timer.phase("evaluate") as tick,
             self._ranks.sharing(point_writer, *arguments) as do,
         ):
-            todo = [at for at in mine if partial.sums[at] is None]
-            written = do([self._parts[at][1] for at in todo])
-            for at, checksum in zip(todo, written, strict=True):
-                if final:
-                    partial.note([*partial.sums[:at], checksum, *partial.sums[at + 1 :]])
-                tick(self._parts[at][1][1] / self.zones[zone].n_points)
+            for (_, end), _ in zip(todo, do(todo), strict=True):
+                tick(end / source.n_points)
 
     def measure(
         self, zone: int, listed: int, displacer: InteriorDisplacer | None = None
@@ -178,7 +116,7 @@ class Output:
         With ``displacer`` it says how far each of its steps may go.
         Raises MeshError if cells are numbered in both directions, and some are folded.
         """
-        partial = self._opened()
+        target = self._opened()
         source = self.zones[zone]
         count = self._cells[-1].stop
         if not self._collectors:
@@ -186,7 +124,7 @@ class Output:
             self._collectors = [QualityCollector(*arguments) for _ in range(2)]
         collector = RunCollector(*(one.of_cells(self._cells[zone]) for one in self._collectors))
         todo = parts(source.n_cells)
-        workers = *source.undeformed, partial.path, self._metric, listed, displacer
+        workers = *source.undeformed, target.path, self._metric, listed, displacer
         with (
             self._timer.phase("quality") as tick,
             self._ranks.sharing(cell_measurer, *workers) as do,
@@ -212,19 +150,21 @@ class Output:
 
         Its arguments are the zone, the descriptor of that file, and a tick.
         """
-        partial = self._opened()
+        target = self._opened()
         with self._timer.phase(phase) as tick, ExitStack() as stack:
-            source = FileSource.open(stack, self.zones[zone].undeformed, moved=partial.path)
-            return work(source.zones[0], partial.file.fileno(), tick)
+            source = FileSource.open(stack, self.zones[zone].undeformed, moved=target.path)
+            return work(source.zones[0], target.file.fileno(), tick)
 
     def finish(self, boxes: Sequence[bytes | None]) -> None:
-        """Write the output where it is a text, with ``boxes`` of each zone, None: as they were."""
+        """Complete the output; a text gets ``boxes`` of each zone, None: as they were."""
+        target = self._opened()
         if not self._is_text:
+            with self._input.path.open("rb") as file:
+                target.place(file.read(HEAD))
             return
-        partial = self._opened()
         written = 0
         moved = [
-            replace(z, points=PointTable(z.file.of(partial.file), z.place), base=z.points)
+            replace(z, points=PointTable(z.file.of(target.file), z.place), base=z.points)
             for z in self.zones
         ]
         if self._input.texts:
@@ -239,7 +179,6 @@ class Output:
                     written += len(block)
                     tick(min(1.0, written / size))
             tick(1.0)
-        partial.remove()
 
 
 def parts(count: int) -> list[Part]:
@@ -250,16 +189,16 @@ def parts(count: int) -> list[Part]:
 
 @contextmanager
 def point_writer(
-    path: Path, zone: int, partial: Path, displacer: InteriorDisplacer | None, synced: bool
-) -> Iterator[Callable[[Part], int]]:
+    path: Path, zone: int, target: Path, displacer: InteriorDisplacer | None, synced: bool
+) -> Iterator[Callable[[Part], None]]:
     """Context with a function that writes the deformed points of a part, as `write_points` does.
 
-    Undeformed points are read from a zone of ``path``, deformed ones written to ``partial``; with
+    Undeformed points are read from a zone of ``path``, deformed ones written to ``target``; with
     ``synced`` they are on the disk when the function returns.
     """
     with ExitStack() as stack:
         (source,) = FileSource.open(stack, (path, zone)).zones
-        out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
+        out = os.open(target, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
             yield lambda part: write_points(source.points, displacer, out, part)
         finally:
@@ -268,38 +207,28 @@ def point_writer(
 
 def write_points(
     table: PointTable, displacer: InteriorDisplacer | None, out: int, part: Part
-) -> int:
-    """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
+) -> None:
+    """Write the deformed points of a part to a file descriptor."""
     rows = table.rows(part[0], part[1] - part[0])
     points = rows["x"].astype(np.float64)
     for now in displacer.after_steps(np.arange(*part), points) if displacer else ():
         points = now
     rows["x"] = points
     write_at(out, table.byte(part[0]), rows)
-    return zlib.crc32(rows.view(np.uint8).data)
-
-
-@contextmanager
-def checksum_reader(path: Path, zone: int, partial: Path) -> Iterator[Callable[[Part], int]]:
-    """Context with a function that returns the CRC-32 of a part as it is in the file."""
-    with ExitStack() as stack:
-        (source,) = FileSource.open(stack, (path, zone), moved=partial).zones
-        rows = source.points.rows
-        yield lambda part: zlib.crc32(rows(part[0], part[1] - part[0]).view(np.uint8).data)
 
 
 @contextmanager
 def cell_measurer(
     path: Path,
     zone: int,
-    partial: Path,
+    target: Path,
     metric: SkewMetric,
     listed: int,
     displacer: InteriorDisplacer | None,
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Context with a function that measures the cells of a part, as `MeasuredBlock.of` does."""
     with ExitStack() as stack:
-        (source,) = FileSource.open(stack, (path, zone), moved=partial).zones
+        (source,) = FileSource.open(stack, (path, zone), moved=target).zones
         yield lambda part: MeasuredBlock.of(
             source.between(part[0], part[1] - part[0]), metric, listed, displacer
         )

@@ -12,7 +12,6 @@ from slideviz.errors import MeshError
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.text import find_texts
 from slideviz.formats.su2b.layout import ZonePlace
-from slideviz.formats.su2b.partial import names_of
 from slideviz.formats.table import format_of
 from slideviz.solver.deform import free_memory
 from slideviz.system.atomic import reason_of
@@ -91,9 +90,3 @@ def bytes_of_run(
     points = sum(is_text * one.n_points * (8 * one.dim + width) for one in places)
     cells = sum(one.cells.count for one in places)
     return size + CELL_BYTES * cells + max(copy + points, later * cells)
-
-
-def reusable_bytes(output: Path) -> int:
-    """Return how many bytes on the disk a stopped run has left, which this run will replace."""
-    files = (names_of(output, more)[0] for more in ("", ".binary"))
-    return sum(file.stat().st_blocks * 512 for file in files if file.exists())

@@ -8,7 +8,6 @@ is measured block by block.
 
 from __future__ import annotations
 
-import hashlib
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -18,12 +17,10 @@ from time import monotonic
 
 import numpy as np
 
-from slideviz import __version__
 from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
 from slideviz.case.zones import with_marker_names
 from slideviz.errors import CaseError, NodeError
-from slideviz.formats.su2b.partial import keep_earlier
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import zones_of
@@ -41,6 +38,7 @@ from slideviz.streaming.quality import RunCollector, folded_steps
 from slideviz.streaming.repair import mend_file
 from slideviz.streaming.skin import without_cells
 from slideviz.streaming.stream_input import open_for_run, require_su2
+from slideviz.streaming.target_file import target_file
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
 from slideviz.terms import FileFormat
@@ -128,9 +126,7 @@ def stream(
     *,
     file_format: FileFormat | None = None,
     report: ReportProgress = lambda _: None,
-    note: Callable[[str], object] = lambda _: None,
     warn: Callable[[str], object] = lambda _: None,
-    resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
     worst: int = 0,
@@ -145,9 +141,7 @@ def stream(
     ``output``: the file of the deformed mesh, written whole or not at all.
     ``file_format``: the format of ``output``; None: by its ending.
     ``report``: called often with a ``Progress``; an exception it raises ends the run at once.
-    ``note``: called with a sentence on what ``resume`` found.
     ``warn``: called with a sentence on what of the mesh the output will lack; with "" if nothing.
-    ``resume``: whether to go on where a run was stopped.
     ``replaces``: an input file that the output may overwrite.
     ``listed``: most inverted cells whose first inverted step is found.
     ``worst``: as for `slideviz.mesh.quality.quality_totals`.
@@ -158,7 +152,6 @@ def stream(
     assert case.mesh_file is not None
     path = case.mesh_file
     require_stream(case)
-    keep_earlier(output)
     total = max(1, case.steps)
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
@@ -168,6 +161,7 @@ def stream(
     remaining = RemainingTime(report, *phases)
     timer = PhaseTimer(lambda phase, part: remaining(Progress(total, total, phase, part)))
     with ExitStack() as stack:
+        target = stack.enter_context(target_file(output, replaces))
         with timer.phase("read") as tick:
             mesh_input = stack.enter_context(
                 open_for_run(
@@ -176,8 +170,6 @@ def stream(
                     case.zone,
                     file_format=case.mesh_format,
                     is_text=is_text,
-                    version=__version__,
-                    resume=resume,
                     warn=warn,
                     tick=tick,
                     ranks=ranks,
@@ -189,15 +181,12 @@ def stream(
             mesh_input,
             case.quality_metric,
             output,
+            target,
             timer,
             ranks,
-            about_run(case),
             is_text=is_text,
-            resume=resume,
             replaces=replaces,
         )
-        if resume:
-            note(out.resume_message())
 
         def read() -> Mesh:
             with timer.phase("read") as tick:
@@ -241,7 +230,7 @@ class _ZoneRuns:
         for zone, after in enumerate(zones_of(motion.after(last))):
             if zone not in last:
                 self._remaining.next()
-                self._out.displace(zone, None, final=True)
+                self._out.displace(zone, None)
                 self._remaining.next()
             else:
                 self._close_gaps(zone, last[zone].mesh, after)
@@ -286,7 +275,7 @@ class _ZoneRuns:
             give_back()
 
             def rate(steps: Sequence[Step]) -> Quality:
-                self._out.displace(zone, InteriorDisplacer(skin, lean, steps), final=False)
+                self._out.displace(zone, InteriorDisplacer(skin, lean, steps))
                 return self._out.measure(zone, 0).after.quality()
 
             steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
@@ -294,7 +283,7 @@ class _ZoneRuns:
         give_back()
         self._remaining.next()
         displacer = self._displacers[zone] = InteriorDisplacer(skin, lean, steps)
-        self._out.displace(zone, displacer, final=True)
+        self._out.displace(zone, displacer)
         if whole is not None and full is not None:
             self._remaining.more("quality")
             self._mend(zone, case, whole, full)
@@ -400,21 +389,6 @@ def require_stream(case: Case) -> None:
         )
     require_streamed(case.limits)
     require_su2(path, case.mesh_format)
-
-
-def about_run(case: Case) -> str:
-    """Return a hash of all that the deformed points depend on: case, input files and version.
-
-    The mesh file counts by its size and its time of change, other files by their bytes.
-    """
-    path = case.mesh_file
-    assert path is not None
-    text = repr((__version__, replace(case, mesh_out=None, view={}, warnings=())))
-    for file in sorted(case.inputs()):
-        if file not in (path, case.source):
-            text += hashlib.sha256(file.read_bytes()).hexdigest()
-    state = path.stat()
-    return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
 def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -> list[Step]:

@@ -12,20 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.binary_copy import binary_layouts, write_layouts
+from slideviz.formats.binary_copy import BinaryLayout, binary_layouts, write_layouts
 from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.text import Text, find_texts
 from slideviz.formats.su2.write import PointChange, patched_blocks, require_text_names
 from slideviz.formats.su2b.layout import ZonePlace, open_zones
-from slideviz.formats.su2b.partial import BINARY, checksums, finish_head, partial_file
 from slideviz.formats.su2b.write import require_binary_names
 from slideviz.formats.table import format_of
 from slideviz.mesh.model import Mesh
 from slideviz.streaming.resources import (
     bytes_of_run,
     require_disk_space,
-    reusable_bytes,
     text_size,
 )
 from slideviz.streaming.skin import naming_text, read_skin
@@ -37,10 +35,8 @@ from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat
 
 SCANNED = 0.15
-FILLED = 0.75
 COPIED = 0.8
-"""Parts of the time for reading a text after which its lines are found, its copy is made, and the
-checksums of the copy are computed."""
+"""Parts of the time for reading a text after which its lines are found, and its copy is made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +46,6 @@ class StreamInput:
     path: Path  # the binary file: the user's, or a copy of a text
     zone: int | None  # the zone in it, from 1; all where it is None
     texts: tuple[Text, ...] = ()  # the zones of the text that ``path`` is a copy of
-    is_reused: bool = False  # whether the copy was made by an earlier run that was stopped
 
     def text_size(self, places: Sequence[ZonePlace]) -> int:
         """Return about how many bytes the zones at ``places`` have as a text."""
@@ -108,10 +103,7 @@ def open_read_only(
         try:
             open_temporary(copy, new=True).close()
             require_disk_space(copy, path, layouts[-1].place.end)
-            os.truncate(copy, layouts[-1].place.end)
-            head = write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED))
-            with open_temporary(copy) as file:
-                file.write(head)
+            _write_copy(layouts, copy, tick)
         except OSError as problem:
             raise MeshError(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
@@ -119,6 +111,14 @@ def open_read_only(
             ) from problem
         with naming_text(texts[0], copy):
             yield StreamInput(copy, None, texts)
+
+
+def _write_copy(
+    layouts: Sequence[BinaryLayout], copy: Path, tick: Tick, ranks: SerialPool = SERIAL
+) -> None:
+    with open_temporary(copy, new=True) as file:
+        file.truncate(layouts[-1].place.end)
+        file.write(write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED), ranks))
 
 
 @contextmanager
@@ -129,8 +129,6 @@ def open_for_run(
     *,
     file_format: FileFormat | None,
     is_text: bool,
-    version: str,
-    resume: bool,
     warn: Callable[[str], object],
     tick: Tick,
     ranks: SerialPool,
@@ -138,11 +136,9 @@ def open_for_run(
 ) -> Iterator[StreamInput]:
     """Context with a mesh to be deformed; the binary copy of a text is beside the output.
 
-    The copy is removed at the end, but kept where the run is stopped, to go on with. Raises
-    MeshError if it is of no format that can be streamed, or has a mistake; the disk has no room.
+    The copy is removed at the end. Raises MeshError if it is of no format that can be streamed, or
+    has a mistake; the disk has no room.
     ``is_text``: whether the output is a text.
-    ``version``: the program's version: a copy made by another version is not used again.
-    ``resume``: whether to use the copy that a stopped run has left.
     ``warn``: called with a sentence on what of the mesh the output will lack; with "" if nothing.
     ``later``: bytes for each cell that the caller writes beside the output afterwards.
     """
@@ -156,7 +152,7 @@ def open_for_run(
             lost = [OTHER_ZONES] if source.zones > len(places) else []
             warn(sentence_of_lost(output, name, lost, ".su2b"))
         size = bytes_of_run(places, source.width, size, 0, is_text=is_text, later=later)
-        require_disk_space(output, output, size - reusable_bytes(output))
+        require_disk_space(output, output, size)
         yield StreamInput(path, zone)
         return
     texts = _streamable(path, zone, tick)
@@ -166,27 +162,16 @@ def open_for_run(
             require_binary_names(name, (m.name for m in text.zone.markers))
         warn(sentence_of_lost(output, name, lost_of_texts(texts)))
     layouts = binary_layouts(texts, is_result=not is_text)
-    left = reusable_bytes(output)
-    state = path.stat()
     size = layouts[-1].place.end
+    places = tuple(one.place for one in layouts)
+    result = path.stat().st_size if is_text else size
     width = layouts[0].conn.itemsize
-    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {size}"
-    with partial_file(output, size, about, resume=resume, more=BINARY) as copy:
-        is_reused = (
-            copy.done > 0
-            and checksums(copy.path, progress_share(tick, SCANNED, COPIED), ranks) == copy.sums
-        )
-        places = tuple(one.place for one in layouts)
-        result = state.st_size if is_text else size
-        needed = bytes_of_run(places, width, result, size, is_text=is_text, later=later)
-        require_disk_space(output, output, needed - left)
-        if not is_reused:
-            head = write_layouts(layouts, copy.path, progress_share(tick, SCANNED, FILLED), ranks)
-            finish_head(copy.file, head)
-            copy.note(checksums(copy.path, progress_share(tick, FILLED, COPIED), ranks))
-        with naming_text(texts[0], copy.path):
-            yield StreamInput(copy.path, None, texts, is_reused)
-        copy.remove()
+    needed = bytes_of_run(places, width, result, size, is_text=is_text, later=later)
+    require_disk_space(output, output, needed)
+    with draft(Path(os.path.realpath(output)).parent) as copy:
+        _write_copy(layouts, copy, tick, ranks)
+        with naming_text(texts[0], copy):
+            yield StreamInput(copy, None, texts)
 
 
 def patched_text(

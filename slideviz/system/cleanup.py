@@ -46,7 +46,7 @@ class Process(Protocol):
 
 
 NOTHING_LEFT = "it leaves nothing half-written"
-"""The answer of `leftover_message` where no partial file is kept."""
+"""The answer of `leftover_message` where no file is kept."""
 _drafts: set[Path] = set()  # files and folders to remove when the program ends early
 _processes: set[Process] = set()  # processes to kill when the program ends early
 starting = Lock()
@@ -54,7 +54,7 @@ starting = Lock()
 """
 _PATIENCE = 2.0  # longest time that an early end waits for it, in seconds
 _partial: dict[Path, str] = {}
-"""Partial files that stay then, and the sentence on each for the user."""
+"""Files that stay then, not yet complete, and the sentence on each for the user."""
 
 
 @contextmanager
@@ -67,14 +67,13 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
     """
     _sweep(folder)
     path = folder / f"{_owned(os.getpid())}{os.urandom(8).hex()}{_SUFFIX}"
-    _drafts.add(path)
-    try:
-        if is_folder:
-            path.mkdir(mode=0o700)
-        yield path
-    finally:
-        _remove(path)
-        _drafts.discard(path)
+    with removed_at_stop(path):
+        try:
+            if is_folder:
+                path.mkdir(mode=0o700)
+            yield path
+        finally:
+            _remove(path)
 
 
 def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> BinaryIO:
@@ -120,19 +119,16 @@ def clean_up() -> None:
 
 @contextmanager
 def removed_at_stop(path: Path) -> Iterator[None]:
-    """Context in which a file is removed if the program ends, unless `keep_partial` is called."""
+    """Context in which a file is removed if the program ends."""
     _drafts.add(path)
-    _partial.pop(path, None)
     try:
         yield
     finally:
         _drafts.discard(path)
-        _partial.pop(path, None)
 
 
 def keep_partial(path: Path, words: str) -> None:
-    """Let a partial file stay if the program ends; ``words`` tell the user so."""
-    _drafts.discard(path)
+    """Say ``words`` on a file that is not yet complete, if the program ends early."""
     _partial[path] = words
 
 

@@ -19,12 +19,10 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import MeshError, NodeError
 from slideviz.formats.su2b.layout import MAGIC
-from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from slideviz.streaming import output, skin
 from slideviz.streaming.run import stream
 from slideviz.system import ranks, threads
-from tests.builders import grid
 from tests.streaming.test_run import made
 
 MPI = shutil.which("mpirun") and importlib.util.find_spec("mpi4py")
@@ -118,7 +116,7 @@ def alone(tmp_path_factory):
 def test_bits_are_those_of_one_process(square, alone, count):
     assert done(started(square, count, *WORDS)) == (0, "", "")
     assert results(square) == alone
-    assert [path.name for path in square.glob(".*")] == [".out.su2b.finished"]
+    assert not list(square.glob(".*"))
 
 
 @pytest.mark.slow
@@ -131,7 +129,7 @@ def test_a_text_is_that_of_a_run_in_memory(tmp_path):
     words = ("--stream", "-o", "out.su2")
     assert done(started(tmp_path, 2, *words)) == (0, "", "")
     assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "memory.su2").read_bytes()
-    assert [path.name for path in tmp_path.glob(".*")] == [".out.su2.finished"]
+    assert not list(tmp_path.glob(".*"))
 
 
 class Sent(ranks.SerialPool):
@@ -221,33 +219,16 @@ def test_errors_of_other_ranks_can_be_raised():
     assert str(sent(node)) == "nodes 3 and 4"
 
 
-def parts_done(note):
-    return sum(one is not None for one in json.loads(note.read_text())["sums"])
-
-
 @pytest.mark.slow
 @needs_mpi
-def test_a_killed_rank_ends_all_and_others_go_on_with_what_is_done(square, alone):
-    """From one process to two ranks, and back: parts are the same."""
-    ours, note = names_of(square / "out.su2b")
-    # Parts before it are finished by other threads meanwhile.
-    kill = "if rank == {} and given[-1][0] > {}: time.sleep(.5), os.kill(os.getpid(), 9)"
-    code, out, err = done(started(square, 0, *WORDS, hook=kill.format(0, 100)))
-    assert (code, out, err) == (-9, "", "")
-    first = parts_done(note)
-    assert 0 < first <= 3
-    hook = kill.format(1, 300)
-    code, out, err = done(started(square, 2, *WORDS, "--resume", hook=hook, pause=0.02))
+def test_a_killed_rank_ends_all_and_leaves_nothing(square):
+    kill = "if rank == 1 and given[-1][0] > 300: time.sleep(.5), os.kill(os.getpid(), 9)"
+    code, out, err = done(started(square, 2, *WORDS, hook=kill, pause=0.02))
     assert (code != 0, out) == (True, "")
-    assert err.count("slideviz: ended by SIGTERM; the partial result is in ") == 1
-    assert err.count("/.out.su2b.partial; continue with --resume") == 1
+    assert err.count("slideviz: ended by SIGTERM; it leaves nothing half-written\n") == 1
     assert err.count("slideviz:") == 1
     assert not (square / "out.su2b").exists()
-    assert ours.read_bytes()[:4] not in MAGIC
-    assert parts_done(note) > first
-    code, out, err = done(started(square, 0, *WORDS, "--resume"))
-    assert code == 0
-    assert results(square) == alone
+    assert not list(square.glob(".*"))
 
 
 @needs_mpi
@@ -370,43 +351,6 @@ def test_threads_are_limited_for_a_time():
     assert threads.cores() == before
 
 
-def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
-    class StoppedError(BaseException):
-        pass
-
-    monkeypatch.setattr(output, "CHUNK", 10)
-    sv.write(tmp_path / "mesh.su2b", grid((9, 9)))
-    case = sv.Case(
-        mesh_file=tmp_path / "mesh.su2b",
-        roles={"x_p": "moving"},
-        motions=(sv.Translate("x_p", (0.1, 0.0)),),
-    )
-    out, move, made = tmp_path / "out.su2b", output.write_points, []
-    stream(case, out)
-    whole = out.read_bytes()
-
-    def stopping(*given):
-        if given[-1][0] >= 60:
-            raise StoppedError
-        return move(*given)
-
-    monkeypatch.setattr(output, "write_points", stopping)
-    with pytest.raises(StoppedError):
-        stream(case, out)
-    ours, _ = names_of(out)
-    data = np.frombuffer(ours.read_bytes(), np.uint8).copy()
-    place = whole.find(sv.read(out).points[35].tobytes())
-    assert place > 0
-    data[place + 3] ^= 1
-    ours.write_bytes(data.tobytes())
-    monkeypatch.setattr(output, "write_points", lambda *a: (made.append(a[-1]), move(*a))[1])
-    told = []
-    stream(case, out, resume=True, note=told.append)
-    assert "continues after 5 of 10 parts" in told[0]
-    assert sorted(made)[:2] == [(30, 40), (60, 70)]
-    assert out.read_bytes() == whole
-
-
 @needs_mpi
 @pytest.mark.slow
 def test_killing_ranks_at_random_moments_leaves_no_half_mesh(square, alone):
@@ -418,7 +362,7 @@ def test_killing_ranks_at_random_moments_leaves_no_half_mesh(square, alone):
     (square / "out.su2b").write_bytes(b"older")
     for turn in range(20):
         count = int(random.integers(2, 5))
-        process = started(square, count, *WORDS, "--resume", pause=0.05)
+        process = started(square, count, *WORDS, pause=0.05)
         time.sleep(random.uniform(0.2, 1.0) * usual)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         if turn % 3 == 0:
@@ -431,5 +375,5 @@ def test_killing_ranks_at_random_moments_leaves_no_half_mesh(square, alone):
         assert (square / "out.su2b").read_bytes() in (b"older", reference)
         for file in square.glob(".*.partial"):
             assert file.read_bytes()[:4] not in MAGIC
-    assert done(started(square, 2, *WORDS, "--resume"))[0] == 0
+    assert done(started(square, 2, *WORDS))[0] == 0
     assert results(square) == alone

@@ -1,4 +1,4 @@
-"""Streamed runs of SU2 text meshes: the bytes of a run in memory; stopped, and resumed."""
+"""Streamed runs of SU2 text meshes: the bytes of a run in memory; what a stop leaves."""
 
 import json
 import os
@@ -21,13 +21,12 @@ from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text
 from slideviz.formats.su2 import write
 from slideviz.formats.su2b.layout import MAGIC
-from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from slideviz.streaming import converting, output, resources
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import stream
 from tests.builders import grid
-from tests.streaming.test_run import RUNS, KilledError, flip, killed_after, killed_at
+from tests.streaming.test_run import ROOT, RUNS, StoppedError, hidden, stopped_after
 
 
 def made(folder, name, size, sets=()):
@@ -236,78 +235,30 @@ def test_the_command_writes_the_same_files_and_report(tmp_path, monkeypatch, cap
     assert Path("out.txt").read_bytes() == texts[0][1]
     assert run([*call, "-o", "mesh.su2", "--stream", "--force", "-q"]) == 0
     assert Path("mesh.su2").read_bytes() == texts[0][1]
-    assert {path.suffix for path in tmp_path.glob(".*")} == {".finished"}
+    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("ending", ["su2", "su2b"])
-def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, small, ending):
+def test_a_run_that_is_stopped_leaves_nothing(tmp_path, monkeypatch, small, ending):
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / f"out.{ending}"
-    stream(case, out)
-    whole, move, put = out.read_bytes(), output.write_points, binary_copy._write_points
-    parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
+    parts = -(-len(sv.read(case.mesh_file).points) // 60)
+
+    def stopped(*_, **__):
+        raise StoppedError
+
     for stop in (-1, 0, 3, parts - 1, *([parts] if ending == "su2" else [])):
-
-        def killed(*_, **__):
-            raise KilledError
-
         with monkeypatch.context() as patch:
-            patch.setattr(output, "write_points", killed_after(move, stop))
+            patch.setattr(output, "write_points", stopped_after(output.write_points, stop))
             if stop == -1:
-                patch.setattr(binary_copy, "_write_points", killed)
+                patch.setattr(binary_copy, "_write_points", stopped)
             if stop == parts:
-                patch.setattr(output, "atomic_write", killed)
-            with pytest.raises(KilledError):
+                patch.setattr(output, "atomic_write", stopped)
+            with pytest.raises(StoppedError):
                 stream(case, out)
         assert out.read_bytes() == b"older"
-        assert names_of(out, ".binary")[0].exists()
-        assert names_of(out, ".binary")[1].exists() == (stop != -1)
-        made_again, moved = [], []
-        with monkeypatch.context() as patch:
-            patch.setattr(
-                binary_copy, "_write_points", lambda *a, s=made_again: s.append(1) or put(*a)
-            )
-            patch.setattr(output, "write_points", lambda *a, seen=moved: seen.append(1) or move(*a))
-            told: list[str] = []
-            stream(case, out, note=told.append, resume=True)
-        assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
-        assert ("continues with the text that was read" in told[0]) == (stop == 0)
-        assert bool(made_again) == (stop == -1)
-        assert len(moved) == parts - max(stop, 0)
-        assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
-        out.write_bytes(b"older")
-
-
-@pytest.mark.parametrize("ending", ["su2", "su2b"])
-def test_a_binary_copy_that_another_has_changed_is_made_anew(tmp_path, monkeypatch, small, ending):
-    case = made(tmp_path, "square", 25, ("STEPS=1",))
-    out = tmp_path / f"out.{ending}"
-    with monkeypatch.context() as patch:
-        patch.setattr(output, "write_points", killed_at(output.write_points, 120))
-        with pytest.raises(KilledError):
-            stream(case, out)
-    flip(names_of(out, ".binary")[0], 500)
-    told = []
-    stream(case, out, resume=True, note=told.append)
-    assert "continues after 2 of" in told[0]
-    assert out.read_bytes() == in_memory(case, tmp_path / f"memory.{ending}")
-
-
-def test_a_text_that_changed_is_read_anew(tmp_path, monkeypatch, small):
-    case = made(tmp_path, "square", 25, ("STEPS=1",))
-    out = tmp_path / "out.su2"
-    with monkeypatch.context() as patch:
-        patch.setattr(output, "atomic_write", lambda *_, **__: (_ for _ in ()).throw(KilledError()))
-        with pytest.raises(KilledError):
-            stream(case, out)
-    text = case.mesh_file.read_text()
-    case.mesh_file.write_text(text + "% more\n")
-    told = []
-    stream(case, out, resume=True, note=told.append)
-    assert "there is nothing to resume" in told[0]
-    assert out.read_bytes() == in_memory(case, tmp_path / "memory.su2")
 
 
 def test_an_error_leaves_nothing(tmp_path, monkeypatch, small):
@@ -343,7 +294,7 @@ output.write_points = late(output.write_points)
 binary_copy._write_cells = late(binary_copy._write_cells)
 from slideviz.formats.su2 import write
 write._moved_rows = late(write._moved_rows)
-run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
+run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]))
 """
 
 
@@ -356,27 +307,23 @@ def test_killing_it_at_random_moments_leaves_no_half_mesh(tmp_path):
     case = sv.Case.read(tmp_path / "square.cfg")
     out = tmp_path / "out.su2"
     reference = in_memory(case, tmp_path / "memory.su2")
-    root = Path(sv.__file__).parents[1]
-    call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), str(out), "resume"]
+    call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), str(out)]
     begin = time.monotonic()
-    subprocess.run([*call[:-1], "anew"], check=True, cwd=root)
+    subprocess.run(call, check=True, cwd=ROOT)
     usual = time.monotonic() - begin
     assert out.read_bytes() == reference
     out.write_bytes(b"older")
-    binary = names_of(out, ".binary")[0]
     for _ in range(20):
-        process = subprocess.Popen(call, cwd=root)
+        process = subprocess.Popen(call, cwd=ROOT)
         time.sleep(random.uniform(0.2, 1.1) * usual)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         assert out.read_bytes() in (b"older", reference)
-        assert names_of(out)[0].read_bytes()[:4] not in MAGIC if names_of(out)[0].exists() else True
-        if binary.exists() and binary.read_bytes()[:4] in MAGIC:  # then it is the whole, undeformed
-            given = sv.read(binary, file_format="su2b")
-            assert np.array_equal(given.points, sv.read(case.mesh_file).points)
-    subprocess.run(call, check=True, cwd=root)
+        if hidden(out).exists():
+            assert hidden(out).read_bytes()[:4] not in MAGIC
+    subprocess.run(call, check=True, cwd=ROOT)
     assert out.read_bytes() == reference
-    assert not list(tmp_path.glob(".out*"))
+    assert not list(tmp_path.glob(".*"))  # also none of the killed runs
 
 
 def with_halo(text):

@@ -14,7 +14,7 @@ from tests.builders import grid, passage
 from tests.mesh.test_interfaces import zones as core_in_a_square
 from tests.solver.test_zones import both, roles_of, turn
 from tests.solver.test_zones import stage as rows
-from tests.streaming.test_run import KilledError, bits, killed_after, require_same
+from tests.streaming.test_run import bits, require_same
 
 
 def sliding_pair(folder):
@@ -123,26 +123,6 @@ def test_repair_of_a_zone_is_seen_by_the_zones_that_follow_it(tmp_path):
     *_, step = sv.deform(case, mesh)
     assert step.repaired is not None
     assert len(np.intersect1d(step.repaired.nodes, mesh.marker("1:x_p").nodes))
-
-
-@pytest.mark.parametrize("ending", ["su2", "su2b"])
-def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, ending):
-    monkeypatch.setattr(output, "CHUNK", 20)
-    path, out = rows(tmp_path), tmp_path / f"out.{ending}"
-    case = both().change(mesh_file=path)
-    stream(case, out)
-    whole, move = out.read_bytes(), output.write_points
-    parts = sum(-(-len(sv.read(path, zone).points) // 20) for zone in (1, 2))
-    for stop in (2, parts - 1):
-        monkeypatch.setattr(output, "write_points", killed_after(move, stop))
-        with pytest.raises(KilledError):
-            stream(case, out)
-        again, told = [], []
-        monkeypatch.setattr(output, "write_points", lambda *a, s=again: (s.append(1), move(*a))[1])
-        stream(case, out, resume=True, note=told.append)
-        assert f"continues after {stop} of {parts} parts" in told[0]
-        assert len(again) == parts - stop
-        assert out.read_bytes() == whole
 
 
 def test_a_text_becomes_binary_and_back(tmp_path):
