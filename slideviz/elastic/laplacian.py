@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from numba import prange
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from slideviz.elastic.corotated import Corotated
@@ -151,12 +151,27 @@ def _hierarchy(
     factors = []
     for g in range(modes.shape[1]):
         dense = _of_group(matrix, g).toarray() * np.outer(modes[:, g] > 0.0, modes[:, g] > 0.0)
-        # A mesh that may move as a whole makes the matrix singular; rows of nothing are held.
-        diagonal = np.diag(dense)
-        dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, HELD)
-        with enough_threads(0.0):
-            factors.append(cho_factor(dense, lower=True, check_finite=False))
+        factors.append(_factor(dense))
     return tuple(levels), tuple(factors)
+
+
+def _factor(dense: FloatArray) -> Any:
+    """Return the Cholesky factor of a symmetric matrix (k, k), semidefinite but for rounding.
+
+    A mesh that may move as a whole makes it singular, and the sums of much larger numbers, of which
+    it is made, indefinite: its diagonal grows until it is definite. Rows of nothing are held.
+    """
+    diagonal = np.diag(dense)
+    ridge = RIDGE
+    while True:
+        shifted = dense + np.diag(np.where(diagonal > 0, ridge * diagonal, HELD))
+        try:
+            with enough_threads(0.0):
+                return cho_factor(shifted, lower=True, check_finite=False)
+        except LinAlgError:
+            if ridge > len(dense):  # definite by now, unless a number is not finite
+                raise
+            ridge *= 100.0
 
 
 def _prolongation(matrix: Sparse, modes: FloatArray) -> tuple[Sparse, FloatArray]:
