@@ -13,22 +13,23 @@ TRUTHS = ("bool", "isinstance", "any", "all")
 
 
 def _are_unrelated(targets: list[ast.expr], values: list[ast.expr]) -> bool:
-    """Return whether assigning one after the other does the same."""
+    """Return whether no value reads what an assignment before it changes."""
     for place, target in enumerate(targets[:-1], 1):
-        base = target
-        while isinstance(base, ast.Attribute | ast.Subscript):
-            base = base.value
-        later = values[place:]
-        if isinstance(target, ast.Name):
-            places = (ast.Attribute, ast.Subscript)
-            later = later + [one for one in targets[place:] if isinstance(one, places)]
-        nodes = [node for one in later for node in ast.walk(one)]
-        reads = (ast.Call, ast.Subscript, ast.Attribute)
-        if not isinstance(base, ast.Name) or base.id in [getattr(n, "id", "") for n in nodes]:
-            return False
-        if base is not target and any(isinstance(node, reads) for node in nodes):
+        read = {ast.unparse(node) for one in values[place:] for node in ast.walk(one)}
+        if any(ast.unparse(one) in read for one in _changed(target)):
             return False
     return True
+
+
+def _changed(target: ast.expr) -> Iterator[ast.expr]:
+    """Yield the variables, attributes and containers that assigning ``target`` changes."""
+    if isinstance(target, ast.Tuple | ast.List):
+        for one in target.elts:
+            yield from _changed(one)
+    elif isinstance(target, ast.Subscript):
+        yield from _changed(target.value)
+    else:
+        yield target
 
 
 def _is_condition(node: ast.expr) -> bool:
@@ -83,6 +84,9 @@ def test_a_line_says_one_thing():
     [
         "a, b = 1, f(x)",
         "self.a, self.b = 1, 2",
+        "self.a, self.b = x, f(self.c)",
+        "x[i], y[i] = a.b, c[i]",
+        "a, a.b = f(), g()",
         "a, (b, c) = x, f(y)",
         "a, b = (f(x) for x in (u, v))",
         "*a, b = [f(x) for x in u]",
@@ -105,6 +109,8 @@ def test_packing_is_noticed(packed):
         "a, b = f(x)",
         "a, b = map(f, x)",
         "x[0], x[1] = x[1], x[0]",
+        "self.a, self.b = self.b, self.a",
+        "(a, b), c = x, a + y",
         "for a, b in ((1, 2),): pass",
         "t = '-' * width",
         "t = [0] * len(x)",

@@ -138,7 +138,8 @@ def in_zones(
         if line.strip() and (head is None or head[1] not in several)
     ]
     if wrong:
-        (at, said), (k, first, _, here) = wrong[0], each[0]
+        at, said = wrong[0]
+        k, first, _, here = each[0]
         said += f"; write zone and node, e.g. {k}:{here[0] - first}"
         raise CaseError(listed(path, [(at, _with_count(said, len(wrong)))]))
     missing = [k for k in several if not any(head is not None and head[1] == k for head in heads)]

@@ -55,7 +55,7 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
     Raises CaseError or MeshError where there is none.
     """
     sides = case.markers_with("periodic")
-    (hub, shroud) = span_ends(case, mesh)
+    hub, shroud = span_ends(case, mesh)
     axis = case.axis
     origin = case.origin
     period = WHOLE

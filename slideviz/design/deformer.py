@@ -172,7 +172,8 @@ class Deformer:
         asked = motion.displacements(case, mesh)
         self.mesh = mesh
         self.case = case
-        self.nodes, self.displacement = asked.nodes, asked.vectors
+        self.nodes = asked.nodes
+        self.displacement = asked.vectors
         designs = asked.vectors if displacements is None else displacements
         designs = self._checked(designs, "displacements")
         references = designs.reshape(-1, *asked.vectors.shape)
@@ -206,7 +207,8 @@ class Deformer:
                 "all displacements are zero, so control nodes cannot be chosen; give "
                 "`displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
-        self._setup, self._input = setup, known_node_map(mesh, setup, asked)
+        self._setup = setup
+        self._input = known_node_map(mesh, setup, asked)
         self._references = references
         self.warnings = (*case.warnings, *left_out, *setup.warnings)
         targets = [value(self._input.target(reference)) for reference in references]

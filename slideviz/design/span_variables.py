@@ -65,7 +65,9 @@ class SpanVariables:
             raise CaseError("the case has no motion over the span; add one, as SpanMotion(...)")
         _require_last(case, span[0])
         moved = displacements(case, mesh)
-        self.mesh, self.case, self.nodes = mesh, case, moved.nodes
+        self.mesh = mesh
+        self.case = case
+        self.nodes = moved.nodes
         self._at = {name: at for name, at in numbers_of(case).items() if at.motion in span}
         self.names = tuple(self._at)
         self.values = np.array([at.of(case) for at in self._at.values()])

@@ -194,5 +194,6 @@ def rigid_motions(points: FloatArray, conditions: Conditions) -> FloatArray:
     modes = np.zeros((len(x), d, d + len(pairs)))
     modes[:, range(d), range(d)] = 1.0
     for column, (i, j) in enumerate(pairs, start=d):
-        modes[:, i, column], modes[:, j, column] = -x[:, j], x[:, i]
+        modes[:, i, column] = -x[:, j]
+        modes[:, j, column] = x[:, i]
     return (conditions.free @ modes).reshape(-1, modes.shape[2])

@@ -149,7 +149,7 @@ class Corotated:
             body = _plain(self.points), sealed(part.nodes), part.shape, sealed(modulus)
             in_parts(partial(_add_part, add, body, rows.start, corners), m)
         out = np.empty((n, d))
-        (indptr, entries) = self._corners
+        indptr, entries = self._corners
         in_parts(lambda s: gather(indptr[s.start : s.stop + 1], entries, each, out[s]), n)
         return out
 
@@ -256,7 +256,8 @@ def _row(m, i, k):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _set_row(m, i, k, row):  # type: ignore[no-untyped-def]
-    m[3 * i * LANES + k], m[(3 * i + 1) * LANES + k] = row[0], row[1]
+    m[3 * i * LANES + k] = row[0]
+    m[(3 * i + 1) * LANES + k] = row[1]
     m[(3 * i + 2) * LANES + k] = row[2]
 
 

@@ -359,7 +359,8 @@ def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-
                 entry = data[k, 0]
                 at = k
                 while at > base and indices[at - 1] > column:
-                    indices[at], data[at, 0] = indices[at - 1], data[at - 1, 0]
+                    indices[at] = indices[at - 1]
+                    data[at, 0] = data[at - 1, 0]
                     at -= 1
                 indices[at] = column
                 data[at, 0] = entry
@@ -454,7 +455,8 @@ def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-
             left[row, 0] = s0
             left[row, 1] = s1
             left[row, 2] = s2
-            x[row, 0], x[row, 1] = s0 * inverse[row, g0], s1 * inverse[row, g1]
+            x[row, 0] = s0 * inverse[row, g0]
+            x[row, 1] = s1 * inverse[row, g1]
             x[row, 2] = s2 * inverse[row, g2]
 
 

@@ -95,7 +95,8 @@ def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
         x, weights = get_quadrature(element, _ORDER[vtk])
         return np.asarray(x), np.asarray(weights)
     # A prism: triangle times line. scikit-fem's own rule for it has its centre at x = 1/2.
-    (flat, area), (height, length) = get_quadrature(RefTri, 2), get_quadrature(RefLine, 2)
+    flat, area = get_quadrature(RefTri, 2)
+    height, length = get_quadrature(RefLine, 2)
     x = np.concatenate([np.repeat(flat, len(length), axis=1), np.tile(height, len(area))])
     return x, np.repeat(area, len(length)) * np.tile(length, len(area))
 

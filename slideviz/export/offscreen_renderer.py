@@ -214,7 +214,7 @@ class OffscreenRenderer:
         """Return the ranges of x and of y that a picture of a 2D mesh shows."""
         self.aim(options)
         camera = self._plotter.camera
-        (width, height) = options.size
+        width, height = options.size
         unit = 2.0 * camera.parallel_scale / height
         ranges = []
         for centre, length, shift in zip(

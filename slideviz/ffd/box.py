@@ -300,7 +300,7 @@ def points_at(index: tuple[int, ...]) -> tuple[int | slice, ...]:
 def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
     """Return the sums (m, c) of values (I, J, K, c) times factors (m, I), (m, J), (m, K)."""
     m = len(u)
-    (i, j, k, c) = lattice.shape
+    i, j, k, c = lattice.shape
     plane = (u @ lattice.reshape(i, -1)).reshape(m, j, k * c)
     line = np.einsum("mj,mjx->mx", v, plane).reshape(m, k, c)
     return np.einsum("mk,mkc->mc", w, line)

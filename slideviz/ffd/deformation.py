@@ -124,7 +124,8 @@ def _newton(
             there = points[rows] - box.at(trial)
             left = np.linalg.norm(there / size, axis=1)
             good = left < gap[rows]
-            uvw[rows[good]], remaining[rows[good]] = trial[good], there[good]
+            uvw[rows[good]] = trial[good]
+            remaining[rows[good]] = there[good]
             gap[rows[good]] = left[good]
             better[np.flatnonzero(~better)[good]] = True
             if better.all():
@@ -202,7 +203,8 @@ class BoxDeformation:
         self._carried = {box.name: self._in_parent(box) for box in self.boxes if box.parent}
         self._tape: list[Callable[[_Rates], None]] = []
         self._done: dict[str, list[tuple[DrivenMove, float]]] = {}
-        self._factor, self._relax = 1.0, self.relax
+        self._factor = 1.0
+        self._relax = self.relax
         self._embedded = dict(self.inside)
         self.nodes = np.zeros((self.count, 3))
         self.change = {box.name: np.zeros(box.points.shape) for box in self.boxes}

@@ -233,6 +233,7 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
         at = int(np.argmax((np.abs(points) > LARGEST).any(axis=1)))
         raise too_large(text.lines.name, piece.row + at, points[at])
     block = np.empty(piece.rows, layout.point)
-    block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
+    block["x"] = points
+    block["i"] = np.arange(piece.row, piece.row + piece.rows)
     write_at(out, layout.place.points + piece.row * layout.point.itemsize, block)
     return filled

@@ -121,7 +121,8 @@ class SessionRecovery(QObject):
         except CaseError as error:
             self.window.banner.show_error(error)
             return
-        panel.case, panel.mesh = session.case if current else None, session.mesh
+        panel.case = session.case if current else None
+        panel.mesh = session.mesh
         panel.put(table)
         log.info("restored the session of %s", _time_text(found.when))
 

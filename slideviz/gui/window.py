@@ -90,9 +90,12 @@ class MainWindow(Services):
         self._kept.enter_context(protected(self._inputs))
         self._make_centre(multi_samples)
         self.dock_manager = Docks(self)
-        self.docks, panel = self.dock_manager.by_name, self.dock_manager.panel
-        self.boundaries, self.motions = panel(BoundariesPanel), panel(MotionPanel)
-        self.method, self.run_panel = panel(MethodPanel), panel(RunPanel)
+        self.docks = self.dock_manager.by_name
+        panel = self.dock_manager.panel
+        self.boundaries = panel(BoundariesPanel)
+        self.motions = panel(MotionPanel)
+        self.method = panel(MethodPanel)
+        self.run_panel = panel(RunPanel)
         self._make_status()
         self.actions_table = Actions(self)
         self._connect()
@@ -120,7 +123,8 @@ class MainWindow(Services):
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page covers the view, which must be shown to have a size.
         self.viewing = Viewing(self.store, multi_samples, stack)
-        self.view, self.scene = self.viewing.view, self.viewing.scene
+        self.view = self.viewing.view
+        self.scene = self.viewing.scene
         self.section_views = SectionViews(self.viewing, multi_samples, stack)
         self.start = StartPage(self.files.samples, stack)
         self.start.setAutoFillBackground(True)

@@ -62,18 +62,21 @@ def curve_at(
             slope_by[k] = (w1 + w2) * (parts[0] * by[k - 1] + parts[1] * by[k])
     for k, near, far in ((0, 0, 1), (count - 1, count - 2, count - 3)):
         if count == 2:
-            slope[k], slope_by[k] = secant[0], by[0]
+            slope[k] = secant[0]
+            slope_by[k] = by[0]
             continue
         h0 = h[near]
         h1 = h[min(far, count - 2)]
         w0 = (2.0 * h0 + h1) / (h0 + h1)
         w1 = -h0 / (h0 + h1)
-        slope[k], slope_by[k] = w0 * secant[near] + w1 * secant[far], w0 * by[near] + w1 * by[far]
+        slope[k] = w0 * secant[near] + w1 * secant[far]
+        slope_by[k] = w0 * by[near] + w1 * by[far]
         if slope[k] * secant[near] <= 0.0:
             slope[k] = 0.0
             slope_by[k] = 0.0
         elif secant[near] * secant[far] < 0.0 and abs(slope[k]) > 3.0 * abs(secant[near]):
-            slope[k], slope_by[k] = 3.0 * secant[near], 3.0 * by[near]
+            slope[k] = 3.0 * secant[near]
+            slope_by[k] = 3.0 * by[near]
     s = np.clip(at, x[0], x[-1])
     left = np.clip(np.searchsorted(x, s, "right") - 1, 0, count - 2)
     t = (s - x[left]) / h[left]
@@ -121,7 +124,8 @@ class BladeSections:
         if period > 0.0:  # the point may be at the other side
             away = (coords[:, 2] + self._turns).mean() - middle[2]
             middle[2] += period * np.round(away / period)
-        self.field, self.curves = field, SpanCurves(field, middle[:2])
+        self.field = field
+        self.curves = SpanCurves(field, middle[:2])
         plane = self.curves.plane(coords)
         plane[:, 1] += self._turns
         self.spans = plane[:, 2]
@@ -149,7 +153,8 @@ class BladeSections:
         gap = np.where(right > left, levels[right] - levels[left], 1.0)
         part = ((self.spans - levels[left]) / gap)[:, None]
         leading, trailing = ((1.0 - part) * edges[left] + part * edges[right]).T
-        self._centre, self._away = centre, self._start - centre
+        self._centre = centre
+        self._away = self._start - centre
         chord = trailing - leading
         place = ((self._start - leading) * np.conj(chord)).real / np.abs(chord) ** 2
         self._camber = 4.0 * place * (1.0 - place) * 1j * chord
@@ -171,8 +176,11 @@ class BladeSections:
         plane = np.stack([flat.real, flat.imag - self._turns, self.spans], axis=1)
         coords, by_plane = self.curves.coords_and_slopes(plane)
         by = np.empty((5, len(flat)), complex)
-        by[ANGLE], by[CHORD], by[CAMBER] = 1j * shape, shape, turn * self._camber
-        by[LEAN], by[SWEEP] = 1j / self._radius, 1.0 / self.curves.growth(swept, self.spans)
+        by[ANGLE] = 1j * shape
+        by[CHORD] = shape
+        by[CAMBER] = turn * self._camber
+        by[LEAN] = 1j / self._radius
+        by[SWEEP] = 1.0 / self.curves.growth(swept, self.spans)
         by_totals = np.stack([by.real, by.imag])  # (2, 5, n)
         slopes = np.einsum("nij,njk,ktn->nit", self.field.slopes(coords), by_plane, by_totals)
         return self.field.points(coords), slopes
@@ -185,12 +193,14 @@ def change_of(
 
     The derivative is that by the values of the curve (k,); angles of it are in degrees.
     """
-    (value, slope), row = curve_at(spans, values, at), ROWS[kind]
+    value, slope = curve_at(spans, values, at)
+    row = ROWS[kind]
     if row == ANGLE:
         value = np.radians(value)
         slope = np.radians(slope)
     if row == CHORD:
-        value, slope = np.log(value), slope / value[:, None]
+        slope = slope / value[:, None]
+        value = np.log(value)
     return row, value, slope
 
 

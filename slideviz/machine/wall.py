@@ -166,7 +166,8 @@ def _order(places: FloatArray, length: float) -> IntArray:
 def _inside(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
     """Return which points (n, 2) are inside of a polygon (k, 2), by the crossings of a ray."""
     x, y = points.T[:, :, None]
-    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    x0, y0 = polygon.T
+    x1, y1 = np.roll(polygon, -1, axis=0).T
     meets = (y0 > y) != (y1 > y)
     at = x0 + (y - y0) * (x1 - x0) / np.where(y1 != y0, y1 - y0, 1.0)
     return np.asarray((meets & (x < at)).sum(axis=1) % 2 == 1)

@@ -57,7 +57,7 @@ class Wheel:
         of its image.
         """
         mesh = self.passages[0]
-        (first, second) = self._sides.T
+        first, second = self._sides.T
         axis = first[first == second]
         kind = np.full(len(mesh.points), -1)
         kind[mesh.cells.nodes] = 0
@@ -65,7 +65,8 @@ class Wheel:
         kind[axis] = 2
         own = np.flatnonzero(kind == 0)
         place = np.zeros(len(mesh.points), np.int64)
-        place[own], place[axis] = np.arange(len(own)), np.arange(len(axis))
+        place[own] = np.arange(len(own))
+        place[axis] = np.arange(len(axis))
         last = second[first != second]
         place[last] = place[first[first != second]]
         return own, last, axis, place

@@ -111,7 +111,8 @@ def _write_around(connectivity, offsets, begins, owner, local):  # type: ignore[
     for cell in range(len(offsets) - 1):
         for k in range(offsets[cell], offsets[cell + 1]):
             at = _place(connectivity[k], begins)
-            owner[at], local[at] = cell, k - offsets[cell]
+            owner[at] = cell
+            local[at] = k - offsets[cell]
 
 
 @njit(inline="always", nogil=True, cache=True)

@@ -89,7 +89,8 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
     ``limits`` (N, 2): smallest and largest area of a boundary at each node; inf and 0 without one.
     """
     types, offsets, connectivity, signs, middles = mesh
-    (around, side_nodes), (starts, cells, local) = tables, nodes
+    around, side_nodes = tables
+    starts, cells, local = nodes
     most = 0
     for i in range(found.shape[1]):
         most = max(most, starts[begin + i + 1] - starts[begin + i])

@@ -97,4 +97,5 @@ SIZES = np.zeros(256, np.int64)
 DIMS = np.zeros(256, np.int64)
 """Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""
 for _row in _ROWS:
-    SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim
+    SIZES[_row.vtk] = _row.n_nodes
+    DIMS[_row.vtk] = _row.dim

@@ -29,7 +29,9 @@ def _face(at, row, count, area, centre):  # type: ignore[no-untyped-def]
     for c in range(count):
         if d < 0:
             x = edge(at, a, b, c)
-            area[0, c], area[1, c], area[2, c] = x[1], -x[0], 0.0
+            area[0, c] = x[1]
+            area[1, c] = -x[0]
+            area[2, c] = 0.0
             for axis in range(3):
                 centre[axis, c] = 0.5 * (at[axis, a, c] + at[axis, b, c])
         elif e < 0:
@@ -136,7 +138,8 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
         for c in range(count):
             cosine = min(max(worst[0, c], -1.0), 1.0)
             angle[cells[c]] = np.degrees(np.arccos(cosine))
-            skewness[cells[c]], expansion[cells[c]] = worst[1, c], worst[2, c]
+            skewness[cells[c]] = worst[1, c]
+            expansion[cells[c]] = worst[2, c]
 
 
 @njit(**OPTIONS)
@@ -146,12 +149,15 @@ def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # t
     The vector ``across`` (3, …) from centre to centre, its least share of the scale of skewness,
     and the ratio of the volumes. At a boundary the vector leads to the plane of the face.
     """
-    (first, neighbour), (centres, volumes) = adjacent, rated
+    first, neighbour = adjacent
+    centres, volumes = rated
     for c in range(len(cells)):
         cell = cells[c]
         other = neighbour[first[cell] + k]
         if other >= 0:
-            share[c], here, there = 0.2, volumes[cell], volumes[other]
+            share[c] = 0.2
+            here = volumes[cell]
+            there = volumes[other]
             ratio[c] = max(here / there, there / here) if min(here, there) > 0.0 else np.inf
             for axis in range(3):
                 across[axis, c] = centres[other, axis] - centres[cell, axis]
@@ -181,7 +187,9 @@ def _raise_skewness(at, row, cells, centres, area, middle, across, share, worst)
         d = (across[0, c], across[1, c], across[2, c])
         p = middle[0, c] - own[0, c], middle[1, c] - own[1, c], middle[2, c] - own[2, c]
         part = dot3(s, p) / dot3(s, d)
-        v[0, c], v[1, c], v[2, c] = p[0] - part * d[0], p[1] - part * d[1], p[2] - part * d[2]
+        v[0, c] = p[0] - part * d[0]
+        v[1, c] = p[1] - part * d[1]
+        v[2, c] = p[2] - part * d[2]
     for k in row:
         if k >= 0:
             for c in range(len(cells)):

@@ -96,7 +96,8 @@ def find_fans(
     fan = (np.cumsum(is_first) - 1)[first][fan]
     fan_node = np.empty(total, np.int64)
     fan_marker = np.empty(total, np.int64)
-    fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
+    fan_node[fan] = node
+    fan_marker[fan] = boundary.marker[facet]
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
 
 

@@ -390,7 +390,8 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, fou
             write_coefficients(vtk, at, table, count, values[k])
         safe = _write_polynomials(dim, values, errors, turn[first : first + count], cap / scale)
         for c in range(count):
-            found[first + c], end = cap, cap / scale[c]
+            found[first + c] = cap
+            end = cap / scale[c]
             if not safe[c]:
                 poly[:] = values[:, :, c].T
                 root = _margin(poly, cuts, end, stack)

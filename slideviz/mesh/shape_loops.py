@@ -150,7 +150,10 @@ def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-de
     An angle is given by a number that rises with it, from 0 for 0° to 4 for 360° (`_degrees`), to
     spare the arc cosines. An edge without length makes angles of 0.
     """
-    angles[0], angles[1], angles[2], angles[3] = np.inf, -np.inf, np.inf, -np.inf
+    angles[0] = np.inf
+    angles[1] = -np.inf
+    angles[2] = np.inf
+    angles[3] = -np.inf
     normal = np.empty((3, LANES))
     for row in polygons:
         a, b, d, e = row
@@ -174,7 +177,8 @@ def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-de
                 if n == 4:
                     turn = dot3((normal[0, c], normal[1, c], normal[2, c]), cross3(x, y))
                     angle = angle if turn >= 0.0 else 4.0 - angle
-                least[c], largest[c] = min(least[c], angle), max(largest[c], angle)
+                least[c] = min(least[c], angle)
+                largest[c] = max(largest[c], angle)
 
 
 @njit(inline="always", **OPTIONS)

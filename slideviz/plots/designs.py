@@ -90,7 +90,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
 def failed_designs(table: DesignTable, column: str) -> dict[int, float]:
     """Return the horizontal coordinate of each failed design, by its number."""
     at = table.columns.index(column)
-    (place_of, _) = _places(table, column)
+    place_of, _ = _places(table, column)
     failed = (number for number, row in sorted(table.results.items()) if row.problem)
     return {number: place_of[table.rows[number - 1][at]] for number in failed}
 

@@ -125,7 +125,8 @@ def draw_meridional(
     style_axes(axes, style, f"z [{unit}]", f"r [{unit}]")
     axes.grid(False)
     for bins in zones:
-        (z, r), means = np.moveaxis(bins.places, -1, 0), bins.means(values)
+        z, r = np.moveaxis(bins.places, -1, 0)
+        means = bins.means(values)
         mesh = axes.pcolormesh(z, r, means, cmap=color_map, vmin=limits[0], vmax=limits[1])
         mesh.set_rasterized(True)
         for row, name in zip((0, -1), bins.walls, strict=True):

@@ -95,7 +95,8 @@ def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
     # The first fan of the node, then its second and so on, beside all fans of its images.
     while len(rows):
         mine = first[rows] < rows
-        rows, other = rows[mine], first[rows[mine]]
+        rows = rows[mine]
+        other = first[rows]
         along = np.einsum("rd,rd->r", around.normals[chosen[rows]], around.normals[chosen[other]])
         drop[rows] |= (along < -around.merge) & (own[rows] != own[other])
         first[rows] += 1

@@ -91,7 +91,8 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
             one = corners[i, 0, axis]
             two = corners[i, 1, axis]
             three = corners[i, 2, axis]
-            low[i, axis], high[i, axis] = min(one, two, three), max(one, two, three)
+            low[i, axis] = min(one, two, three)
+            high[i, axis] = max(one, two, three)
     for k in range(nodes):
         a = starts[k]
         b = stops[k]
@@ -246,7 +247,9 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
         best = np.inf
         held = np.inf
         top = 1
-        stack[0], first[0], last[0] = 0, 0, len(order)
+        stack[0] = 0
+        first[0] = 0
+        last[0] = len(order)
         if len(guess):
             _load(guess[i], corners, shifts, t)
             best = held = _on_triangle(x[i], t[0], t[1], t[2], point, trial)

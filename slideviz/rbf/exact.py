@@ -160,10 +160,8 @@ class ExactFit:
             error_estimate = max(float(each.error_estimate.max(initial=0.0)) for each in refined)
             if refined[0].exact or error_estimate < max(field_error):
                 first = max(float(each.before.max(initial=0.0)) for each in refined)
-                self.refined, self.error_estimate = (
-                    max(self.refined, *field_error, first),
-                    max(self.error_estimate, error_estimate),
-                )
+                self.refined = max(self.refined, *field_error, first)
+                self.error_estimate = max(self.error_estimate, error_estimate)
                 return refined[0].weights, part[:0]
         self.error_estimate = max(self.error_estimate, *field_error)
         return found, part[system.factor.dropped]

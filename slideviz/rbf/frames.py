@@ -162,7 +162,8 @@ def features_slopes(frame: Frame, coords: FloatArray) -> FloatArray:
         phase = rate * coords[:, 1]
         out = np.zeros((n, 4, d))
         out[:, 0, 0] = 1.0
-        out[:, 1, 1], out[:, 2, 1] = rate * np.cos(phase), -rate * np.sin(phase)
+        out[:, 1, 1] = rate * np.cos(phase)
+        out[:, 2, 1] = -rate * np.sin(phase)
         if d == 3:
             out[:, 3, 2] = 1.0
         return out

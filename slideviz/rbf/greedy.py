@@ -62,7 +62,9 @@ class GreedyFit:
         same step (the first of the two of direct sliding).
         """
         assert problem.reduction is not None
-        self._problem, self._timer, self._settings = problem, timer, problem.reduction
+        self._problem = problem
+        self._timer = timer
+        self._settings = problem.reduction
         d = problem.dim
         self.history = history
         self.short = ""
@@ -80,7 +82,8 @@ class GreedyFit:
         self._among = Candidates(rows, none, none, none, np.empty(0))
         self._level = GreedyLevel(problem, self._among, self.interpolant)
         self._known = problem.initial_control_nodes()
-        self._given, self._used = problem.stages[done:], list[int]()
+        self._given = problem.stages[done:]
+        self._used = list[int]()
         self._one_level = not self._settings.multilevel
 
     def _new_level(self) -> None:

@@ -214,7 +214,8 @@ class WallNodes:
             found.append((place[some[row]], source, carrier))
         rows, columns, values = map(np.concatenate, zip(*found, strict=True))
         arm = values[:, None] * (targets[hit[rows]] - self.places[columns])
-        (total, dim), count = self.places.shape, len(hit)
+        total, dim = self.places.shape
+        count = len(hit)
         wide = (columns[:, None] * dim + np.arange(dim)).reshape(-1)
         by_rotation = (arm.reshape(-1), (np.repeat(rows, dim), wide))
         return (
@@ -227,7 +228,7 @@ class WallNodes:
     def _reached(self, k: int, targets: FloatArray) -> Reached:
         """Return the points (m, d) in the zone of wall k; weights without shares."""
         wall = self.walls[k][0]
-        (tree, closest) = self._trees[k]
+        tree, closest = self._trees[k]
         images = tree.n // len(wall.first)
         count = min(ALIKE, tree.n)
         heights = np.append(np.tile(wall.first, images), 0.0)
@@ -271,7 +272,8 @@ class WallNodes:
             seen[~(seen > 0.0).any(axis=1)] = 1.0
             gap = np.maximum(gap, TINY)
             w = seen * (gap[:, :1] / gap) ** POWER * _faded(gap, seen > 0.0, count < tree.n)
-            nearest[part], weight[part] = index, w / w.sum(axis=1, keepdims=True)
+            nearest[part] = index
+            weight[part] = w / w.sum(axis=1, keepdims=True)
 
         in_parts(find, len(targets))
         point, column = np.nonzero(weight)

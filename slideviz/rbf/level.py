@@ -342,7 +342,8 @@ class GreedyLevel:
     def extend_candidates(self, candidates: Candidates) -> None:
         """Choose among ``candidates`` from here on, which begin with those there were before."""
         more = np.zeros(len(candidates.rows.nodes) - len(self.excluded), bool)
-        self._among, self.excluded = candidates, np.concatenate([self.excluded, more])
+        self.excluded = np.concatenate([self.excluded, more])
+        self._among = candidates
         self._terms = self._terms_of(candidates)
 
     def targets(self) -> FloatArray:

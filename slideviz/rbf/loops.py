@@ -123,7 +123,8 @@ def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[n
         sin = np.empty(BLOCK)
         for i in range(first, last):
             angle = start[i, 1] * rate + theta0
-            cos[i - first], sin[i - first] = np.cos(angle), np.sin(angle)
+            cos[i - first] = np.cos(angle)
+            sin[i - first] = np.sin(angle)
         for k in range(coords.shape[0]):
             for i in range(first, last):
                 x0 = coords[k, i, 0]

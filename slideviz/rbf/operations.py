@@ -184,7 +184,7 @@ def many(
     if weights.ndim == 2:
         return evaluate(basis, targets, controls, weights, tick)
     ahead = weights.shape[:-2]
-    (n, d) = weights.shape[-2:]
+    n, d = weights.shape[-2:]
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d)) if out is None else out
@@ -218,8 +218,10 @@ def terms(basis: Basis, x: Array) -> Array:
     slopes = np.zeros((n, out.shape[1], k))
     if basis.period > 0:
         slopes[:, 1, 0] = slopes[:, 4, 3] = 1.0
-        slopes[:, 2, 1], slopes[:, 2, 2] = -2.0 * v[1], 2.0 * v[2]
-        slopes[:, 3, 1], slopes[:, 3, 2] = 2.0 * v[2], 2.0 * v[1]
+        slopes[:, 2, 1] = -2.0 * v[1]
+        slopes[:, 2, 2] = 2.0 * v[2]
+        slopes[:, 3, 1] = 2.0 * v[2]
+        slopes[:, 3, 2] = 2.0 * v[1]
     else:
         slopes[:, range(1, k + 1), range(k)] = 1.0
     return recorded(

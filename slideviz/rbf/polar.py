@@ -154,9 +154,12 @@ def rotation(m, r, work, vectors):  # type: ignore[no-untyped-def]
     work[1, 1] = m[0, 0] - m[1, 1] - m[2, 2]
     work[2, 2] = m[1, 1] - m[0, 0] - m[2, 2]
     work[3, 3] = m[2, 2] - m[0, 0] - m[1, 1]
-    work[0, 1], work[0, 2] = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0]
-    work[0, 3], work[1, 2] = m[1, 0] - m[0, 1], m[0, 1] + m[1, 0]
-    work[1, 3], work[2, 3] = m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
+    work[0, 1] = m[2, 1] - m[1, 2]
+    work[0, 2] = m[0, 2] - m[2, 0]
+    work[0, 3] = m[1, 0] - m[0, 1]
+    work[1, 2] = m[0, 1] + m[1, 0]
+    work[1, 3] = m[0, 2] + m[2, 0]
+    work[2, 3] = m[1, 2] + m[2, 1]
     _eigenvectors(work, vectors)
     best = 0
     for k in range(1, 4):

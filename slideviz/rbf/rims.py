@@ -147,7 +147,7 @@ class Bodies:
         from scipy.sparse.linalg import splu
 
         count = len(self.share)
-        (one, two) = self.edges.T
+        one, two = self.edges.T
         links = coo_array((self.weights, (one, two)), (count, count)).tocsr()
         links = links + links.T
         rows = (diags_array(links.sum(axis=1)) - links).tocsr()[self.inner]
@@ -358,8 +358,9 @@ def bulge_of(coords: FloatArray, facets: IntArray) -> float:
     nodes, normals = vertex_normals(coords, facets)
     one = facets.ravel()
     two = np.roll(facets, -1, axis=1).ravel()
-    ends = (unit(normals)[np.searchsorted(nodes, end)] for end in (one, two))
-    first, second = ends
+    at_nodes = unit(normals)
+    first = at_nodes[np.searchsorted(nodes, one)]
+    second = at_nodes[np.searchsorted(nodes, two)]
     off = np.einsum("ed,ed->e", coords[two] - coords[one], second - first)
     return BULGE * float(np.abs(off).max(initial=0.0))
 

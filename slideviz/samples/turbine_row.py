@@ -44,7 +44,8 @@ def triangulate(points: FloatArray, edges: IntArray) -> IntArray:
     """
     triangles = Delaunay(points).simplices.astype(np.int64)
     at = points[triangles]
-    (ax, ay), (bx, by) = (at[:, 1] - at[:, 0]).T, (at[:, 2] - at[:, 0]).T
+    ax, ay = (at[:, 1] - at[:, 0]).T
+    bx, by = (at[:, 2] - at[:, 0]).T
     triangles[ax * by < ay * bx] = triangles[ax * by < ay * bx][:, ::-1]
     rim = np.zeros(len(points), bool)
     rim[edges] = True
@@ -71,7 +72,8 @@ def relax(points: FloatArray, fixed: int, edges: IntArray) -> tuple[FloatArray, 
 def _sweep(points: FloatArray, triangles: IntArray, fixed: int) -> FloatArray:
     """Return the points with all after the first ``fixed`` moved once, as `relax` says."""
     at = points[triangles]
-    (ax, ay), (bx, by) = (at[:, 1] - at[:, 0]).T, (at[:, 2] - at[:, 0]).T
+    ax, ay = (at[:, 1] - at[:, 0]).T
+    bx, by = (at[:, 2] - at[:, 0]).T
     weight = np.sqrt(np.abs(ax * by - ay * bx))
     total = np.bincount(triangles.ravel(), np.repeat(weight, 3), len(points))
     moved = points.copy()
@@ -84,7 +86,8 @@ def _sweep(points: FloatArray, triangles: IntArray, fixed: int) -> FloatArray:
 def inside(places: FloatArray, points: FloatArray, edges: IntArray) -> NDArray[np.bool_]:
     """Return which places (k, 2) the edges (e, 2) of points (n, 2) go round oddly often, (k,)."""
     odd = np.zeros(len(places), bool)
-    (x0, y0), (x1, y1) = points[edges[:, 0]].T, points[edges[:, 1]].T
+    x0, y0 = points[edges[:, 0]].T
+    x1, y1 = points[edges[:, 1]].T
     order = np.argsort(places[:, 1], kind="stable")
     heights = places[order, 1]
     first = np.searchsorted(heights, np.minimum(y0, y1), side="left")

@@ -100,7 +100,8 @@ def _smooth_curve(
     """
     points[-1] = points[0]
     spline = CubicSpline(arc, points, bc_type="periodic")
-    (tx, ty), (cx, cy) = spline(arc, 1).T, spline(arc, 2).T
+    tx, ty = spline(arc, 1).T
+    cx, cy = spline(arc, 2).T
     speed = np.hypot(tx, ty)
     return arc, points, np.column_stack([ty, -tx]) / speed[:, None], (tx * cy - ty * cx) / speed**3
 

@@ -213,8 +213,10 @@ class Camera:
         """Copy another camera's position and projection, but not its shift beside a legend."""
         camera = self._camera
         theirs = other._camera
-        camera.position, camera.focal_point = theirs.position, theirs.focal_point
-        camera.up, camera.view_angle = theirs.up, theirs.view_angle
+        camera.position = theirs.position
+        camera.focal_point = theirs.focal_point
+        camera.up = theirs.up
+        camera.view_angle = theirs.view_angle
         camera.parallel_projection = theirs.parallel_projection
         camera.parallel_scale = theirs.parallel_scale
         self.shift()
@@ -295,7 +297,9 @@ class Camera:
     def move_to(self, place: tuple[float, ...]) -> None:
         """Restore a `place` or a `view`; of a `view` all the width is seen, if need be smaller."""
         camera = self._camera
-        camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
+        camera.position = place[:3]
+        camera.focal_point = place[3:6]
+        camera.up = place[6:9]
         camera.parallel_scale = place[9]
         wider = max(place[10] / self._ratio(self.stage), 1.0) if len(place) > 10 else 1.0
         camera.parallel_scale *= wider

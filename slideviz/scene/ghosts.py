@@ -405,6 +405,7 @@ def circles(middles: FloatArray, radius: float) -> FloatArray:
     for one in range(dim):
         for other in range(one + 1, dim):
             round_ = np.zeros((PIECES + 1, dim))
-            round_[:, one], round_[:, other] = radius * np.cos(angle), radius * np.sin(angle)
+            round_[:, one] = radius * np.cos(angle)
+            round_[:, other] = radius * np.sin(angle)
             rings.append(round_)
     return (middles[:, None, None] + np.array(rings)).reshape(-1, dim)

@@ -145,7 +145,8 @@ class BoundaryLayer(Layer):
         for surface in surfaces:
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
         enclosing = enclosing_of(session.mesh, surfaces)
-        self._closed, self._enclosed = enclosing.closed, enclosing.inner
+        self._closed = enclosing.closed
+        self._enclosed = enclosing.inner
 
     def shapes(self) -> list[Any]:
         return [one.shape for one in self.drawn.values()]
@@ -181,7 +182,8 @@ class BoundaryLayer(Layer):
         if by_value and recolored(old, new):
             for one in self.drawn.values():
                 one.shape.cell_data[VALUES] = self.stage.values_of(new, one.surface.owner)
-        self.glass, self._buried = self._glass(new), self._hides_mark(new)
+        self.glass = self._glass(new)
+        self._buried = self._hides_mark(new)
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)
         # From outside, the back faces are invisible: culled, they cost no drawing time.

@@ -185,7 +185,10 @@ class SectionLayer(Layer):
                 # Folded cells overlap in one plane: draw the inverted ones last.
                 polygons = polygons.with_last(cut.quality.status[polygons.cells] == INVERTED)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
-            one.made_of, one.frame, one.of, again = key, cut, frame.mesh, True
+            one.made_of = key
+            one.frame = cut
+            one.of = frame.mesh
+            again = True
         if not by_value:
             one.shown.color(None)
         elif again:

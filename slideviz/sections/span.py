@@ -100,7 +100,7 @@ class SpanWalls:
     def lean(self) -> float:
         """The angle in radians between the curves and the axis, where m is 0 at mid-span."""
         places = np.array([[-1e-3, 0, 0.5], [1e-3, 0, 0.5]])
-        (z, r) = np.diff(self.field.curves.traced(places), axis=0)[0]
+        z, r = np.diff(self.field.curves.traced(places), axis=0)[0]
         return float(np.arctan2(r, z))
 
     @cached_property
@@ -183,7 +183,7 @@ class SpanWalls:
 
         def value(k: int, some: FloatArray) -> FloatArray:
             curves = self.channels[k].curves
-            (theta, m, span) = some.T
+            theta, m, span = some.T
             at = m - np.interp(span, _SPANS, self._begin[k, 1])
             plane = np.stack([curves.at_length(at, span), theta, span], axis=1)
             return np.column_stack([curves.traced(plane), theta])
@@ -224,7 +224,8 @@ class ConstantSpan(AboutAxis):
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
         """Return where edges cross, by Ridders' method (IEEE Trans. Circuits Syst. 26, 1979)."""
-        (start, way), (low, high) = edges, level
+        start, way = edges
+        low, high = level
         a = np.zeros(len(start))
         b = np.ones(len(start))
         root = low / np.where(low != high, low - high, 1.0)

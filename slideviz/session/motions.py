@@ -321,7 +321,7 @@ def support_words(session: Session) -> str:
     of = of if session.runs else ""
     shape = "circle" if mesh.dim == 2 else "sphere"
     middles = boxes.mean(axis=1)
-    (low, high) = mesh.bounds
+    low, high = mesh.bounds
     farthest = np.linalg.norm(np.maximum(high - middles, middles - low), axis=1)
     if radius > farthest.max():
         return f"Support radius{of}: {radius:.4g}, a {shape} larger than the whole mesh"

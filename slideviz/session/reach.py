@@ -63,7 +63,9 @@ def _lowest(frames: Sequence[StepFrame], parts: Sequence[float], at: float) -> f
         return frames[parts.index(at)].quality.min
     ends = list(pairwise(parts))
     k = next((k for k, (_, end) in enumerate(ends) if at < end), len(ends) - 1)
-    (low, high), first, undeformed = ends[k], frames[k].mesh.points, frames[0].mesh
+    low, high = ends[k]
+    first = frames[k].mesh.points
+    undeformed = frames[0].mesh
     points = first + (at - low) / (high - low) * (frames[k + 1].mesh.points - first)
     return quality(undeformed.with_points(points), undeformed, frames[-1].quality.metric).min
 

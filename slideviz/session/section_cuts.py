@@ -237,7 +237,8 @@ class Cuts:
     def cutter(self, mesh: Mesh) -> Cutter:
         """Return the cutter of a mesh; the steps of a deformation share it."""
         if self._cutter is None or self._cells is not mesh.cells:
-            self._cells, self._cutter = mesh.cells, Cutter.of(mesh)
+            self._cells = mesh.cells
+            self._cutter = Cutter.of(mesh)
             self._points = None
         return self._cutter
 

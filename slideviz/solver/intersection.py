@@ -316,7 +316,8 @@ def winding_number(points: FloatArray, facets: IntArray, at: FloatArray) -> Floa
 
 
 def _winding_2d(arms: FloatArray) -> float:
-    (a, b), (c, d) = arms[:, 0].T, arms[:, 1].T
+    a, b = arms[:, 0].T
+    c, d = arms[:, 1].T
     return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
 
 

@@ -45,7 +45,8 @@ class InterfaceMotion:
     """
 
     def __init__(self, case: Case, mesh: Mesh) -> None:
-        self.mesh, self.roles = mesh, case.roles
+        self.mesh = mesh
+        self.roles = case.roles
         self.names = case.interfaces  # those of MARKER_ZONE_INTERFACE
         self.interfaces = named_interfaces(mesh, case.interfaces)
         alone = by_zone(case, mesh)

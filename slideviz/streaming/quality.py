@@ -61,7 +61,8 @@ class QualityCollector:
     def of_cells(self, cells: slice) -> QualityCollector:
         """Return the collector of some of the cells, in the same scratch files."""
         some = copy(self)
-        some._values, some._status = self._values[cells], self._status[cells]
+        some._values = self._values[cells]
+        some._status = self._status[cells]
         return some
 
     def add(

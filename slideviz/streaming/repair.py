@@ -109,7 +109,8 @@ class FileRegions:
         every = np.concatenate([self.nodes, nodes[new]])
         order = np.argsort(every)
         before = np.concatenate([self.before, region.mesh.points[moved[new]]])
-        self.nodes, self.before = every[order], before[order]
+        self.nodes = every[order]
+        self.before = before[order]
         self._source.points.write(self._file, nodes, points[moved])
 
     def _blocks(self, chosen: Chosen) -> Iterator[ElementBlock]:

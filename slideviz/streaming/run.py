@@ -101,7 +101,8 @@ class RemainingTime:
 
     def _left(self) -> float | None:
         """Return an estimate of the seconds that are left; None before there is enough evidence."""
-        (stage, share), now = self._left_stages[0], monotonic() - self._begin
+        stage, share = self._left_stages[0]
+        now = monotonic() - self._begin
         spent = self._spent
         usual = self._usual
         if stage != "solve":

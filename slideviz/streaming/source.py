@@ -308,7 +308,8 @@ class FileSource:
         undeformed = [(zone[0], place.number) for place in places]
         if moved is not None:
             other = source.of(stack.enter_context(moved.open("rb")))
-            tables, bases = [PointTable(other, place) for place in places], tables
+            bases = tables
+            tables = [PointTable(other, place) for place in places]
         elif reference is not None:
             there, others = stack.enter_context(open_zones(*reference))
             bases = [PointTable(there, place) for place in others]

@@ -74,11 +74,13 @@ class FrozenFit:
         self._problem = problem
         self._to_come = stages
         self.dropped = dropped
-        self._basis, self._features = basis, problem.features
+        self._basis = basis
+        self._features = problem.features
         self._dim = problem.dim
         self._chosen = chosen
         self._fixed = fixed
-        self._refined, self._checked = refined and supports(basis), checked and not basis.saddle
+        self._refined = refined and supports(basis)
+        self._checked = checked and not basis.saddle
         self.error_estimate: Any = np.zeros(())
         self.stages: tuple[Levels, ...] = ()
         self._rows: ConstraintRows | None = None

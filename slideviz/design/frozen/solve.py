@@ -59,7 +59,8 @@ class MeasuredSystem:
                     parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
                     off = [system.field_error(wide[block, at], solved[:, at]) for at in parts]
                     field_error = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
-            out[block], error_estimate = solved, np.maximum(error_estimate, field_error)
+            out[block] = solved
+            error_estimate = np.maximum(error_estimate, field_error)
         self.error_estimate = error_estimate.reshape(*right.shape[:-2], m).max(axis=-1)
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
@@ -109,7 +110,9 @@ class WithPolynomial:
 
     def __init__(self, inner: Callable[..., FloatArray], terms: FloatArray, use: IntArray) -> None:
         """Prepare the solver for P, ``terms`` (n, q), of which the columns ``use`` (k,) count."""
-        self._inner, self._n, self._rows = inner, len(terms), len(terms) + use
+        self._inner = inner
+        self._n = len(terms)
+        self._rows = len(terms) + use
         self._q, self._r = np.linalg.qr(terms[:, use])
         self._inverse = inner(self._q)
         self._schur = lu_factor(self._q.T @ self._inverse)

@@ -230,8 +230,11 @@ class _Run:
     """One run of a step: `slideviz.rbf.problem.FrozenChoices` at some positions."""
 
     def __init__(self, step: FrozenStep, coords: Array, out: FloatArray | None) -> None:
-        self._step, self._setup, self._coords = step, step.setup, coords
-        self.out, self._kept = out, step.choices
+        self._step = step
+        self._setup = step.setup
+        self._coords = coords
+        self.out = out
+        self._kept = step.choices
         self._projections = count()
         self._stages = ((f"stage {k}", levels) for k, levels in enumerate(step.stages))
 
@@ -242,7 +245,8 @@ class _Run:
     def _tried(self, make: Callable[[], Any]) -> Any:
         """Return what ``make`` returns; projections that it tries are not kept."""
         before = self._kept, self._projections
-        self._kept, self._projections = ChoiceCache(), count()
+        self._kept = ChoiceCache()
+        self._projections = count()
         try:
             return make()
         finally:

@@ -342,12 +342,14 @@ def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarra
     if len(again) and len(left):
         gaps, others = map(np.asarray, cKDTree(points[left]).query(found.points[again]))
         near = gaps <= SAME * largest_coordinate(points)
-        rows[again[near]], far[again[near]] = left[others[near]], gaps[near]
+        rows[again[near]] = left[others[near]]
+        far[again[near]] = gaps[near]
     return float(np.max(far, initial=0.0)), rows
 
 
 def _unordered(paths: Sequence[Path], mesh: Mesh) -> Sensitivities:
-    path, rows = paths[0], [row for path in paths for row in _rows(path) if row]
+    path = paths[0]
+    rows = [row for each in paths for row in _rows(each) if row]
     dim = mesh.dim
     width = len(rows[0]) if rows else 0
     if width not in {6, 2 * dim} or any(len(row) != width for row in rows):

@@ -196,7 +196,9 @@ class _Tasks:
         numbers: Mapping[int, int],
     ) -> None:
         self._folder = None if folder is None else Path(folder).absolute()
-        self._mesh, self._width, self._numbers = mesh, len(str(len(designs))), numbers
+        self._mesh = mesh
+        self._width = len(str(len(designs)))
+        self._numbers = numbers
         self.packed = Packed("", b"")
         if mesh is None:
             return

@@ -141,7 +141,8 @@ SIZES = np.zeros(257, np.int64)
 """Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
 DIMS = np.full(257, -1)  # dimension by element type, likewise; -1 for no type
 for _row in ELEMENTS.values():
-    SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim
+    SIZES[_row.vtk] = _row.n_nodes
+    DIMS[_row.vtk] = _row.dim
 
 RUN_COLUMNS = 5
 """Columns of a table of runs: first byte, first line, kind, rows, nodes (see `Lines`)."""

@@ -59,7 +59,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
         yield from _zone_text(mesh)
     else:
         raw = document.raw
-        (begin, end) = document.zone
+        begin, end = document.zone
         raw.require_same()
         yield from (raw[a:b] for a, b in _ranges(0, begin))
         yield from _zone_text(mesh)

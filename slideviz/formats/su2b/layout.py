@@ -76,7 +76,8 @@ class BinaryFile:
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
         self.name = printable(path)  # for messages
-        self._file, self._lock = file, Lock()
+        self._file = file
+        self._lock = Lock()
         self.size = os.fstat(file.fileno()).st_size
         """Number of bytes."""
         head = file.read(2 * _INT)
@@ -98,7 +99,8 @@ class BinaryFile:
     def of(self, file: BinaryIO) -> BinaryFile:
         """Return this object for another open file of the same layout, whose head is not read."""
         other = copy(self)
-        other._file, other._lock = file, Lock()
+        other._file = file
+        other._lock = Lock()
         return other
 
     @property

@@ -131,7 +131,8 @@ def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) 
     kind = np.dtype([("x", f"{sign}f8", (zone.dim,)), ("i", conn)])
     for i, j in _parts(zone.n_points):
         block = np.empty(j - i, kind)
-        block["x"], block["i"] = zone.points(i, j), np.arange(i, j)
+        block["x"] = zone.points(i, j)
+        block["i"] = np.arange(i, j)
         yield block.tobytes()
     yield short(len(zone.markers))
     raw = {} if form is None else {name.partition(b"\0")[0]: name for name in form.names}

@@ -449,7 +449,9 @@ class PictureDialog(PixelFields, QDialog):
             width, height = map(int, known["size"])
             across, high, dpi = map(float, known.get("paper", PAPER))
         except (TypeError, ValueError, KeyError):
-            known, (width, height), (across, high, dpi) = asdict(usual), usual.size, PAPER
+            known = asdict(usual)
+            width, height = usual.size
+            across, high, dpi = PAPER
         self.width_px.setValue(width)
         self.height_px.setValue(height)
         self.width_cm.setValue(across)

@@ -234,7 +234,8 @@ class FilmDialog(QDialog):
         self.renderer = renderer
         self._ask = ask
         self._file: Path | None = None
-        self._runner, self._previewing = PieceRunner(self), PieceRunner(self)
+        self._runner = PieceRunner(self)
+        self._previewing = PieceRunner(self)
         self._runner.yielded.connect(self._progressed)
         self._runner.done.connect(self._done)
         self._runner.failed.connect(self._failed)

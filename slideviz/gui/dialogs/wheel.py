@@ -41,7 +41,9 @@ class WheelDialog(QDialog):
     def __init__(self, parent: QWidget, renderer: OffscreenRenderer, around: Sequence[int]) -> None:
         super().__init__(parent)
         self.setWindowTitle("Save as wheel")
-        self.renderer, self._session, self._around = renderer, renderer.session, around
+        self.renderer = renderer
+        self._session = renderer.session
+        self._around = around
         self.preview = preview_label("Picture of the wheel", PREVIEW)
         self.passages = Choice(
             passage_choices(self._session, around),

@@ -89,7 +89,7 @@ class CurveCanvas(PlotCanvas):
         if self._line is None or not self._has_axes:
             return
         painter = QPainter(self)
-        (top, height) = self.axes_rows()
+        top, height = self.axes_rows()
         painter.setPen(QPen(QColor(SELECTED_COLOR), 2.0))
         painter.drawLine(QPointF(self._line, top), QPointF(self._line, top + height))
         words = f" {self.to_value(self._line):.0f} % "

@@ -164,7 +164,8 @@ class DesignsJob(QObject):
         self.runner.start(run_designs, case, mesh, table)
 
     def _progressed(self, doing: JobProgress) -> None:
-        self._text, self._fraction = doing.text, doing.fraction or 0.0
+        self._text = doing.text
+        self._fraction = doing.fraction or 0.0
         if not self._timer.isActive():
             self._timer.start()
 
@@ -477,7 +478,8 @@ class DesignsPanel(Panel):
             return
         if len(table.results) == len(table.rows) or not self._confirm_replacing(table):
             return
-        self.case, self.mesh = session.case, session.mesh
+        self.case = session.case
+        self.mesh = session.mesh
         self.put(table)
         self._show_status("")
         self.job.start(self.case, self.mesh, table)

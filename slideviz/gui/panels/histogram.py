@@ -248,7 +248,8 @@ class HistogramPanel(Panel):
             return
         # The bar of the inverted cells is left of the first value: a range that lies there
         # selects them only, and one that begins there begins at 0.
-        (low, high), left = band, first_value(self.canvas.figure.axes[0])
+        low, high = band
+        left = first_value(self.canvas.figure.axes[0])
         if low < left:
             low = 0.0
         self._pending_range = ONLY_INVERTED if high < left else (low, high)

@@ -212,11 +212,13 @@ class MethodPanel(Panel):
         self._reduction: Reduction | None = None
         self.area = PanelScroll(QWidget())
         in_column(self.area, on=self)
-        self.form, self.more = KeyForm("main"), MoreSettings()
+        self.form = KeyForm("main")
+        self.more = MoreSettings()
         for part in (self, self.more):
             for name, field in part.form.fields.items():
                 setattr(part, name, field)
-        self.period_hint, self.tolerance_hint = hint_label(), hint_label()
+        self.period_hint = hint_label()
+        self.tolerance_hint = hint_label()
         self.idle_reasons = hint_label()
         self.tolerance_warning = hint_label()
         set_style(self.tolerance_warning, "bad", True)

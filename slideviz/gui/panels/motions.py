@@ -173,7 +173,8 @@ class MotionPanel(Panel):
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
         self.editor = MotionEditor(SpanWalls(store))
-        self.editor.centroid_of, self.editor.chord_of = self._centroid, self._chord
+        self.editor.centroid_of = self._centroid
+        self.editor.chord_of = self._chord
         self.editor.changed.connect(self._edited)
         self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
@@ -239,7 +240,8 @@ class MotionPanel(Panel):
                 self.list.item(row).setText(text)
                 self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
-        self.editor.machine, self.editor.boxes = machine_axis(session), box_names(session)
+        self.editor.machine = machine_axis(session)
+        self.editor.boxes = box_names(session)
         self.editor.straight = session.case.ffd_system == "CARTESIAN"
         self._sync_editor(session)
         self._sync_buttons(session, moving)
@@ -247,7 +249,8 @@ class MotionPanel(Panel):
     def _set_mesh(self, session: Session) -> None:
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         mesh = session.mesh
-        self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
+        self._mesh = mesh
+        self._extent = mesh.extent if mesh is not None else 0.0
         for kind in (kind for kind in KINDS if kind.only_3d):  # as in the editor
             self.add_actions[kind].setEnabled(mesh is None or mesh.dim == 3)
         self.editor.set_extent(self._extent)

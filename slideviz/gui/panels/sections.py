@@ -110,7 +110,8 @@ class SectionEditor(QWidget):
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         grow_fields(form)
-        self.axis_name, self.place_name = QLabel("Normal"), QLabel("Position")
+        self.axis_name = QLabel("Normal")
+        self.place_name = QLabel("Position")
         # One width for all words, so that the fields do not jump.
         self.axis_name.setMinimumWidth(self.fontMetrics().horizontalAdvance("Position"))
         axis = in_row(self.axis, self.whole, wide=[self.axis], spacing=6)
@@ -143,7 +144,8 @@ class SectionEditor(QWidget):
         if section is None or mesh is None:
             return
         if mesh is not self._mesh:
-            self._mesh, self._points = mesh, section_cuts.cell_points(mesh)
+            self._mesh = mesh
+            self._points = section_cuts.cell_points(mesh)
         terms = section.shape.terms
         flat = mesh.dim == 2
         # A circle's axis is always z, and that of a span the machine's.
@@ -182,9 +184,10 @@ class SectionEditor(QWidget):
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
             assert self._points is not None
-            self._span_of, self._span = key, section_cuts.position_range(section, self._points)
+            self._span = section_cuts.position_range(section, self._points)
+            self._span_of = key
         value = section.shape.position(section)
-        (low, high) = self._span
+        low, high = self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
             return  # the user is moving the slider
@@ -324,7 +327,8 @@ class SectionsPanel(Panel):
         self.walls = SpanWalls(self.store)
 
     def _make_tools(self) -> None:
-        self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
+        self.handle = check_box("Handle", "")
+        self.flat = check_box("Flat view", "")
         self.handle.clicked.connect(lambda on: self.store.change(changes.show_handle, on))
         views = self.services.section_views
         self.flat.clicked.connect(views.want_flat)
@@ -351,7 +355,8 @@ class SectionsPanel(Panel):
         add: list[Part] = [in_row(*rows[0], None, self.remove, spacing=5)]
         add += [in_row(*row, None, spacing=5) for row in rows[1:]]
         tools = (self.handle, self.flat, None, self.look, self.picture)
-        self.tools, self.rest = as_widget(in_row(*tools, spacing=5)), QWidget()
+        self.tools = as_widget(in_row(*tools, spacing=5))
+        self.rest = QWidget()
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         parts = (*add, self.hint, self.list, self.editor, self.walls, self.tools, self.rest)
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))

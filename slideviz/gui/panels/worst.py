@@ -136,7 +136,8 @@ class WorstPanel(Panel):
     def _fill(self, session: Session) -> None:
         if session.frame is None or self._key(session) == self._listed_key:
             return
-        self._listed_key, self._last = self._key(session), time.monotonic()
+        self._listed_key = self._key(session)
+        self._last = time.monotonic()
         at = session.frames.index(session.frame)
         what = measure(session.view.color_by)
         worst = worst_cells(session.frames, at, what)

@@ -202,7 +202,8 @@ class WorstModel(QAbstractTableModel):
         return f"{value:.{self._figures[axis]}g}"
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
-        self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
+        self._by = column
+        self._down = order == Qt.SortOrder.DescendingOrder
         self.beginResetModel()
         self._sort_rows()
         self.endResetModel()

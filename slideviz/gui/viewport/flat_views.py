@@ -301,14 +301,16 @@ class CurveView(QWidget):
         in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
         self._made = CurveRows()
         self.rows: tuple[CurveRow, ...] = ()
-        self._labels, self._colors = ("", ""), Colors()
+        self._labels = ("", "")
+        self._colors = Colors()
         self.set_scheme(scheme)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
         """Show the curves along a section, given each view's session and cuts, the first first."""
         session, cuts = shown[0]
         self.rows = self._made.of(shown, section)
-        self._labels, self._colors = labels_of(session, section), colors_of(session)
+        self._labels = labels_of(session, section)
+        self._colors = colors_of(session)
         self.title.set_text(section.describe(2))
         facts = facts_of(session, cuts, section)
         self.facts.setText(facts)
@@ -368,7 +370,8 @@ class FlatView(QWidget):
         self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.view.set_flat(True)
         self.scene = FlatScene(self.view, cuts, scheme)
-        self.across, self.upright = Ruler(False), Ruler(True)
+        self.across = Ruler(False)
+        self.upright = Ruler(True)
         self._partner: FlatView | None = None
         self._fitted: tuple[object, ...] = ()
         self._ranges: tuple[object, ...] = ()

@@ -210,7 +210,8 @@ class SectionViews(QSplitter):
     def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:
         super().__init__(Qt.Orientation.Vertical, parent)
         self.setChildrenCollapsible(False)
-        self.viewing, self.store = viewing, viewing.store
+        self.viewing = viewing
+        self.store = viewing.store
         self.addWidget(viewing)
         self._multi_samples = multi_samples
         self.handles = Handles(self._replaced, self.store.set_dragging)
@@ -373,7 +374,8 @@ def arrangement_for(extent: tuple[float, float], available: tuple[int, int]) -> 
     ``extent`` (float, float): width and height of the section, in the mesh's length unit.
     ``available`` (int, int): width and height of the 3D view and the flat view together, in pixels.
     """
-    (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(available, 1)
+    wide, high = np.maximum(extent, 1e-300)
+    width, height = np.maximum(available, 1)
     beside_scale = min(_SHARE * width / wide, height / high)
     below_scale = min(width / wide, _SHARE * height / high)
     if width >= BESIDE_PX and below_scale < _LONG * beside_scale:

@@ -113,7 +113,8 @@ class CameraLink:
     def __init__(self, views: tuple[View3D, View3D], scenes: tuple[Scene, Scene]) -> None:
         self._following = False
         self._tags = []
-        scenes[0].camera.beside, scenes[1].camera.beside = scenes[1].camera, scenes[0].camera
+        scenes[0].camera.beside = scenes[1].camera
+        scenes[1].camera.beside = scenes[0].camera
         self._scenes = scenes
         for leader, follower, view in (
             (scenes[0], scenes[1], views[1]),

@@ -196,7 +196,8 @@ class PlotCanvas(QWidget):
 
     def wipe(self) -> None:
         """Show “Drawing…” instead of the image until the next one, as it is of another plot."""
-        self.wiped, self._before = True, self._coming
+        self.wiped = True
+        self._before = self._coming
         self.update()
 
     def _least_interval_ms(self) -> float:

@@ -85,8 +85,11 @@ class SpanCurveField(QWidget):
         points = tuple(zip(motion.spans, motion.values, strict=True))
         if self._motion is None or len(points) != len(self._points):
             self._at = len(points) - 1
-        self._motion, self._points, term = motion, points, SPAN_KINDS[motion.kind]
-        self._neutral, self._unit = term.neutral, term.unit if term.unit == "°" else ""
+        self._motion = motion
+        self._points = points
+        term = SPAN_KINDS[motion.kind]
+        self._neutral = term.neutral
+        self._unit = term.unit if term.unit == "°" else ""
         self._least = RANGES[term.unit] * (self._extent if term.unit == "length" else 1.0)
         self._refit()
 
@@ -133,14 +136,14 @@ class SpanCurveField(QWidget):
     def place(self, span: float, value: float) -> QPointF:
         """Return where in the widget a span and a value are."""
         axes = self._axes()
-        (low, high) = self._range
+        low, high = self._range
         right = axes.left() + axes.width() * (value - low) / (high - low)
         return QPointF(right, axes.bottom() - axes.height() * span)
 
     def _under(self, at: QPointF) -> tuple[float, float]:
         """Return span and value at a place, the value in round steps."""
         axes = self._axes()
-        (low, high) = self._range
+        low, high = self._range
         value = low + (high - low) * (at.x() - axes.left()) / max(axes.width(), 1.0)
         span = (axes.bottom() - at.y()) / max(axes.height(), 1.0)
         return min(max(round(span, 2), 0.0), 1.0), self._rounded(value)
@@ -204,7 +207,8 @@ class SpanCurveField(QWidget):
         gaps = [self.place(*point) - event.position() for point in self._points]
         away = [np.hypot(gap.x(), gap.y()) for gap in gaps]
         if min(away) <= REACH:
-            self._at, self._before = int(np.argmin(away)), self._points
+            self._at = int(np.argmin(away))
+            self._before = self._points
             self.dragging.emit(True)
             self._describe()
 

@@ -88,7 +88,8 @@ class Memory:
             full = len(self) == CORRECTIONS
             k = self._order[0] if full else len(self)
             self._order = np.append(self._order[1:] if full else self._order, k)
-            self._steps[k], self._changes[k] = step.ravel(), change.ravel()
+            self._steps[k] = step.ravel()
+            self._changes[k] = change.ravel()
             self._products[k] = product
             self._scale = product / dot(change.ravel(), self._precondition(change).ravel())
 

@@ -55,7 +55,8 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     ``at`` (m, n, d): corner points of the target of each. ``signs`` (m,): 1, or -1 for a target
     that is numbered the other way round.
     """
-    (m, _, d), table = at.shape, CORNERS[vtk]
+    m, _, d = at.shape
+    table = CORNERS[vtk]
     found = coefficients(vtk, at.T) * signs
     edges = at[:, table[:, 1:]] - at[:, table[:, :1]]
     gram = edges @ np.swapaxes(edges, 2, 3)
@@ -195,7 +196,8 @@ def write_energy(  # type: ignore[no-untyped-def]
             _pull_squares(at, table[k], shapes[k], count, weight, slope)
         pull_proof(vtk, at, table, count, pull, none, slope)
         for c in range(count):
-            values[first + c], least[first + c] = value[c], lowest[c]
+            values[first + c] = value[c]
+            least[first + c] = lowest[c]
             for j in range(n):
                 for axis in range(d):
                     slopes[first + c, j, axis] = slope[axis, j, c]

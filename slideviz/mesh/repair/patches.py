@@ -110,7 +110,8 @@ class Patch:
         self._begins = begins
         self._slopes = np.empty((len(self._flat), points.shape[1]))
         sizes = [len(part.nodes) for part in parts]
-        self.values, self.least = np.empty(sum(sizes)), np.empty(sum(sizes))
+        self.values = np.empty(sum(sizes))
+        self.least = np.empty(sum(sizes))
         self._chunks = []
         first = 0
         entry = 0

@@ -293,7 +293,8 @@ class _Rounds:
         if more and not lowest > WORTH * before:
             return False
         order = np.argsort(every)
-        self.cells, self.ratings = every[order], now[order]
+        self.cells = every[order]
+        self.ratings = now[order]
         return True
 
 
@@ -391,7 +392,8 @@ class _Mending:
             tables[vtk] = local[rank]
             order.append(cells[some[rank]])
         ids = np.concatenate(order)
-        self.signs, self.sums = work.signs[ids], work.sums[ids]
+        self.signs = work.signs[ids]
+        self.sums = work.sums[ids]
         length = _local_lengths(work.mesh.points[self.nodes], tables)
         self.parts = []
         for (vtk, local), some in zip(tables.items(), order, strict=True):
