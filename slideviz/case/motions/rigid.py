@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -84,8 +84,31 @@ class Translate(Motion):
         return np.broadcast_to(np.array(self.vector, np.float64), points.shape)
 
 
+class _AboutPoint(Motion):
+    """A motion about a point; where that is the centroid, several markers have one in common."""
+
+    point: Point
+
+    depends_on_place = True
+    stays_at: ClassVar[tuple[str, ...]] = ("centroid", "point")
+
+    def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
+        if self.point != "centroid":
+            said = f"the point has {len(self.point)} coordinates"
+            yield from require_dimension(len(self.point), mesh.dim, said)
+
+    def as_one(self, points: FloatArray) -> Motion:
+        if self.point != "centroid":
+            return self
+        return replace(self, point=tuple(points.mean(axis=0).tolist()))
+
+    @property
+    def joins_zones(self) -> bool:
+        return self.point == "centroid"
+
+
 @dataclass(frozen=True)
-class Rotate(Motion):
+class Rotate(_AboutPoint):
     """Rotate a marker by ``angle_deg`` about an axis through ``point`` (right-handed; any length).
 
     In 2D the axis is z: positive angles turn counter-clockwise. Several markers have one common
@@ -105,9 +128,7 @@ class Rotate(Motion):
         "(BLADE, rotate, degrees, AXIS, centroid)      AXIS: x, y, z or three numbers",
         "(BLADE, rotate, degrees, AXIS, px, py, pz)",
     )
-    depends_on_place = True
     rows = ("angle",)
-    stays_at = ("centroid", "point")
     proportional = ("angle_deg",)
 
     @classmethod
@@ -153,7 +174,7 @@ class Rotate(Motion):
         return f"rotate {self.angle_deg:+{form}}°"
 
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
-        yield from _point_problems(self.point, mesh.dim)
+        yield from super().problems(case, mesh, place)
         yield from _axis_problems(self.axis, mesh.dim)
 
     def change(
@@ -161,19 +182,12 @@ class Rotate(Motion):
     ) -> FloatArray:
         return rotated(points - _centre(self.point, points), self.angle_deg, self.axis)
 
-    def as_one(self, points: FloatArray) -> Motion:
-        return replace(self, point=_common(self.point, points))
-
-    @property
-    def joins_zones(self) -> bool:
-        return self.point == "centroid"
-
     def turned(self, part: float) -> Motion:
         return replace(self, angle_deg=part * self.angle_deg)
 
 
 @dataclass(frozen=True)
-class Scale(Motion):
+class Scale(_AboutPoint):
     """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
 
     marker: Target
@@ -186,9 +200,7 @@ class Scale(Motion):
         "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
         "(BLADE, scale, FACTORS, (px, py[, pz]))",
     )
-    depends_on_place = True
     rows = ("factors",)
-    stays_at = ("centroid", "point")
     ratios = ("factors",)
 
     @classmethod
@@ -232,7 +244,7 @@ class Scale(Motion):
         return f"scale {_factor_words(self.factors[:1] if same else self.factors, form)}"
 
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
-        yield from _point_problems(self.point, mesh.dim)
+        yield from super().problems(case, mesh, place)
         count = len(self.factors)
         if count not in (1, mesh.dim):
             yield (
@@ -246,16 +258,9 @@ class Scale(Motion):
         arm = points - _centre(self.point, points)
         return arm * (np.array(self.factors, np.float64) - 1.0)
 
-    def as_one(self, points: FloatArray) -> Motion:
-        return replace(self, point=_common(self.point, points))
-
-    @property
-    def joins_zones(self) -> bool:
-        return self.point == "centroid"
-
 
 @dataclass(frozen=True)
-class Radial(Motion):
+class Radial(_AboutPoint):
     """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
 
     ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``; in 2D it
@@ -273,7 +278,6 @@ class Radial(Motion):
     grammar = (
         "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  r becomes FACTOR r + dr; 2D: no AXIS",
     )
-    depends_on_place = True
     rows = ("percent", "distance")
     stays_at = ("point",)
     proportional = ("distance",)
@@ -317,7 +321,7 @@ class Radial(Motion):
         return " and ".join(parts)
 
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
-        yield from _point_problems(self.point, mesh.dim)
+        yield from super().problems(case, mesh, place)
         yield from _axis_problems(self.axis, mesh.dim)
 
     def change(
@@ -362,11 +366,6 @@ def _centre(point: Point, points: FloatArray) -> FloatArray:
     return np.array(point)
 
 
-def _common(point: Point, points: FloatArray) -> Point:
-    """Return the point about which several markers move as one body, at ``points`` (k, d)."""
-    return tuple(points.mean(axis=0).tolist()) if point == "centroid" else point
-
-
 def _is_centroid(word: Word) -> bool:
     return not word.quoted and word.text.lower() == "centroid"
 
@@ -377,11 +376,6 @@ def _point_text(point: Point) -> str:
 
 def _factor_words(values: tuple[float, ...], form: str = ".4g") -> str:
     return " × ".join(format(value, form) for value in values)
-
-
-def _point_problems(point: Point, dim: int) -> Iterator[str]:
-    if point != "centroid":
-        yield from require_dimension(len(point), dim, f"the point has {len(point)} coordinates")
 
 
 def _axis_problems(axis: tuple[float, float, float], dim: int) -> Iterator[str]:
