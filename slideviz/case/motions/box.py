@@ -161,16 +161,16 @@ class Ffd(BoxMotion):
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
         items = without_brackets(words)
-        name = items[0].text if items else ""
-        if len(items) not in (5, 7) or not name:
-            raise CaseError(
-                "expected the box, the control point i, j, k (-1 is all of a direction) and its "
-                "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
-            )
+        _require_words(
+            items,
+            (5, 7),
+            "the control point i, j, k (-1 is all of a direction) and its shift: "
+            "ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do",
+        )
         count = (len(items) - 1) // 2
         i, j, k = (*_integers(items[1 : 1 + count]), -1)[:3]
         dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
-        return cls(marker, name, (i, j, k), (dx, dy, dz))
+        return cls(marker, items[0].text, (i, j, k), (dx, dy, dz))
 
     @classmethod
     def new(cls, marker: Target, start: NewMotion) -> Motion:
@@ -214,14 +214,15 @@ class _Column(BoxMotion):
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
         items = without_brackets(words)
-        name = items[0].text if items else ""
-        if len(items) not in (3, 4) or not name:
-            raise CaseError(
-                "expected the box, the column of control points i, j (-1 is all of a direction) "
-                f"and the amount: {verb}, BOX, 2, 1, 0.01; in 2D {verb}, BOX, 2, 0.01"
-            )
+        _require_words(
+            items,
+            (3, 4),
+            "the column of control points i, j (-1 is all of a direction) and the amount: "
+            f"{verb}, BOX, 2, 1, 0.01; in 2D {verb}, BOX, 2, 0.01",
+        )
         i, j = (*_integers(items[1:-1]), -1)[:2]
-        return cls(marker, name, (i, j), number(items[-1].text))  # type: ignore[call-arg]
+        amount = number(items[-1].text)
+        return cls(marker, items[0].text, (i, j), amount)  # type: ignore[call-arg]
 
     @classmethod
     def new(cls, marker: Target, start: NewMotion) -> Motion:
@@ -327,12 +328,12 @@ class FfdTwist(BoxMotion):
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
         items = without_brackets(words)
         n_axis = axis_length(items, 3, 0)
-        if len(items) != 6 + n_axis or not items[0].text:
-            raise CaseError(
-                "expected the box, the plane j of control points (-1 is all), the angle in "
-                "degrees, the axis (x, y, z or three numbers) and a point on it: ffd-twist, BOX, "
-                "2, 5.0, y, 0.25, 0, 0"
-            )
+        _require_words(
+            items,
+            (6 + n_axis,),
+            "the plane j of control points (-1 is all), the angle in degrees, the axis (x, y, z or "
+            "three numbers) and a point on it: ffd-twist, BOX, 2, 5.0, y, 0.25, 0, 0",
+        )
         (plane,) = _integers(items[1:2])
         axis = read_axis(items[3 : 3 + n_axis])
         point = read_vector(items[3 + n_axis :], "the point")
@@ -376,6 +377,12 @@ class FfdTwist(BoxMotion):
                 f"ffd-twist turns control points in x, y and z, and FFD_COORD_SYSTEM is "
                 f"{case.ffd_system}; move them along θ with ffd"
             )
+
+
+def _require_words(items: list[Word], counts: tuple[int, ...], after_box: str) -> None:
+    """Raise CaseError where the name of a box and what follows it are not in one of the counts."""
+    if len(items) not in counts or not items[0].text:
+        raise CaseError(f"expected the box, {after_box}")
 
 
 def _across(dim: int) -> int:
