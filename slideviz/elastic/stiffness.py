@@ -371,16 +371,22 @@ def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
 def shape_gradients(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
     """Write grad N_a (a, d) at integration point q of element e to ``slopes``; return |det J| w."""
     points, nodes, gradients, weights = elements
-    n, d = x.shape
     _gather(points, nodes, e, x)
     size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
+    _slopes(gradients[q], inverse, slopes)
+    return size
+
+
+@njit(**OPTIONS)
+def _slopes(gradients, inverse, slopes):  # type: ignore[no-untyped-def]
+    """Write grad N_a to ``slopes`` (a, d), from that in the reference element."""
+    n, d = slopes.shape
     for a in range(n):
         for i in range(d):
             total = 0.0
             for j in range(d):
-                total += inverse[i, j] * gradients[q, a, j]
+                total += inverse[i, j] * gradients[a, j]
             slopes[a, i] = total
-    return size
 
 
 @njit(**OPTIONS)
@@ -402,17 +408,13 @@ def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-
     Returns False for an element without volume. ``inverse`` and ``g`` are scratch.
     """
     n, d = x.shape
+    slopes = g.reshape(n, d)
     m[:] = 0.0
     for q in range(len(weights)):
         size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
         if not size > 0.0:
             return False
-        for a in range(n):
-            for i in range(d):
-                total = 0.0
-                for j in range(d):
-                    total += inverse[i, j] * gradients[q, a, j]
-                g[a * d + i] = total
+        _slopes(gradients[q], inverse, slopes)
         for row in range(n * d):
             scaled = size * g[row]
             for column in range(n * d):
@@ -499,11 +501,8 @@ def add_forces(elements, modulus, lame, moved, out):  # type: ignore[no-untyped-
         for q in range(len(weights)):
             size = modulus[e] * abs(_jacobian(x, gradients, q, inverse)) * weights[q]
             g[:] = 0.0
+            _slopes(gradients[q], inverse, slopes)
             for a in range(n):
-                for i in range(d):
-                    slopes[a, i] = 0.0
-                    for j in range(d):
-                        slopes[a, i] += inverse[i, j] * gradients[q, a, j]
                 for i in range(d):
                     for j in range(d):
                         g[i, j] += (y[a, i] - y[0, i]) * slopes[a, j]
