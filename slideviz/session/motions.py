@@ -16,7 +16,6 @@ from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, moved_together, placed_displacements
-from slideviz.case.motions.box import BoxMotion
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.kinds import IN_ZONES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
@@ -225,7 +224,6 @@ def with_new_box(session: Session, index: int) -> Case:
     mesh = session.mesh
     assert mesh is not None
     motion = case.motions[index]
-    assert isinstance(motion, BoxMotion)
     names = named(motion.marker) or case.markers_with("moving")
     points = mesh.points[np.unique(np.concatenate([mesh.marker(n).nodes for n in names]))]
     low = points.min(axis=0)

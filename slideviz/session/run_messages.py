@@ -10,7 +10,6 @@ import numpy as np
 
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
-from slideviz.case.motions.box import BoxMotion
 from slideviz.case.motions.motion import applies_to
 from slideviz.case.words import counted
 from slideviz.errors import Note
@@ -208,7 +207,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
             "A motion lacks its box: choose one, or make a new one.", "motion", motion=place
         )
         for place, motion in enumerate(case.motions)
-        if isinstance(motion, BoxMotion) and not motion.box
+        if motion.incomplete()
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
         requirements.append(
