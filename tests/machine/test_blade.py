@@ -36,7 +36,9 @@ curves = st.lists(
 def test_curves_are_those_of_scipy_and_constant_beyond_their_ends(points):
     x, y = points.T
     value, slope = curve_at(x, y, AT)
-    assert value == pytest.approx(PchipInterpolator(x, y)(np.clip(AT, x[0], x[-1])), abs=1e-12)
+    with np.errstate(over="ignore"):  # in SciPy, where values are close to the smallest number
+        expected = PchipInterpolator(x, y)(np.clip(AT, x[0], x[-1]))
+    assert value == pytest.approx(expected, abs=1e-12)
     assert value.min() >= y.min() - 1e-12
     assert value.max() <= y.max() + 1e-12
     assert slope.sum(axis=1) == pytest.approx(1.0, abs=1e-9)  # raised as a whole
