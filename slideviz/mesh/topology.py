@@ -5,7 +5,8 @@ A *facet* is one element of a marker.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,6 +45,22 @@ class Boundary:
     def nodes(self) -> IntArray:
         """Return the boundary nodes, sorted: (b,)."""
         return frozen_array(sorted_nodes(self.facets), np.int64)
+
+    def around(self, markers: Collection[str]) -> Boundary:
+        """Return the facets of markers, and those of others that share a node with them."""
+        wanted = np.isin(self.marker, [self.names.index(name) for name in markers])
+        near = np.zeros(int(self.facets.max(initial=-1)) + 1, bool)
+        near[self.facets[wanted]] = True
+        kept = np.asarray(near[self.facets].any(axis=1))
+        joints = kept[self.joints].all(axis=1)
+        return replace(
+            self,
+            facets=frozen_array(self.facets[kept], np.int64),
+            marker=frozen_array(self.marker[kept], np.int64),
+            owner=frozen_array(self.owner[kept], np.int64),
+            joints=frozen_array((np.cumsum(kept) - 1)[self.joints[joints]], np.int64),
+            joint_nodes=frozen_array(self.joint_nodes[joints], np.int64),
+        )
 
 
 def find_boundary(mesh: Mesh) -> Boundary:

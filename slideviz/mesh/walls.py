@@ -36,6 +36,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.argument_types import check_types
+from slideviz.errors import MeshError
 from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
@@ -59,9 +60,10 @@ for _row in ELEMENTS.values():
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """The columns of nodes that leave the boundaries of a mesh, and facets that have none."""
+    """The columns of nodes that leave boundaries of a mesh, and facets that have none."""
 
-    boundary: Boundary
+    boundary: Boundary  # the facets of ``markers``, and those that share nodes with them
+    markers: tuple[str, ...]  # the boundaries whose columns are all here
     nodes: IntArray
     """(c, k + 1): the nodes of each column, the first one on the boundary; -1 beyond its end."""
     corner: IntArray
@@ -110,12 +112,16 @@ class Columns:
 
 
 @check_types
-def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
-    """Return the columns of at most ``layers`` layers that leave all boundaries of a mesh.
+def find_columns(
+    mesh: Mesh, layers: int = LAYERS, markers: tuple[str, ...] | None = None
+) -> Columns:
+    """Return the columns of at most ``layers`` layers that leave ``markers``; None: all.
 
     Raises MeshError if a marker element is no side of any cell.
     """
     boundary = boundary_of(mesh)
+    if markers is not None and set(markers) != set(boundary.names):
+        boundary = boundary.around(markers)
     cells = mesh.cells
     facets = boundary.facets
     owner = boundary.owner
@@ -149,7 +155,8 @@ def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
     corner = np.empty(facets.shape, np.int64)
     corner[deep] = number.reshape(-1, facets.shape[1])
     corner[bare] = len(nodes) + np.arange(len(bare))[:, None]
-    return Columns(boundary, *(sealed(x) for x in (nodes, corner, depth, bare, off[bare])))
+    parts = (sealed(x) for x in (nodes, corner, depth, bare, off[bare]))
+    return Columns(boundary, markers or boundary.names, *parts)
 
 
 @njit(nogil=True, cache=True)
@@ -169,6 +176,7 @@ def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type
     lead only through cells of the mask ``use`` (m,).
     """
     types, offsets, connectivity = cells
+    stride = np.zeros(chain.shape[2], np.int64)
     for f in range(len(facets)):
         width = facets.shape[1]
         if width == 4 and facets[f, 2] == facets[f, 3]:
@@ -181,9 +189,13 @@ def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type
                 break
             depth[f] = layer + 1
             side = chain[f, :width, layer + 1]
-            cell = _neighbour(side, cell, offsets, connectivity, *around, use)
-            if cell < 0:
-                break
+            beyond = cell + stride[layer]  # as of the facet before, where cells are in rows
+            if not _is_beyond(side, cell, beyond, offsets, connectivity, use):
+                beyond = _neighbour(side, cell, offsets, connectivity, *around, use)
+                if beyond < 0:
+                    break
+                stride[layer] = beyond - cell
+            cell = beyond
         if depth[f] == 0:
             count = 0
             for k in range(offsets[owner[f]], offsets[owner[f] + 1]):
@@ -222,16 +234,23 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
 def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type: ignore[no-untyped-def]
     """Return the cell of ``use`` beyond a side (w,) of ``cell``, -1 if there is none."""
     for at in range(begin[side[0]], begin[side[0] + 1]):
-        other = cells_at[at]
-        nodes = connectivity[offsets[other] : offsets[other + 1]]
-        # Few cells have the opposite corner of the side, too.
-        if other != cell and use[other] and _has(nodes, side[len(side) // 2]):
-            shared = 0
-            for node in nodes:
-                shared += _has(side, node)
-            if shared == len(side):
-                return np.int64(other)
+        if _is_beyond(side, cell, np.int64(cells_at[at]), offsets, connectivity, use):
+            return np.int64(cells_at[at])
     return np.int64(-1)
+
+
+@njit(nogil=True, cache=True)
+def _is_beyond(side, cell, other, offsets, connectivity, use):  # type: ignore[no-untyped-def]
+    """Return whether ``other`` is a cell of ``use`` that has a side (w,) of ``cell``, too."""
+    if other == cell or not 0 <= other < len(use) or not use[other]:
+        return False
+    nodes = connectivity[offsets[other] : offsets[other + 1]]
+    if not _has(nodes, side[len(side) // 2]):  # few cells have the opposite corner, too
+        return False
+    shared = 0
+    for node in nodes:
+        shared += _has(side, node)
+    return shared == len(side)
 
 
 VALUES = ("first_height", "growth", "equal_layers", "wall_angle")
@@ -303,14 +322,24 @@ class Walls:
     before: dict[str, FloatArray] | None
     """The `VALUES` of the reference."""
     layered: frozenset[str]
-    """The boundaries with layers: most of their facets have a stack of flat cells."""
+    """Those of the measured boundaries with layers: most of their facets have a stack of flat
+    cells."""
     markers: tuple[str, ...]
     """The boundaries that `summary` reports."""
     n_cells: int
     """Number of cells of the mesh."""
 
     def of(self, markers: Sequence[str]) -> Walls:
-        """Return the same for other boundaries to be reported."""
+        """Return the same with some of the boundaries that were measured to be reported.
+
+        Raises MeshError for another one.
+        """
+        others = [name for name in markers if name not in self.columns.markers]
+        if others:
+            raise MeshError(
+                f"the walls at {', '.join(others)} were not measured, but those at "
+                f"{', '.join(self.columns.markers)}; give all of them to walls(mesh, markers=...)"
+            )
         return replace(self, markers=tuple(markers))
 
     def with_layers(self) -> Walls:
@@ -424,17 +453,17 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
 
 
 @weak_cache
-def _columns_of(mesh: Mesh) -> tuple[Columns, frozenset[str]]:
-    """Return the columns of a mesh, and the boundaries with layers."""
-    columns = find_columns(mesh)
+def _columns_of(mesh: Mesh, markers: tuple[str, ...]) -> tuple[Columns, frozenset[str]]:
+    """Return the columns at boundaries of a mesh, and those of the boundaries with layers."""
+    columns = find_columns(mesh, markers=markers)
     boundary = columns.boundary
     flat = columns.stack_thickness(mesh.points, 1) > 0
-    names = (
-        name
-        for k, name in enumerate(boundary.names)
-        if 2 * np.count_nonzero(flat[boundary.marker == k]) > (boundary.marker == k).sum()
-    )
-    return columns, frozenset(names)
+    layered = set()
+    for name in markers:
+        member = boundary.marker == boundary.names.index(name)
+        if 2 * np.count_nonzero(flat[member]) > np.count_nonzero(member):
+            layered.add(name)
+    return columns, frozenset(layered)
 
 
 @check_types
@@ -448,7 +477,7 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     reference : Mesh, optional
         The undeformed mesh, with the same cells, to compare with.
     markers : sequence of str, optional
-        The boundaries that are reported; all by default.
+        The boundaries that are measured; all by default.
 
     Raises
     ------
@@ -473,11 +502,11 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     >>> sv.walls(moved, reference=mesh).summary()["lower"]["first_height"]["ratio"]["mean"]
     0.5
     """
-    columns, layered = _columns_of(
-        mesh if reference is None else checked_reference(reference, mesh)
-    )
-    for name in markers or ():
+    base = mesh if reference is None else checked_reference(reference, mesh)
+    chosen = mesh.marker_names if markers is None else tuple(markers)
+    for name in chosen:
         mesh.marker(name)
+    columns, layered = _columns_of(base, chosen)
     after = measure_walls(columns, mesh.points)
     before = None
     if reference is not None:
@@ -485,5 +514,4 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
         with np.errstate(all="ignore"):
             after["height_ratio"] = sealed(after["first_height"] / before["first_height"])
         after["angle_change"] = sealed(np.abs(after["wall_angle"] - before["wall_angle"]))
-    chosen = mesh.marker_names if markers is None else tuple(markers)
     return Walls(columns, after, before, layered, chosen, len(mesh.cells))

@@ -310,7 +310,7 @@ def _precompute(frame: StepFrame) -> None:
 def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
     """Return the layers at boundaries; None where a boundary is no side of the cells."""
     try:
-        return walls(mesh, undeformed, names)
+        return walls(mesh, undeformed).of(names)  # of others where roles change
     except MeshError:
         return None
 

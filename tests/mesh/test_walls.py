@@ -62,6 +62,29 @@ def test_numbers_of_curved_walls(mesh):
     check(bent(mesh))
 
 
+@pytest.mark.parametrize(
+    "mesh",
+    [airfoil(16), sphere_in_box(), layered_cylinder(4, 12, 0.01), bent(cube(6, "mixed"))],
+    ids=["airfoil", "sphere", "cylinder", "mixed"],
+)
+def test_numbers_do_not_depend_on_which_boundaries_are_measured(mesh):
+    moved = bent(mesh)
+    every = sv.walls(moved, mesh)
+    names = mesh.marker_names
+    for some in (*((name,) for name in names), names[1:]):
+        found = sv.walls(moved, mesh, some)
+        assert found.summary() == every.of(some).summary()
+        assert found.layered == every.layered & set(some)
+        for number in found.values:
+            np.testing.assert_array_equal(found.at_cells(number), every.of(some).at_cells(number))
+
+
+def test_boundaries_that_were_not_measured_are_not_reported():
+    mesh = grid((4, 4))
+    with pytest.raises(MeshError, match="y_p were not measured, but those at y_m"):
+        sv.walls(mesh, markers=["y_m"]).of(["y_p"])
+
+
 def test_channel_by_hand():
     y = np.array([0, 0.1, 0.2005, 0.35, 0.55, 0.8, 1.0])
     mesh = grid((4, 6), place=lambda p: np.stack([p[:, 0], y[p[:, 1].astype(int)]], axis=1))
