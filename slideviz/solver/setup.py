@@ -374,8 +374,7 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 def relaxes(case: Case, mesh: Mesh) -> bool:
     """Return whether RELAX acts on a mesh."""
-    auto = case.relax == "auto" and mesh.part is None and len(mesh.cells) <= RELAXED_CELLS
-    return case.method == "rbf" and (auto or case.relax == "yes")
+    return case.relax != "no" and not _not_relaxed(case, mesh)
 
 
 def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Relaxation | None:
