@@ -300,8 +300,9 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
             "DATA_REDUCTION= YES"
         )
     pair = sorted((int(nodes[k]), int(nodes[others[k]])))
-    at = [f"{mesh.number(node)} ({', '.join(_names_at(setup, node))})" for node in pair]
-    named = " and ".join(at)
+    named = " and ".join(
+        f"{mesh.number(node)} ({', '.join(_names_at(setup, node))})" for node in pair
+    )
     return (
         f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
         "smooth function cannot follow; let the boundary that stays go along (role moving, "
