@@ -1182,6 +1182,8 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
 
 def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
     view, drawn = opened.window.view, []
+    checks = (opened.window.intersection_check, opened.window.limit_check)
+    opened.qtbot.waitUntil(lambda: not any(check.busy for check in checks))
     opened.qtbot.wait(50)
     monkeypatch.setattr(view, "update", lambda: drawn.append(1))
     for name in ("inflow", "outflow", "inflow"):
