@@ -370,11 +370,11 @@ class MotionPanel(Panel):
     def edit_table(self) -> None:
         row = self.list.currentRow()
         motion = self.store.session.case.motions[row]
-        assert isinstance(motion, FromFile)
-        path = self._ask_table(motion.marker, motion.path)
+        (before,) = motion.files
+        path = self._ask_table(motion.marker, before)
         if path is None:
             return
-        if path == motion.path:
+        if path == before:
             # The file has other rows now, but the motion is equal: change it and back, so that
             # whoever caches the file's content reads it again.
             self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
