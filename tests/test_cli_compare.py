@@ -174,7 +174,7 @@ def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_pa
     assert run(["compare", str(empty)]) == 1
     assert "MESH_FILENAME is missing" in capsys.readouterr().err
     assert run(["compare", str(square), "-o", str(square)]) == 1
-    assert "cannot be made a folder" in capsys.readouterr().err
+    assert "cannot create this folder" in capsys.readouterr().err
 
 
 def test_the_help_names_every_method(capsys):

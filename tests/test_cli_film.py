@@ -159,7 +159,7 @@ def test_a_case_without_mesh_is_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--size", "320"], "is not of the form WIDTHxHEIGHT, as 1280x800"),
+        (["--size", "320"], "is not of the form WIDTHxHEIGHT; write e.g. 1280x800"),
         (["--size", "-3x4"], "expected one argument"),
         (["--zoom", "1,2"], "is neither X,Y,WIDTH"),
         (["--zoom", "0,0,0"], "is neither X,Y,WIDTH"),

@@ -126,7 +126,7 @@ def test_a_palette_keeps_a_few_red_pixels_and_a_smooth_background(tmp_path):
 
 def test_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(SlidevizError, match="cannot be made a folder"):
+    with pytest.raises(SlidevizError, match="cannot create this folder"):
         shots.shots(tmp_path / "file" / "folder")
 
 

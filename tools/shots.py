@@ -384,7 +384,7 @@ def shots(folder: Path) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise SlidevizError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+        raise SlidevizError(f"{folder}: cannot create this folder ({problem.strerror})") from None
     with draft(Path(tempfile.gettempdir()), is_folder=True) as place, display():
         made = []
         for state in STATES:

@@ -73,7 +73,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except MemoryError:
         return _fail("out of memory; use a coarser mesh or close other programs", WRONG_INPUT)
     except BrokenPipeError:
-        # The reader of the output has ended (`slideviz info MESH | head`): that is no error.
+        # The reader of the output has ended (`slideviz info MESH | head`): that is not an error.
         return DONE
     except OSError as problem:
         text = NO_MEMORY if _NO_MEMORY.search(str(problem)) else str(problem)
@@ -171,7 +171,7 @@ def _number(variable: str) -> int:
 
 
 def _silence() -> None:
-    """Send all output of this process to the null device, that of libraries, too."""
+    """Send all output of this process, libraries included, to the null device."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     if not os.environ.get("SLIDEVIZ_DEBUG"):

@@ -1,4 +1,4 @@
-"""``slideviz compare``: one case by several methods, as table, plots and pictures."""
+"""``slideviz compare``: one case by several methods, in a table, plots and pictures."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
     call.add_argument(
         "--periodic",
         metavar="LIST",
-        help="of none,periodic,fixed,moving, or all (default: that of the case; with moving, "
-        "fixed too, for the methods that cannot move)",
+        help="of none,periodic,fixed,moving, or all (default: the mode of the case; moving adds "
+        "fixed for the methods that cannot move nodes)",
     )
     call.add_argument("--steps", metavar="LIST", help="numbers of steps, or auto (default: 1,5,20)")
     call.add_argument(

@@ -62,8 +62,9 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     assert file is not None
     if not file.exists() and (arguments.case.parent / file).exists():
         raise CaseError(
-            f"{file}: is not in the working folder, but beside {arguments.case}; paths are "
-            f"relative to the working folder, as in SU2: change to {arguments.case.parent} first"
+            f"{file}: is not in the working folder, but in the folder of {arguments.case}; paths "
+            f"are relative to the working folder, like in SU2: change to {arguments.case.parent} "
+            "first"
         )
     if not file.exists() and "MESH_FILENAME" not in config.present:
         hints = [text for text in config.case.warnings if "did you mean MESH_FILENAME?" in text]

@@ -38,7 +38,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
     config, mesh = read_configuration(arguments)
     first = config.variables[0]
     if first.group in ("boxes", "nothing"):
-        raise CaseError(f"{config.source}: {first.kind} moves nothing: there is no gradient for it")
+        raise CaseError(f"{config.source}: {first.kind} moves nothing, so it has no gradient")
     for path in sensitivity_files(config, mesh):
         arguments.inputs.setdefault(path, "the file of the sensitivities")
     sensitivities = config.files["DV_SENS_FILENAME"]

@@ -72,7 +72,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         "--designs",
         type=Path,
         metavar="TABLE",
-        help="an image for each design of a table, as of sweep, instead of the steps",
+        help="an image for each design of a table (see sweep) instead of the steps",
     )
     add_zoom(call)
     add_changes(call)
@@ -81,8 +81,8 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="show a second run beside it with this change, such as SLIDING_MODE=none; repeat it "
-        "for more changes of that run",
+        help="show a second run next to it with this change, e.g. SLIDING_MODE=none; may be "
+        "repeated",
     )
     add_shared(call, "zone", "quiet")
     call.add_argument("--force", action="store_true", help="replace files that exist")
@@ -138,7 +138,7 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Ru
     if not arguments.beside:
         return first, [Run(1, case, _frames(arguments, case, mesh), "done")]
     if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
-        raise CaseError("--beside: two runs beside each other must deform the same mesh")
+        raise CaseError("--beside: two runs side by side must deform the same mesh")
     keys = [text.partition("=")[0].strip().upper() for text in arguments.beside]
     runs = [
         Run(number, one, _frames(arguments, one, mesh), "done", name=_words(one, keys))
@@ -210,7 +210,7 @@ def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: 
     pace = film_options.pace(most)
     print(f"film: {arguments.output} ({images} images, {pace:.3g} a second)")
     if most - 1 < SMOOTH and not arguments.between:
-        print("few steps; --between 20 puts 20 images between two of them")
+        print("few steps; --between 20 puts 20 images between two steps")
 
 
 def _print_inverted(arguments: argparse.Namespace, run: Run) -> bool:

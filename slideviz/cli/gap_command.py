@@ -71,7 +71,7 @@ def _gap(arguments: argparse.Namespace) -> int:
             none = "tip gaps by span are for 3D meshes"
         raise CaseError(
             f"{mesh_file}: there is one blade, which does not repeat, and {none}, so there is "
-            "nothing to measure; name boundaries by --between, as in --between SHROUD,BLADE"
+            "nothing to measure; name boundaries, e.g. --between SHROUD,BLADE"
         )
     after: tuple[Gap, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -104,7 +104,8 @@ def _gap(arguments: argparse.Namespace) -> int:
             why = (
                 "in 2D each distance is one number, not a curve; leave out -o"
                 if mesh.dim == 2
-                else "without hub and shroud distances are no curves; set SPAN, or leave out -o"
+                else "without hub and shroud there are no curves over the span; set SPAN, or leave "
+                "out -o"
             )
             raise CaseError(f"{mesh_file}: {why}")
         _draw(arguments.output, before, after)

@@ -69,7 +69,7 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "default": (),
             "metavar": "NAMES",
             "help": "other numbers too, also in a .vtu, .vtkhdf or .csv file: all, or names with "
-            "commas, as skewness,expansion,growth",
+            "commas, e.g. skewness,expansion,growth",
         },
     ),
     "force": (
@@ -282,7 +282,7 @@ def integer(text: str) -> int:
     except ValueError:
         number = 0.5
     if not number.is_integer():
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number, as 20000 or 1e8")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number; write e.g. 20000 or 1e8")
     return int(text) if text.strip().lstrip("+-").isdigit() else int(number)
 
 
@@ -290,5 +290,7 @@ def size(text: str) -> tuple[int, int]:
     """Return width and height of a text like ``1280x800``."""
     width, sign, height = text.lower().partition("x")
     if not (sign and width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, as 1280x800")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not of the form WIDTHxHEIGHT; write e.g. 1280x800"
+        )
     return int(width), int(height)

@@ -40,7 +40,7 @@ class OutputPath:
     replaced."""
     files: str = ""
     """For a folder: a regular expression for the names of the files in it; else empty."""
-    is_mesh: bool = False  # whether its ending must be that of a mesh
+    is_mesh: bool = False  # whether its ending must be one of a mesh format
     replaces: Path | None = None  # the only input file that it may overwrite
     remedy: str = ""  # the advice in the message where it is an input file
 
@@ -152,6 +152,6 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
-        raise CaseError(f"{folder}: cannot be made a folder: it is a file") from None
+        raise CaseError(f"{folder}: cannot create this folder: it is a file") from None
     except OSError as problem:
-        raise CaseError(f"{folder}: cannot be made a folder: {reason_of(problem)}") from None
+        raise CaseError(f"{folder}: cannot create this folder: {reason_of(problem)}") from None

@@ -20,9 +20,8 @@ def window(arguments: argparse.Namespace) -> int:
 
     if arguments.file is not None and not arguments.file.exists():
         raise CaseError(
-            f"{arguments.file}: there is no such file, and no such command "
-            f"(commands: {', '.join(arguments.commands)})"
-            f"{nearest(str(arguments.file), arguments.commands)}"
+            f"{arguments.file}: there is no such file or command (commands: "
+            f"{', '.join(arguments.commands)}){nearest(str(arguments.file), arguments.commands)}"
         )
     why = display_fault() if sys.platform.startswith("linux") else ""
     if why:

@@ -38,8 +38,8 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         type=checked(limits),
         default=(),
         metavar="LIMITS",
-        help='limits as of the key LIMITS, as "min > 0.3, inverted = 0": exit code 4 if one is '
-        "not met",
+        help='limits like those of the key LIMITS, e.g. "min > 0.3, inverted = 0"; exit code 4 if '
+        "one is not met",
     )
     add_shared(call, "metrics", "zone", "json")
     call.add_argument(
@@ -59,7 +59,7 @@ def limits(text: str) -> tuple[Limit, ...]:
 
     found = read_limits(text)
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} has no limit; expected one, as min > 0.3")
+        raise argparse.ArgumentTypeError(f"{text!r} has no limit; write e.g. min > 0.3")
     return found
 
 
@@ -128,7 +128,7 @@ def _require_streamed(arguments: argparse.Namespace) -> None:
         usable = [k for k, one in METRICS.items() if arguments.reference or not one.compares]
         known = ",".join(field_of(name) for name in usable if METRICS[name].alone)
         raise CaseError(
-            f"--metrics {','.join(map(field_of, several))} needs the mesh in memory, for a "
+            f"--metrics {','.join(map(field_of, several))} needs the mesh in memory, since a "
             f"stream has one cell at a time; use --metrics {known}, or leave out --stream"
         )
     require_streamed(arguments.limits)
@@ -185,7 +185,7 @@ def _report(
 def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
     """Return the boundaries without those that match and whose names say that they are periodic.
 
-    None, which means all, where there are none such or the mesh is in a file.
+    None, which means all, if there are none such or the mesh is in a file.
     """
     from slideviz.errors import MeshError
     from slideviz.mesh.periodic import find_pairs

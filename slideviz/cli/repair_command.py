@@ -27,7 +27,7 @@ def add_repair(calls: argparse._SubParsersAction) -> None:
         "--reference", type=Path, metavar="UNDEFORMED", help="undeformed mesh, with the same cells"
     )
     for role, what in (
-        ("fixed", "boundaries that stay, as those that are not named"),
+        ("fixed", "boundaries that stay; so do boundaries that are not named"),
         ("sliding", "boundaries along which nodes may slide"),
         ("periodic", "pairs of periodic boundaries, which may move alike"),
     ):
@@ -151,5 +151,5 @@ def _inverted(found: Quality) -> str:
     more = " ..." if found.inverted > len(cells) else ""
     return (
         f"{found.inverted} of {found.cells} cells are still inverted ({named}{more}); what may "
-        "help: --sliding for boundaries beside them, or another mesh of the boundary there"
+        "help: --sliding for adjacent boundaries, or remesh there"
     )

@@ -165,7 +165,7 @@ def metric_lines(
     before: Mapping[str, Any] | None = None,
     walls: Mapping[str, Any] | None = None,
 ) -> str:
-    """Return metrics of a mesh, and of the undeformed one, as text: a heading and a table.
+    """Return the metrics of a mesh and of the undeformed one: a heading and a table.
 
     ``after``, ``before``: from `metrics_report`. ``walls``: the summary of `Walls`, for those of
     ``names`` that are numbers of walls: they are of boundaries with layers.

@@ -244,7 +244,7 @@ def require_streamable(
     """Raise where ``--stream`` is given for a run that cannot be streamed.
 
     Raises CaseError or MeshError if an option or the method needs the mesh in memory, or mesh or
-    output are no SU2 meshes.
+    output is not an SU2 mesh.
     """
     if not arguments.stream:
         return

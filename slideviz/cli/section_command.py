@@ -60,8 +60,8 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         "--between",
         type=pair_of_names,
         metavar="HUB,SHROUD",
-        help="the walls of --span and --meridional; by default those of the case, or by their "
-        "names",
+        help="the walls of --span and --meridional; by default SPAN of the case, or what their "
+        "names say",
     )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(
@@ -88,7 +88,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         type=neighbours,
         metavar="N",
         default=0,
-        help="neighbouring passages to draw on each side, or wheel for all of them",
+        help="neighbouring passages to draw on each side, or wheel for all",
     )
     add(
         "--size",
@@ -345,7 +345,7 @@ def _section_and_passages(
 
 
 def _between(walls: SpanWalls | None) -> dict[str, Any]:
-    """Return hub and shroud, of several zones those of each."""
+    """Return hub and shroud of each zone with a span."""
     pairs = [[one.hub, one.shroud] for one in walls.channels] if walls is not None else []
     if not pairs:
         return {}

@@ -53,13 +53,13 @@ def plane(text: str) -> SectionArgument:
     word, sign, value = text.partition("=")
     if sign:
         if word.strip() not in AXES:
-            raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z, as in z=0.5")
+            raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z; write e.g. z=0.5")
         normal = AXES[word.strip()]
         if value.count(",") == 1:
             raise argparse.ArgumentTypeError(_comma(text, value.strip().replace(",", ".")))
-        (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
+        (at,) = _numbers(value, (1,), "a coordinate, e.g. z=0.5")
         return SectionArgument(_section("plane", [at * part for part in normal], normal))
-    values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
+    values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, e.g. z=0.5")
     half = len(values) // 2
     return SectionArgument(_section("plane", values[half:], values[:half]))
 
@@ -92,20 +92,20 @@ def section_about_axis(row: ShapeTerms, text: str) -> SectionArgument:
 
 def _comma(text: str, number: str) -> str:
     """Return the message that a comma stands in ``text`` where ``number`` has a point."""
-    return f"{text!r}: a comma separates numbers; write a decimal point, as in {number}"
+    return f"{text!r}: a comma separates numbers; write a decimal point, e.g. {number}"
 
 
 def pair_of_names(text: str) -> tuple[str, str]:
     """Return the two boundaries of a text like ``BLADE,HUB``."""
     first, _, second = map(str.strip, text.partition(","))
     if not first or not second or "," in second:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two boundaries, as BLADE,HUB")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected two boundaries, e.g. BLADE,HUB")
     return first, second
 
 
 def limits(text: str) -> tuple[float, float]:
     """Return the two numbers of a text like ``0.2,0.9``."""
-    low, high = _numbers(text, (2,), "lowest,highest, as in 0.2,0.9")
+    low, high = _numbers(text, (2,), "lowest,highest, e.g. 0.2,0.9")
     return low, high
 
 
@@ -113,12 +113,12 @@ def pixels(text: str) -> tuple[int, int]:
     """Return width and height of a text like ``1600x1000``."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
     if not match:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; write it as 1600x1000")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size; write e.g. 1600x1000")
     width = int(match[1])
     height = int(match[2])
     if not (300 <= width <= 20000 and 200 <= height <= 20000):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: pictures are 300x200 to 20000x20000 pixels large"
+            f"{text!r}: expected a size from 300x200 to 20000x20000 pixels"
         )
     return width, height
 
@@ -129,7 +129,7 @@ def neighbours(text: str) -> int | Literal["wheel"]:
         return "wheel"
     if not text.isdecimal() or int(text) > MOST_COPIES:
         raise argparse.ArgumentTypeError(
-            f"{text!r}: give a number, 0 to {MOST_COPIES}, or the word wheel"
+            f"{text!r}: expected a number from 0 to {MOST_COPIES}, or the word wheel"
         )
     return int(text)
 

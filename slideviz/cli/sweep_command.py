@@ -51,7 +51,7 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
         "--workers", type=integer, metavar="N", help="processes (default: one for each core)"
     )
     call.add_argument(
-        "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, as tcp://node1:8786"
+        "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, e.g. tcp://node1:8786"
     )
     call.add_argument("--resume", action="store_true", help="continue an interrupted sweep")
     call.add_argument(
@@ -62,7 +62,7 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
         "--time-step",
         type=float,
         metavar="DT",
-        help="of a table with a column time: meshes are numbered by time / DT, as SU2's files",
+        help="number the meshes by time / DT, like SU2's files (table with a column time)",
     )
     add_shared(
         call, "stream", help="with --meshes, for meshes larger than memory (SU2): one at a time"
@@ -137,7 +137,7 @@ def _print_columns(case: Any) -> int:
 
     numbers = numbers_of(case)
     if numbers:
-        print("numbers of the motions, and those of the case:")
+        print("numbers of the motions, and their values in the case:")
         print(table([(name, place.of(case)) for name, place in numbers.items()]))
     print("keys of the case (`slideviz keys` explains them):")
     print("  " + ", ".join(name for name, key in KEYS.items() if key.group not in (FILES, VIEW)))

@@ -50,8 +50,8 @@ def add_wheel(calls: argparse._SubParsersAction) -> None:
         "--designs",
         type=Path,
         metavar="TABLE",
-        help="motions of passages (CSV, as of `slideviz sweep`): a row for each, from the first "
-        "one on; the others move as the case says",
+        help="motions of passages (CSV, see `slideviz sweep`): one row for each passage from the "
+        "first on; the others move as the case says",
     )
     add_changes(call)
     add_shared(call, "json")
@@ -116,7 +116,7 @@ def _wheel(arguments: argparse.Namespace) -> int:
 
 
 def _numbers(made: WheelQuality) -> dict[str, object]:
-    """Return what a report has of a wheel, or of that of a zone."""
+    """Return the entry of a wheel, or of one zone's wheel, for a report."""
     left = ("path", "limits", "warnings", "zones")
     return {name: value for name, value in vars(made).items() if name not in left}
 

@@ -171,7 +171,7 @@ def section(
         Instead of ``at``: the surface of constant span, between hub (0) and shroud (1) of the
         undeformed mesh.
     between : (str, str), optional
-        Hub and shroud; by default those of the case, or by their names.
+        Hub and shroud; by default SPAN of the case, or what their names say.
     case : Case, optional
         The case with the axis of the span, and the periodic boundaries.
     rated : Quality, optional

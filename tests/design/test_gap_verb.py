@@ -150,9 +150,9 @@ def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
     roles = {"blade": "moving"}
     case.change(mesh_file=files / "full.su2", motions=(), roles=roles).write("one.cfg")
     assert run(["gap", "one.cfg"]) == 1
-    assert "so there is nothing to measure; name boundaries by --between" in capsys.readouterr().err
+    assert "nothing to measure; name boundaries, e.g. --between SHROUD" in capsys.readouterr().err
     assert run(["gap", "one.cfg", "--between", "blade"]) == 2
-    assert "'blade' is not two boundaries, as BLADE,HUB" in capsys.readouterr().err
+    assert "'blade': expected two boundaries, e.g. BLADE,HUB" in capsys.readouterr().err
     flat = sector()
     sv.write("flat.su2", flat)
     roles = {"BLOCK": "moving", "per1": "periodic", "per2": "periodic"}
@@ -164,7 +164,7 @@ def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
     names = [replace(one, name=one.name.replace("hub", "inner")) for one in bare.markers]
     sv.write("bare.su2", replace(bare, markers=tuple(names), origin=Origin()))
     assert run(["gap", "bare.cfg", "-o", "gap.png"]) == 1
-    assert "without hub and shroud distances are no curves; set SPAN" in capsys.readouterr().err
+    assert "there are no curves over the span; set SPAN" in capsys.readouterr().err
 
 
 def test_each_zone_has_the_gaps_that_it_has_alone(tmp_path, monkeypatch, capsys):

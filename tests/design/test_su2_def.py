@@ -748,7 +748,7 @@ def test_paths_are_those_of_the_working_folder(here, capsys):
     assert Path("out.su2").is_file()
     Path("mesh.su2").rename("deep/mesh.su2")
     assert run(["def", "deep/a.cfg"]) == 1
-    assert "is not in the working folder, but beside deep/a.cfg" in capsys.readouterr().err
+    assert "not in the working folder, but in the folder of deep/a.cfg" in capsys.readouterr().err
 
 
 def test_input_mesh_is_not_written_over_unasked(here, capsys):

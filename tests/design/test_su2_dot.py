@@ -451,7 +451,7 @@ def test_ffd_setting_has_no_gradient(case, capsys):
     Path("dot.cfg").write_text(HEAD + keys)
     assert run(["dot", "dot.cfg"]) == 1
     said = capsys.readouterr().err
-    assert "FFD_SETTING moves nothing: there is no gradient for it" in said
+    assert "FFD_SETTING moves nothing, so it has no gradient" in said
     assert "not needed here" not in said  # a refusal comes alone
 
 

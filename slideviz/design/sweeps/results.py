@@ -82,7 +82,7 @@ class SweepResults:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
             raise CaseError(
-                f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
+                f"{self._folder}: cannot create this folder: {reason_of(problem)}"
             ) from problem
         self._lock = lock_folder(self._folder)
         try:
