@@ -9,11 +9,12 @@ PARALLEL := -n auto --maxprocesses 4 --dist worksteal
 # A screen for the pictures of the examples; without one VTK draws off screen, and says so.
 XVFB = $(if $(shell command -v xvfb-run),xvfb-run -a)
 
+ROOM := rbf
 RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test test-all test-processors lint format docs golden smoke bench laws shots study clean
+.PHONY: help setup upgrade demo test test-all test-processors lint format docs golden smoke mutants bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -57,6 +58,9 @@ golden: setup ## record what users get, which test-all compares (PARTS="films wi
 
 smoke: setup ## build the wheel and try it outside of the clone, also without Qt and VTK
 	$(BIN)/python tools/smoke.py
+
+mutants: setup ## faults that the tests of a package do not notice (ROOM=rbf ARGS="--sample 50")
+	$(BIN)/python -m tools.mutants $(ROOM) $(ARGS)
 
 bench: setup ## measure the speed (needs a quiet machine)
 	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)
