@@ -336,14 +336,14 @@ class USMesh:
 
     # Between the orders of numbers ---------------------------------------------------------
     def _followed(self, coordinates: FloatArray) -> FloatArray:
-        """Return coordinates (N, d), with those of nodes that are no moving nodes from the grid."""
+        """Return coordinates (N, d), with those of nodes that are not moving from the grid."""
         return np.where(self._surface.held, self._points[self._surface.nodes], coordinates)
 
     def _shaped(self, values: ArrayLike) -> FloatArray:
         """Return values, flat or (N, d), as (N, d); CaseError if any is not finite."""
         out = np.asarray(values, np.float64).reshape(-1, self.deformer.mesh.dim)
         if not np.isfinite(out).all():
-            raise CaseError("values of the surface are infinite or no numbers; give numbers")
+            raise CaseError("values of the surface are not finite; give finite numbers")
         return out
 
     def _of_grid(self, values: ArrayLike, solver: bool) -> FloatArray:

@@ -166,8 +166,8 @@ def bodies(nodes: IntArray, sides: IntArray) -> list[Body]:
                 for a, b, way in ((low, high, -1), (high, low, 1)):
                     if a == now and turns.setdefault(b, turns[a] + way) != turns[a] + way:
                         raise MeshError(
-                            "the boundary meets its own image one period on, so it is no blade; "
-                            "name blades only"
+                            "the boundary continues through the periodic side, so it is not a "
+                            "blade; name blades only"
                         )
                     if a == now and b not in members:
                         members.append(b)

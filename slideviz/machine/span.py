@@ -224,7 +224,7 @@ def _span_between(
             f"{mesh.name}: hub {hub!r} and shroud {shroud!r} do not turn about the axis "
             f"{tuple(axis)} through {tuple(origin)}, and a span needs an axis; correct "
             "PERIODIC_AXIS and PERIODIC_ORIGIN, name the periodic sides of a passage, or move the "
-            "boundaries of a wing otherwise, as with rotate or ffd-twist"
+            "boundaries of a wing in another way, e.g. by rotate or ffd-twist"
         )
     x, y, _ = local.T
     middle = float(np.arctan2(y.sum(), x.sum()))

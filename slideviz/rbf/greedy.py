@@ -163,7 +163,7 @@ class GreedyFit:
         basis = self._problem.basis
         other = "" if basis.kernel == PLAIN else f"RBF_KERNEL= {PLAIN}, "
         return (
-            "the nodes that are left add nothing but rounding to those chosen (RBF_KERNEL= "
+            "the remaining nodes add nothing but rounding to the chosen ones (RBF_KERNEL= "
             f"{basis.kernel} with a support radius of {basis.radius:.3g}); use a smaller "
             f"INFLUENCE_FACTOR, {other}or a larger tolerance"
         )

@@ -347,7 +347,7 @@ class GreedyLevel:
         self._terms = self._terms_of(candidates)
 
     def targets(self) -> FloatArray:
-        """Return what this level has to meet: the data less the levels before, (r, m)."""
+        """Return the residual that this level interpolates, (r, m): data less former levels."""
         right = self._among.rows.data
         if not len(self.previous_levels.nodes):
             return right

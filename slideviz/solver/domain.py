@@ -60,8 +60,8 @@ class Domain:
 def find_domain(case: Case, mesh: Mesh) -> Domain:
     """Return the domain of a mesh with the roles of a case.
 
-    Raises MeshError if periodic markers do not match, a marker element is no side of a cell, or a
-    coordinate is not finite, or too large to compute with.
+    Raises MeshError if periodic markers do not match, a marker element is not a side of a cell, or
+    a coordinate is not finite, or too large to compute with.
     """
     case, notes = roles_of_copies(case, mesh)
     _require_finite(mesh)
@@ -118,13 +118,12 @@ def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
         roles[copy] = other
         if role == other == "periodic" and case.periodic == "none":
             notes.append(
-                f"{copy} follows {origin} all the same, whose copy it is by the mesh's "
-                "SEND_RECEIVE markers"
+                f"{copy} still follows {origin}: it is its halo copy (SEND_RECEIVE markers)"
             )
         if role != other:
             notes.append(
-                f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
-                f"its own role ({role}) has no effect"
+                f"{copy} follows {origin}, because it is its halo copy (SEND_RECEIVE markers); its "
+                f"own role ({role}) has no effect"
             )
     return case.change(roles=roles), tuple(notes)
 

@@ -249,7 +249,7 @@ def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Itera
         if off[k] > allowed:
             far = abs(float(field.distances(coords[[k]])[end][0][0]))
             remedy = f"refine {name}" if field.revolved else "let no periodic side cut the blade"
-            why = f"where the blade stood, its shape is not known; move the blade less, or {remedy}"
+            why = f"its shape is not known where the blade stood; move the blade less, or {remedy}"
             why = f", {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
             yield _OffWall(int(nodes[k]), name, "this boundary", far, why)
 
@@ -304,9 +304,9 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
         f"{mesh.number(node)} ({', '.join(_names_at(setup, node))})" for node in pair
     )
     return (
-        f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
-        "smooth function cannot follow; let the boundary that stays go along (role moving, "
-        "internal or periodic), use RBF_KERNEL= wendland-c0, which does not overshoot, or "
+        f"boundary nodes {named}, {gaps[k]:.2g} apart, have displacements that differ by "
+        f"{apart[k]:.3g}, which a smooth function cannot follow; make the fixed boundary moving, "
+        "internal or periodic, use RBF_KERNEL= wendland-c0, which does not overshoot, or "
         "DATA_REDUCTION= YES"
     )
 

@@ -59,9 +59,9 @@ def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
     if gap.max(initial=0.0) > same(moved.vectors, mesh):
         k = int(np.argmax(gap))
         raise CaseError(
-            f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "
-            f"{halo.donors[k]}, whose copy it is by the mesh's halo, by {gap[k]:.3g}; a boundary "
-            "that moves must move alike on both periodic sides"
+            f"{mesh.name}: nodes {halo.receivers[k]} and {halo.donors[k]} are halo copies, but "
+            f"their displacements differ by {gap[k]:.3g}; let the boundary move alike on both "
+            "periodic sides"
         )
     asked[halo.receivers] = follows
     with_copies = np.union1d(moved.nodes, halo.receivers[np.isin(halo.donors, moved.nodes)])

@@ -42,7 +42,7 @@ from slideviz.solver.zones import joined_repairs
 from slideviz.system.threads import Tick, equal_shares
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, SLIDES, RepairTarget, Role, SkewMetric
 
-_NO_IMAGES = "they are no images of each other; name two that are"
+_NO_IMAGES = "they are not images of each other; name two that are"
 
 
 @check_types
@@ -83,7 +83,7 @@ def repair(
     Raises
     ------
     CaseError
-        The mesh has no such boundary, one is named twice, or periodic ones are no pairs; ``below``
+        The mesh has no such boundary, one is named twice, or periodic ones are not pairs; ``below``
         is below 0 or not below 1; another target or metric, or the reference's without one.
     MeshError
         Periodic boundaries do not match, or the reference has other cells.
@@ -285,7 +285,7 @@ def unmendable_words(
     first += " ..." if len(cells) > 5 else ""
     sentence = (
         f"{counted(len(cells), 'cell')} cannot be mended ({first}): the nodes that make them bad "
-        f"are {on(impossible)}, so that no motion of the others helps; let that boundary slide, "
+        f"are {on(impossible)}, so moving the others does not help; let that boundary slide, "
         "move it less, or mend its mesh"
     )
     return tuple(zip(cells, reasons, strict=True)), (sentence,)
@@ -356,7 +356,7 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     held = np.concatenate([known, setup.known])
     if mesh.part is None:
         held = np.concatenate([held, unmarked_sides(mesh, setup.boundary.facets).ravel()])
-    if mesh.halo is not None:  # copies that are no images would have to follow their donors
+    if mesh.halo is not None:  # copies that are not images would have to follow their donors
         copies = np.setdiff1d(mesh.halo.receivers, setup.images)
         pairs = np.isin(mesh.halo.receivers, np.setdiff1d(copies, mesh.halo.outer))
         held = np.concatenate([held, copies, mesh.halo.donors[pairs]])

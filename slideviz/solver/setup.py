@@ -122,10 +122,10 @@ def loose_warnings(
     assert case.reduction is not None
     if case.reduction.auto and (needed := needed_by_layers(reduction, gap)):
         sentence = (
-            f"sliding nodes are {gap:.3g} from moving ones, too little for DATA_REDUCTION= AUTO: "
-            f"its tolerance is {reduction.tolerance:.3g}, {SMALLEST:g} of the largest "
-            "displacement, so that cells between them may be inverted; use DATA_REDUCTION= NO, or "
-            f"YES with DATA_RED_TOLERANCE= {needed:.2g}"
+            f"the layer between moving and sliding nodes ({gap:.3g}) is too thin for the tolerance "
+            f"of DATA_REDUCTION= AUTO ({reduction.tolerance:.3g}, {SMALLEST:g} of the largest "
+            "displacement); cells there may invert; use DATA_REDUCTION= NO, or YES with "
+            f"DATA_RED_TOLERANCE= {needed:.2g}"
         )
         return [sentence]
     if reduction.tolerance <= LOOSE * largest:
@@ -142,8 +142,8 @@ def loose_warnings(
         so = "control nodes follow the motion roughly, and the cells"
     sentence = (
         f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
-        f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
-        f"invert them; {remedy}, a hundredth of the displacement"
+        f"displacement, {largest:.3g}: {so} near the boundary absorb the rest, which may invert "
+        f"them; {remedy}, a hundredth of the displacement"
     )
     return [sentence]
 
@@ -253,7 +253,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     """Return the setup of a deformation: all that stays the same over its steps.
 
     Raises CaseError if the case does not fit the mesh, and MeshError if periodic markers do not
-    match, a marker element is no side of a cell, or a coordinate is not finite, or too large to
+    match, a marker element is not a side of a cell, or a coordinate is not finite, or too large to
     compute with, and DeformError if no node is moving or fixed, or periodic images are asked to
     move differently.
     ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
@@ -362,12 +362,18 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
     if case.relax == "no":
         return ()
     if case.method != "rbf":
-        return (Note(f"METHOD= {case.method} is not relaxed, as RELAX= AUTO would do with rbf"),)
+        return (
+            Note(
+                f"METHOD= {case.method} is not relaxed; RELAX= AUTO relaxes with METHOD= rbf only"
+            ),
+        )
     if mesh.part is not None:
-        return (Note("RELAX= AUTO relaxes no mesh that goes from file to file"),)
+        return (Note("RELAX= AUTO does not relax a streamed mesh"),)
     if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:
         return (
-            Note(f"RELAX= AUTO relaxes no mesh of more than {RELAXED_CELLS:,} cells; YES does"),
+            Note(
+                f"RELAX= AUTO does not relax a mesh of more than {RELAXED_CELLS:,} cells; YES does"
+            ),
         )
     return ()
 

@@ -417,10 +417,10 @@ def with_halo_copies(
 def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
     assert setup.reduction is not None
     return (
-        f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
-        f"an error of {solution.max_error:.3g}, above its tolerance of "
+        f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at an "
+        f"error of {solution.max_error:.3g}, above its tolerance of "
         f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
-        "their displacement, but the mesh near them follows by the correction only"
+        "their displacement, but the mesh near them follows only through the correction"
     )
 
 
@@ -464,24 +464,29 @@ def _dropped_warning(
     since = f"from step {index} on, " if total > 1 else ""
     if setup.basis.saddle:
         sentence = (
-            f"{since}the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
-            f"and its {solution.control_nodes} control nodes are met by least squares, to "
-            f"{solution.dropped_error:.2g}; they still get exactly their displacement, and the "
-            "cells beside them take that up; use RBF_KERNEL= wendland-c2"
+            f"{since}the system is singular for RBF_KERNEL= {setup.basis.kernel}, so the "
+            f"{solution.control_nodes} control nodes are fitted by least squares (residual "
+            f"{solution.dropped_error:.2g}). They still get exactly their displacement; "
+            "neighbouring cells absorb the residual; use RBF_KERNEL= wendland-c2"
         )
         return [sentence]
     node = int(solution.dropped[0])
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
     which = f"node {mesh.number(node)} at {where}"
     if len(solution.dropped) == 1:
-        said = f"boundary {which} nearly coincides with another and is no control node; it still "
-        said += "gets exactly its displacement"
+        said = (
+            f"boundary {which} is left out of the control nodes because it nearly coincides with "
+            "another; it still gets exactly its displacement"
+        )
     else:
-        said = f"{len(solution.dropped)} boundary nodes that nearly coincide with others (first: "
-        said += f"{which}) are no control nodes; they still get exactly their displacement"
+        said = (
+            f"{len(solution.dropped)} boundary nodes are left out of the control nodes because "
+            f"they nearly coincide with others (first: {which}); they still get exactly their "
+            "displacement"
+        )
     sentence = (
-        f"{since}{said}, from which the interpolation is off by "
-        f"{solution.dropped_error:.2g} at most, and the cells beside them take that up"
+        f"{since}{said}. The interpolation error there is at most {solution.dropped_error:.2g}; "
+        "neighbouring cells absorb it"
     )
     harmless = solution.dropped_error <= AGREE * mesh.extent
     return [Note(sentence) if harmless else sentence]

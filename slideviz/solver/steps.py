@@ -80,7 +80,7 @@ class MeshRepair:
     warnings: tuple[str, ...] = ()  # what the user should know
 
     def report(self) -> dict[str, Any]:
-        """Return what a report has."""
+        """Return the entry ``repair`` of a report."""
         return {
             "cells_before": len(self.cells),
             "cells_after": len(self.left),

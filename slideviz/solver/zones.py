@@ -39,9 +39,9 @@ FOLLOWING = ("fixed", "sliding", "internal")  # roles of boundaries that follow 
 class InterfaceMotion:
     """The cases of zones, in which nodes of interfaces follow nodes of the zone that moves them.
 
-    A boundary that is asked to move leads those of other zones that coincide with it and are not;
-    and one that slides, those of zones that are deformed after it. What follows has the role
-    moving.
+    A moving boundary leads the boundaries of other zones that coincide with it and do not move by
+    themselves. A sliding boundary leads the coinciding boundaries of zones that are deformed later.
+    A boundary that follows gets the role moving.
     """
 
     def __init__(self, case: Case, mesh: Mesh) -> None:
@@ -72,11 +72,11 @@ class InterfaceMotion:
             self._lead(index, shift, asked, range(len(self.cases)))
 
     def moving(self, zones: Collection[int]) -> list[int]:
-        """Return those of some zones that move."""
+        """Return the zones among ``zones`` that move."""
         return [index for index in zones if self.cases[index].markers_with("moving")]
 
     def first(self, zones: list[int]) -> int:
-        """Return the zone to deform first: the one whose fixed boundaries fewest others lead.
+        """Return the zone with the fewest boundaries that follow another zone.
 
         Where rims are kept on walls (RIMS= SLIDE), those that others lead by moving count, too.
         """
@@ -265,7 +265,7 @@ def joined_step(
 ) -> Step:
     """Return the steps of zones as one of the mesh of all, which is ``now`` then.
 
-    ``fresh`` are those that are no step of the round before.
+    ``fresh`` are those that are not a step of the round before.
     """
     each = list(steps.values())
     new = list(fresh.values())

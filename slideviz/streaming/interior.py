@@ -1,4 +1,4 @@
-"""The rest of a streamed mesh: the nodes outside of its skin, displaced by the fields of all steps.
+"""Displacement of a streamed mesh's interior nodes by the fields of all steps.
 
 The skin is the boundary and the cells at it: the only part of the mesh that is in memory.
 """

@@ -857,15 +857,15 @@ def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):
 
 def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(ready, caplog):
     caplog.set_level("INFO")
-    note = Note("24 nodes are no control nodes, so this does no harm")
+    note = Note("24 nodes are not control nodes, so this does no harm")
     ended_badly(ready, [note], inverted=0)
     assert not ready.window.banner.isVisible()
     assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
-    assert "24 nodes are no control nodes" in describe_run(ready.session.runs[-1])
+    assert "24 nodes are not control nodes" in describe_run(ready.session.runs[-1])
     text = ready.window.run_panel.text
     assert DONE in text.text()
     assert text.text().endswith(" times as far.</a> <a href='notes'>1 note</a>")
-    assert "24 nodes are no control nodes" in text.toolTip()
+    assert "24 nodes are not control nodes" in text.toolTip()
     text.linkActivated.emit("notes")
     assert ready.window.banner.text.text() == f"Note: {note}"
     ready.window.banner.hide()

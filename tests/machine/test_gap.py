@@ -82,5 +82,7 @@ def test_a_blade_that_the_periodic_side_cuts_is_put_together():
 
 
 def test_a_boundary_that_goes_around_is_no_blade():
-    with pytest.raises(MeshError, match="meets its own image one period on, so it is no blade"):
+    with pytest.raises(
+        MeshError, match="continues through the periodic side, so it is not a blade"
+    ):
         bodies(np.array([[0, 1], [1, 2]]), np.array([[0, 2]]))

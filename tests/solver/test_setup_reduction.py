@@ -98,7 +98,7 @@ def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch
     loose = case.change(sliding=sliding, reduction=Reduction(tolerance=2e-4))
     bad = _last(loose, mesh)
     assert bad.layers == pytest.approx(0.5e-6)
-    assert not any("too little for" in text for text in bad.warnings)
+    assert not any("is too thin for" in text for text in bad.warnings)
     state = quality(bad.mesh, mesh)
     assert state.inverted > 0
     keys = "what may help: DATA_RED_TOLERANCE= 5e-07, half of the smallest distance"
@@ -114,8 +114,8 @@ def test_layers_that_it_cannot_follow_are_told(monkeypatch):
     mesh, case = _layers(monkeypatch)
     monkeypatch.setattr(setup, "SMALLEST", 1e-3)
     found = _last(case, mesh)
-    (said,) = [text for text in found.warnings if "too little for" in text]
-    assert said.startswith("sliding nodes are 1e-06 from moving ones, too little for DATA_REDUCT")
+    (said,) = [text for text in found.warnings if "is too thin for" in text]
+    assert said.startswith("the layer between moving and sliding nodes (1e-06) is too thin for")
     assert said.endswith("use DATA_REDUCTION= NO, or YES with DATA_RED_TOLERANCE= 5e-07")
     assert "YES with DATA_RED_TOLERANCE= 5e-07" in advice_for(case, found.layers)
 
