@@ -14,7 +14,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test test-all test-processors lint format docs golden smoke mutants bench laws shots study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden smoke mutants bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -31,6 +31,9 @@ demo: setup ## deform a blade passage into demo/ and open it (WINDOW=no: do not 
 
 test: setup ## fast tests (ARGS="-k name": only some)
 	$(PYTEST) $(PARALLEL) -m "not slow" --ignore=tests/benchmarks $(ARGS)
+
+quick: setup ## tests of the files that changed since the last commit (ARGS="--since main")
+	$(BIN)/python -m tools.quick $(ARGS)
 
 test-all: setup ## all tests, slow reproductions too
 	$(PYTEST) $(PARALLEL) --ignore=tests/benchmarks $(ARGS)

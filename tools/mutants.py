@@ -26,6 +26,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 
+from tools.quick import dotted, imported
+
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("slideviz", "tests", "tools", "sample_meshes", "pyproject.toml")
 NOT_COPIED = shutil.ignore_patterns("golden", "benchmarks")
@@ -214,22 +216,6 @@ def mutants_of(source: str, module: str) -> list[Mutant]:
                     Mutant(module, place.lineno, begin, end, operator.__name__, old, new)
                 )
     return mutants
-
-
-def imported(path: Path) -> set[str]:
-    """Return the dotted names that a module imports, with and without the names in modules."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return names
-
-
-def dotted(module: str) -> str:
-    """Return the name under which ``slideviz/mesh/model.py`` is imported."""
-    return module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 def compiled_callers(root: Path, module: str) -> list[Path]:
