@@ -126,6 +126,7 @@ def test_a_quick_study_has_no_summary(tmp_path, monkeypatch):
     made = []
     monkeypatch.setattr(study, "run", lambda argv: made.append(argv) or 0)
     monkeypatch.setattr(study, "dense", lambda *_: made.append(["dense"]))
+    monkeypatch.setattr(study, "write", lambda *_: made.append(["write"]))
     assert study.main(["--quick", "-o", str(tmp_path)]) == 0
     assert not (tmp_path / "summary.md").exists()
     assert [argv[0] for argv in made].count("compare") == len([c for c in CALLS if c.quick_steps])

@@ -491,7 +491,7 @@ def _tick(text: str, report: Report, stopped: Stopped) -> Callable[[float], None
     return tick
 
 
-SIZES = {"turbine-row": 20_000, "stator": 20_000}
+SIZES = {"stator": 20_000}
 """Sizes with which large samples are opened where none is given, to open quickly."""
 
 

@@ -57,7 +57,8 @@ def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(
     driver, monkeypatch, tmp_path
 ):
     assert max(jobs.SIZES.values()) <= 50_000
-    assert {"stator", "turbine-row"} <= set(jobs.SIZES)
+    assert "stator" in jobs.SIZES
+    assert table.SAMPLES["turbine-row"].size <= 50_000
     made, window = [], driver.window
     monkeypatch.setattr(
         table, "write_sample", lambda name, _folder, size, **_: made.append((name, size)) or []

@@ -257,7 +257,7 @@ def test_folder_that_cannot_be_made_is_told(tmp_path):
         write_sample("square", tmp_path / "file" / "x", 5)
 
 
-KEPT = [("square", 25), ("polar", 25), ("hexahedron", 9), ("airfoil", 48)]
+KEPT = [("square", 25), ("polar", 25), ("hexahedron", 9), ("airfoil", 48), ("turbine-row", 5_000)]
 
 
 @pytest.mark.parametrize(("name", "size"), KEPT)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from slideviz.cli import run
+from slideviz.formats.files import write
 from tools.shots import shrink
 from tools.study.cases import CALLS, Call
 from tools.study.dense import dense
@@ -74,11 +75,14 @@ def main(argv: Sequence[str]) -> int:
 def _compare(call: Call, output: Path, quick: bool) -> int:
     """Write the sample and compare; return the exit code."""
     folder = output / call.name
-    size = str(call.quick_size if quick else call.size)
-    variant = ["--variant", call.variant] if call.variant else []
-    code = run(["sample", call.sample, "-o", str(folder), "--size", size, "--force", *variant])
+    size = call.quick_size if quick else call.size
+    options = ["--variant", call.variant] if call.variant else []
+    options += [] if call.mesh else ["--size", str(size)]
+    code = run(["sample", call.sample, "-o", str(folder), "--force", *options])
     if code:
         return code
+    if call.mesh:
+        write(folder / "mesh.su2", call.mesh(size), True)
     argv = ["compare", str(folder / f"{call.sample}.cfg"), "-o", str(folder)]
     argv += ["--methods", call.methods, "--steps", call.quick_steps if quick else call.steps]
     argv += ["--periodic", call.periodic]

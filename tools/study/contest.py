@@ -28,7 +28,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
-from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS
+from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS, extruded, extruded_case
 from tools.study.flows import (
     SHAPES,
     c_mesh,
@@ -38,6 +38,7 @@ from tools.study.flows import (
     o_mesh,
     triangle_mesh,
 )
+from tools.study.vane_mesh import row_mesh
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
     "rbf": {"relax": "no", "layers": "no"},
@@ -212,6 +213,11 @@ def _linear_twist() -> dict[str, Any]:
     return {"ffd_degrees": ((1, 2, 1),), "motions": motions}
 
 
+def extruded_vane(**changes: Any) -> tuple[sv.Mesh, sv.Case]:
+    """Return a turbine row in 3D of 25,000 cells, four along the span, and its changed case."""
+    return extruded(row_mesh(25_000 // 4), 4), extruded_case().change(**changes)
+
+
 def contests(folder: Path | None) -> Iterator[Contest]:
     """Yield all rows; those of real meshes only with their ``folder``."""
     row = partial(_layered_rows, cases=_passage)
@@ -233,11 +239,8 @@ def contests(folder: Path | None) -> Iterator[Contest]:
         o_shape, c_shape = partial(layered_o_mesh, outline), partial(c_mesh, outline, first=2e-6)
         yield from _layered_rows(f"{name}, O-mesh", cache(o_shape), "airfoil", sharp, _outer)
         yield from _layered_rows(f"{name}, C-mesh", cache(c_shape), "airfoil", sharp, _outer)
-    yield Contest("turbine-row-3d twisted by 10", partial(_own, "turbine-row-3d", None, "motion"))
-    yield Contest(
-        "turbine-row-3d twisted linearly",
-        partial(_own, "turbine-row-3d", None, "motion", **_linear_twist()),
-    )
+    yield Contest("turbine-row-3d twisted by 10", extruded_vane)
+    yield Contest("turbine-row-3d twisted linearly", partial(extruded_vane, **_linear_twist()))
     yield from _bare_rows()
 
 

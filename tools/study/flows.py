@@ -9,7 +9,7 @@ import numpy as np
 
 import slideviz as sv
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
-from slideviz.samples.turbine_row import Sizing, front_points, relax
+from tools.study.vane_mesh import Sizing, front_points, relax
 
 FAR = 15.0
 """Radius of the far field, in sizes of the body."""
