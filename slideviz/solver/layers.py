@@ -133,12 +133,24 @@ def _first_heights(
     return np.where(first > 0.0, np.minimum(first, STEEP * usual), usual)
 
 
-def thickness_warnings(case: Case, domain: Domain, zone: LayerZone | None) -> list[str]:
-    """Return warnings of walls that other ones are nearer to than LAYER_THICKNESS.
+def thickness_warnings(
+    case: Case, mesh: Mesh, domain: Domain, zone: LayerZone | None
+) -> list[str]:
+    """Return warnings of a LAYER_THICKNESS that does not fit its walls.
 
-    Other walls are moving and fixed boundaries that do not touch this one, and periodic images.
+    It is more than the distance to another wall, or less than the height of the first layer. Other
+    walls are moving and fixed boundaries that do not touch this one, and periodic images.
     """
-    if zone is None or not case.layer_thickness:
+    if zone is None:
+        return []
+    if not len(zone.nodes) and mesh.part is None:  # the skin of a mesh in a file may have none
+        thickness = max(wall.thickness for wall, *_ in zone.walls.walls)
+        sentence = (
+            f"LAYERS= {case.layers.upper()} has no effect, since no node is nearer to a wall than "
+            f"{thickness:.3g}; write a LAYER_THICKNESS of several cells"
+        )
+        return [sentence]
+    if not case.layer_thickness:
         return []
     from scipy.spatial import cKDTree  # takes long to load
 
@@ -153,6 +165,13 @@ def thickness_warnings(case: Case, domain: Domain, zone: LayerZone | None) -> li
     periods = [-1, 1] if np.any(frame.shift()) else []
     warnings = []
     for wall, *_ in zone.walls.walls:
+        first = float(np.median(wall.first))
+        if wall.thickness < first:
+            warnings.append(
+                f"LAYER_THICKNESS= {case.layer_thickness:g} is less than the height of the first "
+                f"layer at {' and '.join(wall.names)}, {first:.3g}: only this layer goes with the "
+                "wall; write several times that, or AUTO"
+            )
         mine = np.unique(wall.facets)
         own = part[nodes] == part[mine[0]]
         near = [(nodes[~own], k) for k in (0, *periods)] + [(nodes[own], k) for k in periods]

@@ -301,7 +301,7 @@ def setup_of(
         *file_before_motions(case),
     )
     zone = layer_zone(case, mesh, domain, conditions.known)
-    warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, domain, zone))
+    warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, mesh, domain, zone))
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(

@@ -185,6 +185,23 @@ def test_a_zone_thicker_than_a_channel_is_told(thickness, told):
     assert (first == "LAYER_THICKNESS= AUTO") == (thickness != "auto")
 
 
+@pytest.mark.parametrize(("thickness", "words"), [(2e-4, ""), (9e-5, "layer at w, 0.0001")])
+def test_a_zone_thinner_than_the_first_layer_is_told(thickness, words):
+    mesh = around(ellipse, 40, 80)
+    case, _ = deformed(mesh, MOTIONS["bent"], layer_thickness=thickness)
+    said = [text for text in make_setup(case, mesh).warnings if "LAYER_THICKNESS" in text]
+    assert len(said) == bool(words)
+    assert words in "".join(said)
+
+
+@pytest.mark.parametrize(("thickness", "told"), [(0.0, True), (0.01, True), (0.1, False)])
+def test_a_zone_without_nodes_is_told(thickness, told, tmp_path):
+    mesh = around(ellipse, 12, 80, first=0.05)
+    case, _ = deformed(mesh, MOTIONS["bent"], layers="keep", layer_thickness=thickness)
+    said = [text for text in make_setup(case, mesh).warnings if "LAYERS= KEEP has no" in text]
+    assert len(said) == told
+
+
 def test_the_next_wall_may_be_the_periodic_image():
     row = sample("turbine-row", 5000)
     for thickness in (0.2, 2.0):
@@ -192,7 +209,7 @@ def test_the_next_wall_may_be_the_periodic_image():
         case = row.case.change(layers="keep", layer_thickness=pitch)
         said = [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICKNESS" in text]
         assert [text.partition("from ")[2].partition(" to")[0] for text in said] == ["BLADE"]
-    case = row.case.change(layers="keep", layer_thickness=1e-3 * row.mesh.extent)
+    case = row.case.change(layers="keep", layer_thickness=1e-2 * row.mesh.extent)
     assert not [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICK" in text]
 
 
