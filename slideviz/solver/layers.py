@@ -133,9 +133,7 @@ def _first_heights(
     return np.where(first > 0.0, np.minimum(first, STEEP * usual), usual)
 
 
-def thickness_warnings(
-    case: Case, mesh: Mesh, domain: Domain, zone: LayerZone | None
-) -> list[str]:
+def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone | None) -> list[str]:
     """Return warnings of a LAYER_THICKNESS that does not fit its walls.
 
     It is more than the distance to another wall, or less than the height of the first layer. Other

@@ -152,7 +152,7 @@ def target_file(path: Path, replaces: Path | None = None) -> Iterator[TargetFile
     try:
         mode_of(real)
         with open_temporary(ours, new=True) as file:
-            _lock(file, path)
+            _lock(file, ours, path)
             target = TargetFile(file, ours, real)
             with removed_at_stop(ours):
                 os.ftruncate(file.fileno(), 0)
@@ -167,17 +167,19 @@ def target_file(path: Path, replaces: Path | None = None) -> Iterator[TargetFile
         raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
 
 
-def _lock(file: BinaryIO, path: Path) -> None:
+def _lock(file: BinaryIO, ours: Path, path: Path) -> None:
+    """Lock the hidden file of a target, unless another process has it, or just had it."""
     import fcntl  # POSIX only
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # Between opening and locking, the other process may have renamed it to the target.
+        if os.path.samestat(os.fstat(file.fileno()), ours.stat()):
+            return
     except OSError as problem:
-        if problem.errno not in (errno.EAGAIN, errno.EACCES):
+        if problem.errno not in (errno.EAGAIN, errno.EACCES, errno.ENOENT):
             raise
-        raise MeshError(
-            f"{path}: another process is writing it; wait for it, or choose another name"
-        ) from problem
+    raise MeshError(f"{path}: another process is writing it; wait for it, or choose another name")
 
 
 def _umask() -> int:

@@ -1,5 +1,6 @@
 """Streamed runs: the bits of a run in memory, whatever the chunks; what a stop leaves."""
 
+import fcntl
 import json
 import os
 import re
@@ -225,6 +226,26 @@ def test_what_a_killed_run_has_left_is_replaced(tmp_path, ending):
     stream(case, out)
     assert out.read_bytes() == whole
     assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_file_that_its_writer_has_just_placed_is_not_emptied(tmp_path, monkeypatch, again):
+    case = made(tmp_path, "square", 8, ("STEPS=1",))
+    out = tmp_path / "out.su2"
+    flock = fcntl.flock
+
+    def late(*arguments):
+        hidden(out).write_bytes(b"result")
+        hidden(out).replace(out)
+        if again:  # and a third process has begun
+            hidden(out).touch()
+        return flock(*arguments)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(MeshError, match="another process is writing it; wait"):
+        stream(case, out)
+    assert out.read_bytes() == b"result"
+    assert hidden(out).exists() == again
 
 
 def test_nodes_on_sides_without_a_marker_stay(tmp_path):
