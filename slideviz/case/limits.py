@@ -41,6 +41,7 @@ _LIMIT = re.compile(
     r'(?P<name>[\w-]+)(?:@(?:"(?P<quoted>(?:[^"]|"")+)"|(?P<plain>[^\s<>="]+)))?'
     r"\s*(?P<sign>[<>=]+)\s*(?P<value>\S+)\Z"
 )
+MOST_CELLS = 1e12  # more than any mesh has
 _ITEM = re.compile(r'(?:"[^"]*"|[^",;])+')
 
 
@@ -133,7 +134,7 @@ def _wall(name: str, meaning: str, signs: str, low: float = 0.0, high: float = i
 
 def _count(meaning: str, total: Callable[[Quality], float], status: int) -> LimitNumber:
     return LimitNumber(
-        meaning, "<=", None, total, status, streamed=True, range=(0.0, inf), counts=True
+        meaning, "<=", None, total, status, streamed=True, range=(0.0, MOST_CELLS), counts=True
     )
 
 
@@ -217,14 +218,16 @@ class Limit(CheckedFields):
         if not np.isfinite(self.value):
             raise CaseError(f"{self}: expected a finite number as the limit")
         low, high = row.range
-        end = {"<": low, ">": high}.get(self.sign)  # which nothing passes
+        # The end that nothing passes, or everything; folded layers have first heights below 0.
+        lowest = low if row.signs == ">" else -inf
+        end = {"<": low, ">": high, "<=": high, ">=": lowest}.get(self.sign)
         fits = low <= self.value <= high and self.value != end
         if not fits or (row.counts and not float(self.value).is_integer()):
-            below = "below " if self.sign == ">" else ""
+            below = "below " if end == high else ""
             upper = f" to {below}{high:g}" if high < inf else ""
             raise CaseError(
                 f"{self}: expected a {'whole number' if row.counts else 'number'} "
-                f"{'above' if self.sign == '<' else 'from'} {low:g}{upper} for {self.name} "
+                f"{'above' if end == low else 'from'} {low:g}{upper} for {self.name} "
                 f"({row.meaning})"
             )
 

@@ -40,7 +40,7 @@ def limits(draw):
     low, high = (None if abs(end) == np.inf else end for end in row.range)
     values = st.floats(low, high).filter(lambda value: abs(value) <= 1e50)
     values = st.integers(0, 5).map(float) if row.counts else values
-    ends = {"<": low, ">": high}
+    ends = {"<": low, ">": high, "<=": high, ">=": low}
     return Limit(name, sign, draw(values.filter(lambda value: value != ends.get(sign))), marker)
 
 
@@ -80,11 +80,14 @@ def test_no_limits(text):
             "mean > 2",
             r"mean > 2: expected a number from 0 to below 1 for mean \(mean",
         ),
-        ("min >= 1.5", r"expected a number from 0 to 1 for min \(lowest quality\)$"),
+        ("min >= 1.5", r"expected a number above 0 to 1 for min \(lowest quality\)$"),
         ("min > 1", r"min > 1: expected a number from 0 to below 1 for min"),
-        ("inverted = 0.5", r"inverted = 0.5: expected a whole number from 0 for inverted \(inv"),
-        ("unproven < 0", r"expected a whole number above 0 for unproven"),
-        ("inverted <= -1", r"expected a whole number from 0 for inverted"),
+        (
+            "inverted = 0.5",
+            r"inverted = 0.5: expected a whole number from 0 to 1e\+12 for inverted",
+        ),
+        ("unproven < 0", r"expected a whole number above 0 to 1e\+12 for unproven"),
+        ("inverted <= -1", r"expected a whole number from 0 to below 1e\+12 for inverted"),
         ("first_height > -1", r"first_height > -1: expected a number from 0 for first_height"),
         ("height_ratio < 0", r"expected a number above 0 for height_ratio"),
         ("growth < 0.5", r"growth < 0.5: expected a number above 1 for growth"),
@@ -93,10 +96,15 @@ def test_no_limits(text):
         ("largest_angle < 50", r"expected a number above 60 to 360"),
         ("skew > 1.5", r"expected a number from 0 to below 1 for skew"),
         ("equal_layers > 6", r"expected a whole number from 0 to below 5"),
-        ("equal_layers >= 2.5", r"expected a whole number from 0 to 5"),
+        ("equal_layers >= 2.5", r"expected a whole number above 0 to 5"),
+        ("inverted = 1e20", r"inverted = 1e\+20: expected a whole number from 0 to 1e\+12"),
+        ("min >= 0", r"min >= 0: expected a number above 0 to 1 for min"),
+        ("wall_angle >= -90", r"expected a number above -90 to 90 for wall_angle"),
+        ("largest_angle <= 360", r"expected a number from 60 to below 360"),
         ("min > 0,3", r"'3': cannot read this limit"),
         ("min > high", r"'high' is not a number"),
         ("min < 0.3", r"min < 0.3: a limit of min \(lowest quality\) needs >"),
+        ("first_height >= -1", r"first_height >= -1: expected a number from 0 for first_height"),
         ("inverted >= 1", r"inverted >= 1: a limit of inverted .* needs < or ="),
         ("min => 0.3", r"min => 0.3: '=>' is not one of > \| >="),
         ("min@blade > 0.3", r"min@blade > 0.3: min is of the whole mesh; leave out @blade"),
@@ -144,11 +152,12 @@ def test_the_cells_that_fail_are_the_worst_first(measured):
     np.testing.assert_array_equal(np.sort(result.cells), np.flatnonzero(~(values > 0.9)))
     assert (np.diff(values[result.cells]) >= 0).all()
     assert len(result.cells) > 2
-    (at,) = check_limits([Limit("size", ">=", float(measured.quality.size.min()))], measured)
+    worst = float(metric(measured.mesh, "skewness").of_cells.max())
+    (at,) = check_limits([Limit("skewness", "<=", worst)], measured)
     assert at.passed
     assert not len(at.cells)
-    (above,) = check_limits([Limit("size", ">", float(measured.quality.size.min()))], measured)
-    assert not above.passed
+    (below,) = check_limits([Limit("skewness", "<", worst)], measured)
+    assert not below.passed
 
 
 def test_the_quality_of_a_mesh_says_whether_it_meets_limits(measured):
@@ -280,7 +289,8 @@ def test_every_number_of_walls_can_be_limited(layered, name, signs):
         little = 1.0 if name == "equal_layers" else 1e-9
         beyond = worst + (little if sign[0] == ">" else -little)
         (missed,) = check_limits([Limit(name, sign, beyond, "LOWER")], layered)
-        (met,) = check_limits([Limit(name, sign, worst + (worst - beyond), "LOWER")], layered)
+        within = worst if sign == ">=" else worst + (worst - beyond)  # 0 or more are all layers
+        (met,) = check_limits([Limit(name, sign, within, "LOWER")], layered)
         assert missed.actual == met.actual == worst
         assert met.passed
         assert not missed.passed
