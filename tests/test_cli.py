@@ -615,7 +615,7 @@ def test_the_number_of_steps_has_an_option_and_no_option_is_cut_short(tmp_path, 
     assert run(["run", case, *given]) == 0
     assert json.loads(report.read_text())["steps"] == 3
     assert run(["run", case, "--steps", "text"]) == 1
-    assert "'text' is not a whole number from 1, or auto" in capsys.readouterr().err
+    assert "'text' is not a whole number from 1 to 9999, or auto" in capsys.readouterr().err
     assert run(["run", case, "--step", "3"]) == 2
 
 

@@ -232,6 +232,7 @@ def or_auto(kind: Kind, word: str) -> Kind:
         read=read,
         write=lambda value: kind.write(value) if value else word,
         words={nothing: "automatic"},
+        span=(0, kind.span[1]),
     )
 
 
@@ -306,7 +307,7 @@ METHOD_ROWS = (
         "STEPS",
         "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
         "halves steps that fold a cell, and takes the fewest that are enough.",
-        replace(or_auto(integer(1), "auto"), span=(0, MAX_STEPS)),
+        or_auto(integer(1, MAX_STEPS), "auto"),
         form="main",
         tip="Into how many equal parts the motion is divided: more keep large motions valid and "
         "take longer; automatic (0) takes as few as give no inverted cell.",

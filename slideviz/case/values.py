@@ -29,7 +29,7 @@ Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
 """The kind of field by which the window lets users enter a value."""
 
 LARGEST_WHOLE = 999_999_999  # the largest whole number: it has 9 digits, which ``_WHOLE`` allows
-MAX_STEPS = 9999  # largest number of steps that the window offers; a case file may ask for more
+MAX_STEPS = 9999  # largest number of steps: each is a run of its own, and more change little
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
@@ -98,18 +98,19 @@ def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> 
     return replace(kind, entry="choice", words=labels(terms), tips=tips(terms))
 
 
-def integer(low: int) -> Kind:
-    """Return the kind of whole numbers from ``low``."""
-    allowed = f"a whole number from {low}"
+def integer(low: int, high: int = LARGEST_WHOLE) -> Kind:
+    """Return the kind of whole numbers from ``low`` to ``high``."""
+    allowed = f"a whole number from {low}{f' to {high}' if high < LARGEST_WHOLE else ''}"
 
     def read(text: str) -> int:
         if not _WHOLE.match(text):
             raise CaseError(f"{shown(text)} is not {allowed}")
-        if int(text) < low:
-            raise CaseError(f"{text} is too small; expected {allowed}")
+        if not low <= int(text) <= high:
+            size = "small" if int(text) < low else "large"
+            raise CaseError(f"{text} is too {size}; expected {allowed}")
         return int(text)
 
-    return Kind(allowed, read, str, entry="whole", span=(low, LARGEST_WHOLE))
+    return Kind(allowed, read, str, entry="whole", span=(low, high))
 
 
 def real(

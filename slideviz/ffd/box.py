@@ -156,6 +156,10 @@ def _placed(values: FloatArray, first: np.ndarray, count: int) -> FloatArray:
 Index = tuple[int, int, int]
 """A control point (i, j, k); an index of -1 means all of that direction."""
 
+MOST_DEGREE = 50
+MOST_POINTS = 20_000
+"""The largest degree and number of control points; with more it takes minutes to find nodes."""
+
 HALF = 0.5  # half the thickness of a box in 2D, in the mesh's length unit
 CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
@@ -327,12 +331,15 @@ def regular_box(
 ) -> Box:
     """Return the undeformed box between corners (8, 3), with a regular lattice in q.
 
-    Raises CaseError if a degree or an order is not possible, or the corners in this order enclose
-    no volume.
+    Raises CaseError if a degree or an order is not possible, there are too many control points, or
+    the corners in this order enclose no volume.
     """
     for letter, degree in zip("ijk", degrees, strict=True):
-        if degree < 1:
-            raise CaseError(f"the degree of {letter} is {degree}; expected 1 or more")
+        if not 1 <= degree <= MOST_DEGREE:
+            raise CaseError(f"the degree of {letter} is {degree}; expected 1 to {MOST_DEGREE}")
+    count = (degrees[0] + 1) * (degrees[1] + 1) * (degrees[2] + 1)
+    if count > MOST_POINTS:
+        raise CaseError(f"it has {count} control points; expected at most {MOST_POINTS}")
     for letter, order, degree in zip("ijk", orders or (2, 2, 2), degrees, strict=True):
         if not 2 <= order <= degree + 1:
             raise CaseError(

@@ -93,6 +93,7 @@ def test_values(read, line, field, value):
     [
         ("STEPS= 1.5", r"STEPS: '1.5' is not a whole number from 1"),
         ("STEPS= -3", r"STEPS: -3 is too small; expected a whole number from 1"),
+        ("STEPS= 10000", r"STEPS: 10000 is too large; expected a whole number from 1 to 9999"),
         ("ZONE= 0", r"ZONE: 0 is too small"),
         ("STEPS= 99999999999", r"STEPS: '99999999999' is not a whole number"),
         ("GAMMA= 2,5", r"GAMMA: '2,5' is not a number; write decimals with a point"),

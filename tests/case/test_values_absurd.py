@@ -192,6 +192,29 @@ def test_a_program_is_told_at_once_of_a_number_that_a_file_cannot_have(key, valu
             made()
 
 
+COUNTS = {key.name: "999999999" for key in KEYS.values() if key.kind.entry == "whole"}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        *((name, value, "") for name, value in COUNTS.items() if name != "STEPS"),
+        ("STEPS", "100000000", "100000000 is too large; expected a whole number from 1 to 9999"),
+        ("FFD_DEGREE", "(1e30, 1, 0)", f"the degree of i is {int(1e30)}; expected 1 to 50"),
+        ("FFD_DEGREE", "(2, 51, 0)", "the degree of j is 51; expected 1 to 50"),
+    ],
+)
+def test_a_count_has_a_limit_or_takes_no_time(key, value, words, tmp_path, capsys):
+    sv.write(tmp_path / "mesh.su2", builders.square(6))
+    case = "MESH_FILENAME= mesh.su2\nMARKER_MOVING= ( BLOCK )\nDATA_REDUCTION= YES\n"
+    box = BOX.replace("#", "1") + f"MOTION= {MOTIONS[-2].replace('#', '0.01')}\n"
+    (tmp_path / "a.cfg").write_text(case + box)
+    call = ["run", str(tmp_path / "a.cfg"), "--set", f"{key}={value}"]
+    code = run([*call, "-q", "-o", str(tmp_path / "out.su2")])
+    assert code in ((1,) if words else (0, 1))
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("field", WRONG)
 def test_a_program_is_told_at_once_of_an_axis_or_point(field):
     with pytest.raises(CaseError, match=r"^PERIODIC_(AXIS|ORIGIN): .*"):

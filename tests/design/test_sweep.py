@@ -228,7 +228,7 @@ def test_every_wrong_value_is_told_with_its_line(passage, tmp_path):
         read_designs(passage.case, table)
     assert str(problem.value).splitlines() == [
         f"{table}:4: column 'motion2.y': '0,1' is not a number; write decimals with a point",
-        f"{table}:5: column 'STEPS': 'x' is not a whole number from 1, or auto",
+        f"{table}:5: column 'STEPS': 'x' is not a whole number from 1 to 9999, or auto",
         f"{table}:5: column 'motion2.y': 'nan' is not a number",
         f"{table}:6: has 3 values, and the head 2 columns; give as many",
     ]
@@ -237,7 +237,7 @@ def test_every_wrong_value_is_told_with_its_line(passage, tmp_path):
         read_designs(passage.case, table)
     head, row = str(problem.value).splitlines()
     assert head.startswith(f"{table}:1: column 'motion2.yy': there is no such number")
-    assert row == f"{table}:2: column 'STEPS': 'x' is not a whole number from 1, or auto"
+    assert row == f"{table}:2: column 'STEPS': 'x' is not a whole number from 1 to 9999, or auto"
     with pytest.raises(CaseError, match=r"design 2: column 'motion2.y': inf is not a finite"):
         read_designs(passage.case, {"motion2.y": [0.0, np.inf]})
     with pytest.raises(CaseError, match="different numbers of values"):

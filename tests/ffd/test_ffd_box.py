@@ -189,8 +189,10 @@ def test_unknown_control_point_is_told(index):
 
 
 def test_impossible_boxes_are_refused():
-    with pytest.raises(CaseError, match="the degree of j is 0; expected 1 or more"):
+    with pytest.raises(CaseError, match="the degree of j is 0; expected 1 to 50"):
         regular_box("B", WARPED, (3, 0, 1), None)
+    with pytest.raises(CaseError, match="it has 68921 control points; expected at most 20000"):
+        regular_box("B", WARPED, (40, 40, 40), None)
     with pytest.raises(CaseError, match="of j have the order 4, and 2 control points; expected"):
         regular_box("B", WARPED, (5, 1, 1), (4, 4, 2))
     with pytest.raises(CaseError, match="enclose no volume in their order"):

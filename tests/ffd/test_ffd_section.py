@@ -270,7 +270,7 @@ def test_mesh_without_boxes_has_none():
         ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD_LEVEL is 1; FFD_NLEVEL must be larger, and is 1"),
         ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is no whole number from 0"),
         ("FFD_DEGREE_J= 1\n", "", "FFD_DEGREE_J= is missing"),
-        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; expected 1 or more"),
+        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; expected 1 to 50"),
         ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; expected BEZIER or BSPLINE_UNIFORM"),
         ("POINTS= 4", "POINTS= 8", "FFD_CORNER_POINTS is 8; expected 4"),
         ("1.1 0.1\n", "", "3 rows follow FFD_CORNER_POINTS= 4; correct the count"),

@@ -25,7 +25,7 @@ from slideviz.case.lines import (
     require_no_mesh,
 )
 from slideviz.case.model import NEW, Case
-from slideviz.case.values import YES_NO, integer, real
+from slideviz.case.values import MAX_STEPS, YES_NO, integer, real
 from slideviz.case.words import first_of, list_of, number
 from slideviz.design.su2.variables import (
     NOTHING,
@@ -53,7 +53,10 @@ READ_ALWAYS = {
     "RBF_GREEDY_TOLERANCE": real(0.0),
     "RBF_GREEDY_CORRECTION_FACTOR": real(0.0),
 }
-READ_WITH_RBF = {"RADIAL_BASIS_FUNCTION_PARAMETER": real(0.0), "DEFORM_NONLINEAR_ITER": integer(1)}
+READ_WITH_RBF = {
+    "RADIAL_BASIS_FUNCTION_PARAMETER": real(0.0),
+    "DEFORM_NONLINEAR_ITER": integer(1, MAX_STEPS),
+}
 """Kinds of values; of keys that mean something else unless DEFORM_KIND is RBF."""
 ELASTIC = {
     "DEFORM_STIFFNESS_TYPE": "SOLID_WALL_DISTANCE",
