@@ -28,7 +28,7 @@ from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.growth import farthest_node, stray_warning, unsoundness, wall_warnings
 from slideviz.solver.normals import sliding_normals
 from slideviz.solver.setup import Setup
-from slideviz.solver.steps import Progress, Step, Trial
+from slideviz.solver.steps import Progress, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
 
 RIGID = 0.99
@@ -36,6 +36,49 @@ RIGID = 0.99
 
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
 ALIKE = 1.1  # a shorter step may go farther than the straight paths of a longer one by this factor
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A step that is still to be made."""
+
+    end: float  # the part of the displacement that is made after it
+    halvings: int = 0  # how often it was halved
+
+    def halved(self, begin: float, times: int) -> list[_Planned]:
+        """Return two steps from ``begin``, of which the first is halved again; to ``HALVINGS``."""
+        if not times or self.halvings == HALVINGS:
+            return [self]
+        first = _Planned((begin + self.end) / 2, self.halvings + 1)
+        return [*first.halved(begin, times - 1), _Planned(self.end, first.halvings)]
+
+
+@dataclass(frozen=True)
+class _Finding:
+    """Warnings and numbers of one step of a run, without its arrays."""
+
+    index: int
+    condition: float
+    max_error: float
+    error_estimate: float
+    refined: float
+    """`condition`, `max_error`, `error_estimate`, `refined`: as of `Solution`."""
+    short: list[str]  # that its data reduction ended too early, or []
+    dropped: list[str]  # that singular nodes were left out, or []
+    others: list[str]  # what is said of every step
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A deformation after some of its steps; the next one begins here."""
+
+    mesh: Mesh
+    coords: FloatArray  # (n, d): of all nodes, in the frame
+    index: int = 0  # the number of steps so far
+    part: float = 0.0  # of the displacement that is made
+    solution: Solution | None = None  # of the last step
+    findings: tuple[_Finding, ...] = ()  # of all steps so far
+    inverted: int = 0  # inverted cells, where steps are halved
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,104 +109,88 @@ class Stepping:
         length, and these again, up to ``HALVINGS`` times. ``count`` can also be the part of the
         displacement that is made after each step.
         """
-        setup = self.setup
-        mesh = self.mesh
         parts = [k / count for k in range(1, count + 1)] if isinstance(count, int) else count
-        ahead = [(part, 0) for part in parts]
-        coords = setup.coords
-        done = 0.0
-        index = 0
-        folded = 0
-        warnings = [*self.case.warnings, *setup.warnings]
-        remarks: list[str] = []
-        worst = 0.0
-        least = (0.0, 0.0, 0, 0.0)
-        seconds = dict(self.seconds)
-        before: Solution | None = None
+        ahead = [_Planned(part) for part in parts]
+        state = _State(self.mesh, self.setup.coords)
         made: list[Step] = []
-        last = mesh
+        seconds = dict(self.seconds)
         while ahead:
-            part, halvings = ahead[0]
-            total = index + len(ahead)
-            at = index + 1, total
-            timer = PhaseTimer(lambda *now, at=at: self.report(Progress(*at, *now)), seconds)
-            goal = value(setup.goal(setup.target, part))
-            solution = one_step(setup.at_step(len(ahead) == 1), coords, goal, timer, before)
-            moved = displaced_coords(setup, coords, value(solution.displacement), goal)
-            points = cartesian(setup.frame, mesh.points, setup.coords, moved)
-            if mesh.halo is not None:
-                points, moved = with_halo_copies(setup, mesh, mesh.halo, points, moved)
-            if not within(points, np.finfo(float).max):
-                raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
-            step = self._made(index + 1, total, points, solution, timer, part)
-            farthest = farthest_node(setup.coords, moved)
-            unsound = unsoundness(setup, mesh, solution, moved, part=part, farthest=farthest.length)
-            failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
-            if self.mend is not None and self.case.repair_steps and not failure:
-                step = self.mend(step)
-                points = step.mesh.points
-                moved = mended_coords(setup, step, moved)
-            if halve:
-                try:
-                    now = self.quality_of([*made, step]).inverted
-                except UnsoundError as problem:
-                    now = folded
-                    failure = failure or problem
-                if (now > folded or failure) and halvings < HALVINGS:
-                    needed = 1 if failure else self._halvings(last, step.mesh)
-                    for k in range(halvings + 1, min(halvings + needed, HALVINGS) + 1):
-                        ahead[0] = part, k
-                        part = (done + part) / 2
-                        ahead.insert(0, (part, k))
-                    continue
-                folded = now
-                made.append(step)
-            if failure:
-                raise failure
+            planned = ahead.pop(0)
+            index = state.index + 1
+            timer = step_timer(self.report, index, index + len(ahead), seconds)
+            try:
+                step, after = self._advanced(state, planned.end, len(ahead), timer)
+                halvings = 0
+                if halve:
+                    made.append(step)
+                    after = replace(after, inverted=self.quality_of(made).inverted)
+                    halvings = self._halvings(state, after)
+            except UnsoundError:
+                if not halve or planned.halvings == HALVINGS:
+                    raise
+                halvings = 1
+            if halvings and planned.halvings < HALVINGS:
+                del made[state.index :]
+                ahead = [*planned.halved(state.part, halvings), *ahead]
+                continue
             if self.certify:
                 with timer.phase("quality"):
-                    safe = step_safety(last, step.mesh, mesh, (done, part), index + 1)
+                    ends = state.part, after.part
+                    safe = step_safety(state.mesh, after.mesh, self.mesh, ends, index)
                 step = replace(step, safe=safe)
-            coords = moved
-            done = part
-            index = index + 1
-            last = step.mesh
-            before = solution
-            ahead.pop(0)
-            if solution.short and solution.max_error > worst:
-                remarks = [_short_warning(setup, solution, index)]
-                worst = solution.max_error
-            elif not remarks:
-                remarks = _dropped_warning(setup, solution, index, total, mesh)
-            warnings += [f"step {index}: {text}" for text in solution.warnings]
-            if step.repaired is not None:
-                warnings += [text for text in step.repaired.warnings if text not in warnings]
-            if solution.relaxed is not None and solution.relaxed.limited:
-                warnings.append(_limited_note(solution.relaxed.limited, len(coords), index))
-            stray = []
-            if self.rate is None and self.case.method == "rbf":
-                if setup.frame.cylindrical:
-                    farthest = farthest_node(mesh.points, points)
-                stray = stray_warning(setup, mesh, points, farthest)
-            left = [] if ahead else wall_warnings(setup, self.case, mesh, points)
-            least = max(
-                least, (solution.error_estimate, solution.refined, index, solution.condition)
-            )
-            misfit, apart = self.misfit(step)
-            yield replace(
-                step,
-                warnings=(
-                    *warnings,
-                    *remarks,
-                    *_doubt_warning(*least),
-                    *apart,
-                    *torn_interfaces(mesh, points),
-                    *stray,
-                    *left,
-                ),
-                periodic_misfit=misfit,
-            )
+            state = after
+            yield self._checked(step, state.findings)
             seconds = {}
+
+    def _advanced(
+        self, state: _State, part: float, later: int, timer: PhaseTimer
+    ) -> tuple[Step, _State]:
+        """Return the step from a state to a part of the displacement, and the state after it.
+
+        ``later``: the number of steps after it. The step has only those warnings that need its
+        coordinates before REPAIR. Raises DeformError and UnsoundError as `steps` does.
+        """
+        setup = self.setup
+        mesh = self.mesh
+        index = state.index + 1
+        goal = value(setup.goal(setup.target, part))
+        solution = one_step(setup.at_step(not later), state.coords, goal, timer, state.solution)
+        coords = displaced_coords(setup, state.coords, value(solution.displacement), goal)
+        points = cartesian(setup.frame, mesh.points, setup.coords, coords)
+        if mesh.halo is not None:
+            points, coords = with_halo_copies(setup, mesh, mesh.halo, points, coords)
+        if not within(points, np.finfo(float).max):
+            raise DeformError(f"step {index}: coordinates became infinite; use more steps")
+        farthest = farthest_node(setup.coords, coords)
+        unsound = unsoundness(setup, mesh, solution, coords, part=part, farthest=farthest.length)
+        if unsound:
+            raise UnsoundError(f"step {index}: {unsound}")
+        step = self._made(index, index + later, points, solution, timer, part)
+        if self.rate is None and self.case.method == "rbf":
+            if setup.frame.cylindrical:
+                farthest = farthest_node(mesh.points, points)
+            step = replace(step, warnings=tuple(stray_warning(setup, mesh, points, farthest)))
+        if self.mend is not None and self.case.repair_steps:
+            step = self.mend(step)
+            coords = mended_coords(setup, step, coords)
+        findings = (*state.findings, _finding(setup, mesh, step, solution))
+        return step, _State(step.mesh, coords, index, part, solution, findings)
+
+    def _checked(self, step: Step, findings: Sequence[_Finding]) -> Step:
+        """Return a step with all its warnings; ``findings``: of the steps up to this one."""
+        misfit, apart = self.misfit(step)
+        points = step.mesh.points
+        left: list[str] = []
+        if step.index == step.total:
+            left = wall_warnings(self.setup, self.case, self.mesh, points)
+        warnings = (
+            *_run_warnings([*self.case.warnings, *self.setup.warnings], findings),
+            *apart,
+            *torn_interfaces(self.mesh, points),
+            *step.warnings,
+            *left,
+        )
+        return replace(step, warnings=warnings, periodic_misfit=misfit)
 
     def quality_of(self, steps: Sequence[Step]) -> Quality:
         """Return the quality after the last of some steps.
@@ -175,16 +202,18 @@ class Stepping:
             return self.rate(steps)
         return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
 
-    def _halvings(self, before: Mesh, after: Mesh) -> int:
-        """Return how often to halve a step that folds cells, at least once.
+    def _halvings(self, before: _State, after: _State) -> int:
+        """Return how often to halve the step between two states; 0 where it folds no more cells.
 
         A shorter step nearly takes the same straight paths, so that it folds a cell that folds on
         them before its end: solving it would be in vain.
         """
+        if after.inverted <= before.inverted:
+            return 0
         if not len(self.mesh.cells):  # the skin of a streamed mesh
             return 1
-        found = path_margins(after, before, self.mesh)
-        safe = float(found[found > 0].min(initial=1.0)) * ALIKE
+        margins = path_margins(after.mesh, before.mesh, self.mesh)
+        safe = float(margins[margins > 0].min(initial=1.0)) * ALIKE
         return next((k for k in range(1, HALVINGS) if 0.5**k <= safe), HALVINGS)
 
     def misfit(self, step: Step) -> tuple[float | None, list[str]]:
@@ -412,6 +441,45 @@ def with_halo_copies(
     out = moved.copy()
     out[halo.receivers[rows]] = setup.frame.coords(points[halo.receivers[rows]])
     return points, out
+
+
+def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Finding:
+    others = [f"step {step.index}: {text}" for text in solution.warnings]
+    if step.repaired is not None:
+        others += step.repaired.warnings
+    if solution.relaxed is not None and solution.relaxed.limited:
+        nodes = len(step.mesh.points)
+        others.append(_limited_note(solution.relaxed.limited, nodes, step.index))
+    return _Finding(
+        index=step.index,
+        condition=solution.condition,
+        max_error=solution.max_error,
+        error_estimate=solution.error_estimate,
+        refined=solution.refined,
+        short=[_short_warning(setup, solution, step.index)] if solution.short else [],
+        dropped=_dropped_warning(setup, solution, step.index, step.total, mesh),
+        others=others,
+    )
+
+
+def _run_warnings(before: Sequence[str], findings: Sequence[_Finding]) -> list[str]:
+    """Return the warnings of a run after some steps, each once.
+
+    Of the reductions that ended too early the one with the largest error is told, else the first
+    step that left out nodes; and the step whose solution is worst.
+    ``before``: warnings from before the first step.
+    """
+    others = [text for finding in findings for text in finding.others]
+    ended = [finding for finding in findings if finding.short]
+    if ended:
+        of_nodes = max(ended, key=lambda finding: finding.max_error).short
+    else:
+        of_nodes = next((finding.dropped for finding in findings if finding.dropped), [])
+    worst = max(
+        findings, key=lambda finding: (finding.error_estimate, finding.refined, finding.index)
+    )
+    doubt = _doubt_warning(worst.error_estimate, worst.refined, worst.index, worst.condition)
+    return [*dict.fromkeys([*before, *others]), *of_nodes, *doubt]
 
 
 def _short_warning(setup: Setup, solution: Solution, index: int) -> str:

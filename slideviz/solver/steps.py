@@ -17,7 +17,7 @@ from slideviz.mesh.margin import SafeFraction, chain
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
-from slideviz.rbf.problem import Cycle, Relaxed
+from slideviz.rbf.problem import Cycle, PhaseTimer, Relaxed
 
 if TYPE_CHECKING:
     from slideviz.case.limits import LimitResult
@@ -45,6 +45,19 @@ class Progress:
     def of_zone(self) -> str:
         """Return the zone in words, for the end of a sentence; "" where there is only one."""
         return "" if self.zone is None else f" of zone {self.zone}"
+
+
+def step_timer(
+    report: Callable[[Progress], None],
+    step: int = 1,
+    total: int = 1,
+    seconds: dict[str, float] | None = None,
+) -> PhaseTimer:
+    """Return a timer that reports the phases of one step of ``total``, and adds to ``seconds``."""
+    return PhaseTimer(
+        lambda phase, fraction: report(Progress(step, total, phase, fraction)),
+        {} if seconds is None else seconds,
+    )
 
 
 @dataclass(frozen=True)
