@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_shared, read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
+from slideviz.errors import CaseError
+from slideviz.terms import PERIODIC_MODES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,7 +67,6 @@ def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.terminal import DONE
-    from slideviz.errors import CaseError
     from slideviz.study.combinations import (
         COMPARED_METHODS,
         MODES,
@@ -113,7 +114,6 @@ def _say(arguments: argparse.Namespace, text: str) -> None:
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
     """Return the combinations that the arguments ask for; CaseError if an item is not valid."""
-    from slideviz.errors import CaseError
     from slideviz.study.combinations import (
         AUTO,
         COMPARED_METHODS,
@@ -121,7 +121,6 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
         wanted_methods,
         wanted_modes,
     )
-    from slideviz.terms import PERIODIC_MODES
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
         text = getattr(arguments, option)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from slideviz.cli.options import add_shared
 from slideviz.cli.terminal import say
+from slideviz.errors import CaseError
 
 
 def add_convert(calls: argparse._SubParsersAction) -> None:
@@ -41,7 +42,6 @@ def convert(arguments: argparse.Namespace) -> int:
 
 def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
     """Return whether to convert piece by piece: with ``--stream``, or if memory is too small."""
-    from slideviz.errors import CaseError
     from slideviz.streaming.converting import streamed_kind
     from slideviz.streaming.resources import missing_memory_of
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, changed
 from slideviz.cli.terminal import say
+from slideviz.errors import CaseError, SlidevizError
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -45,7 +46,6 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     from slideviz.cli.output_paths import add_case_inputs
     from slideviz.design.su2.config import own_changes, read_config
     from slideviz.design.su2.on_mesh import on_mesh, read_mesh
-    from slideviz.errors import CaseError
 
     own, others = own_changes(arguments.set)
     config = read_config(arguments.case, own)
@@ -155,8 +155,6 @@ def run_def(arguments: argparse.Namespace) -> int:
 @contextmanager
 def _relaxation_told(config: Su2Config) -> Iterator[None]:
     """Context that adds a line about OPT_RELAX_FACTOR to errors, unless it is 1."""
-    from slideviz.errors import SlidevizError
-
     try:
         yield
     except SlidevizError as problem:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.def_command import add_config, read_configuration, variable_rows
 from slideviz.cli.options import add_shared
+from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,7 +33,6 @@ def run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.terminal import DONE
     from slideviz.design.su2.gradients import design_gradients
     from slideviz.design.su2.sensitivities import sensitivity_files
-    from slideviz.errors import CaseError
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
@@ -87,7 +87,6 @@ def _write_surface(path: Path, found: Gradients) -> None:
     """Write a line ``x, y, z, dJ/dx, dJ/dy, dJ/dz`` for each moving node; in 2D z's are 0."""
     import numpy as np
 
-    from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
 
     table = np.zeros((len(found.points), 6))
@@ -100,7 +99,6 @@ def _write_surface(path: Path, found: Gradients) -> None:
 
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
     """Write a line with the name of the objective, and one with the gradient of each variable."""
-    from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
 
     objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()

@@ -19,6 +19,7 @@ from slideviz.cli.options import (
     require_mesh_file,
     size,
 )
+from slideviz.errors import CaseError
 from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
@@ -122,7 +123,6 @@ def film(arguments: argparse.Namespace) -> int:
 def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
     from slideviz import quality
-    from slideviz.errors import CaseError
     from slideviz.scene.overview import require_detail
     from slideviz.session.state import Run, StepFrame
 

@@ -12,6 +12,7 @@ from slideviz.cli.options import add_changes, add_shared, read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.section_options import pair_of_names
 from slideviz.cli.terminal import holding
+from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
     from slideviz.design.gap import Gap
@@ -57,7 +58,6 @@ def _gap(arguments: argparse.Namespace) -> int:
     from slideviz import deform, gaps, quality
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.cli.terminal import DONE, INVERTED
-    from slideviz.errors import CaseError
     from slideviz.plots.section_picture import require_picture_name
 
     if arguments.output is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_shared
+from slideviz.errors import MeshError
 
 if TYPE_CHECKING:
     from slideviz.ffd.box import Box
@@ -102,7 +103,6 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
 
 def _boxes(mesh: Mesh) -> tuple[tuple[Box, ...], str]:
     """Return the FFD boxes of a mesh, and what is wrong with them, or ""."""
-    from slideviz.errors import MeshError
     from slideviz.ffd.section import boxes_of
 
     try:

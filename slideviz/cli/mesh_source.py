@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.errors import MeshError
+
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.metrics import MetricValues
@@ -77,7 +79,6 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     """
     from slideviz.case.zones import with_marker_names
     from slideviz.cli.report import print_remarks
-    from slideviz.errors import MeshError
     from slideviz.formats.files import read
     from slideviz.streaming.stream_input import open_read_only
 

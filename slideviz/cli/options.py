@@ -7,8 +7,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from slideviz.errors import not_one_of
-from slideviz.terms import NO_REFERENCE, RATED, Quantity, field_of
+from slideviz.errors import CaseError, not_one_of
+from slideviz.terms import NO_REFERENCE, RATED, ROLES, Quantity, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -138,8 +138,6 @@ def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
 
 def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
     """Return the mesh file of a case, or raise CaseError."""
-    from slideviz.errors import CaseError
-
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     return case.mesh_file
@@ -183,7 +181,6 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     """
     from slideviz.case.cfg import set_key
     from slideviz.case.check import idle_roles, raise_all
-    from slideviz.errors import CaseError
 
     before = idle_roles(case)
     problems = []
@@ -214,7 +211,6 @@ def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:
     before.
     """
     from slideviz.case.motions.motion import named
-    from slideviz.terms import ROLES
 
     periodic = case.markers_with("periodic")
     for name, (option, role) in taken.items():
@@ -265,8 +261,6 @@ def checked(read: Callable[[str], Read]) -> Callable[[str], Read]:
     """Return the type of an argument that ``read`` reads: its CaseError means wrong usage."""
 
     def argument(text: str) -> Read:
-        from slideviz.errors import CaseError
-
         try:
             return read(text)
         except CaseError as problem:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.terminal import say
+from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -54,8 +55,6 @@ def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
 def qualities_path(output: Path) -> Path:
     """Return the path of the qualities of cells, beside a mesh; CaseError if that is a folder."""
     if not output.name:
-        from slideviz.errors import CaseError
-
         raise CaseError(f"{output}: is a folder; expected the name of the mesh to write")
     return output.with_name(f"{output.stem}_qual.txt")
 
@@ -73,7 +72,6 @@ def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) ->
     input file, or two results are one file; the folder is missing, there is no permission, a folder
     has that name, or no mesh format has that ending.
     """
-    from slideviz.errors import CaseError
     from slideviz.system.atomic import require_writable
     from slideviz.system.file_checks import require_no_input
 
@@ -146,7 +144,6 @@ def _require_mesh_ending(file: Path) -> None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder and its parents where they are missing, or raise CaseError."""
-    from slideviz.errors import CaseError
     from slideviz.system.atomic import reason_of
 
     try:

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from slideviz import __version__
-from slideviz.errors import nearest
+from slideviz.errors import CaseError, nearest
 
 
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given; return the exit code."""
-    from slideviz.errors import CaseError, nearest
     from slideviz.export.offscreen import display_fault
 
     if arguments.file is not None and not arguments.file.exists():

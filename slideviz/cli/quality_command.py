@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, checked, optional_case, reference_words
+from slideviz.errors import CaseError, MeshError
 from slideviz.formats.table import holds_quality, own_endings
-from slideviz.terms import METRICS, RATED, SKEW_METRICS, WALL_VALUES, field_of
+from slideviz.terms import CELL_STATES, METRICS, RATED, SKEW_METRICS, WALL_VALUES, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -72,7 +73,6 @@ def quality(arguments: argparse.Namespace) -> int:
     from slideviz.case.limits import MeasuredMesh, check_limits
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.errors import CaseError
     from slideviz.formats.files import metric_data, quality_data
 
     output = arguments.output
@@ -117,7 +117,6 @@ def quality(arguments: argparse.Namespace) -> int:
 def _require_streamed(arguments: argparse.Namespace) -> None:
     """Raise CaseError for what needs the mesh in memory, where ``--stream`` is set."""
     from slideviz.case.limits import require_streamed
-    from slideviz.errors import CaseError
 
     if not arguments.stream:
         return
@@ -187,7 +186,6 @@ def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
 
     None, which means all, if there are none such or the mesh is in a file.
     """
-    from slideviz.errors import MeshError
     from slideviz.mesh.periodic import find_pairs
     from slideviz.session.opening import guess_by_name
 
@@ -206,7 +204,6 @@ def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
 def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> Walls | None:
     """Return the layers at the boundaries ``names`` of a mesh; None for one in a file."""
     from slideviz import walls
-    from slideviz.errors import MeshError
 
     if mesh.part is not None:
         return None
@@ -218,9 +215,7 @@ def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> W
 
 def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
     """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
-    from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
-    from slideviz.terms import CELL_STATES
 
     columns = zip(found.values, found.size, found.skew, found.status, *more.values(), strict=True)
     lines = [",".join(("cell,size_skew,size,skew,status", *more))]

@@ -29,6 +29,7 @@ from slideviz.cli.run_outcome import (
     write_qualities,
 )
 from slideviz.cli.terminal import say
+from slideviz.errors import CaseError
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 from slideviz.terms import METRICS, WALL_VALUES
 
@@ -85,7 +86,6 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.case.zones import with_marker_names
     from slideviz.cli.output_paths import qualities_path
     from slideviz.cli.report import metrics_report, run_report
-    from slideviz.errors import CaseError
 
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -248,7 +248,6 @@ def require_streamable(
     """
     if not arguments.stream:
         return
-    from slideviz.errors import CaseError
     from slideviz.streaming.run import require_stream
 
     for name in _needing_memory(arguments):
@@ -332,8 +331,6 @@ def _require_output_paths(
 
 
 def _require_series(path: Path) -> None:
-    from slideviz.errors import CaseError
-
     if not format_for(path).series:
         raise CaseError(
             f"{path}: only {own_endings('series')} files hold all steps; end the name of "
@@ -350,8 +347,6 @@ def _default_output(case: Case) -> Path:
 
 def _format_of(output: Path, case: Case) -> FileFormat | None:
     """Return the format of MESH_OUT_FORMAT, or None; raise CaseError if ``-o`` contradicts it."""
-    from slideviz.errors import CaseError
-
     kind = case.mesh_out_format
     ending = output.suffix.lower()
     if kind and output != case.mesh_out and ending in FORMATS and ending != f".{kind}":

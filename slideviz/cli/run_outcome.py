@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from slideviz.errors import CaseError
 from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
@@ -82,8 +83,6 @@ def write_qualities(path: Path, found: Quality) -> None:
     """Write a line with the size-skew quality of each cell, as RBF-SliDe's GENERATE_QUALITY."""
     import numpy as np
     import orjson
-
-    from slideviz.errors import CaseError
 
     with atomic_write(path, CaseError) as file:
         for first in range(0, len(found), _ROWS):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.cli.section_options import limits, neighbours, pair_of_names, pixels, section_reader
+from slideviz.errors import CaseError
 from slideviz.terms import COLOR_MAPS, QUANTITIES, SKEW_METRICS
 
 if TYPE_CHECKING:
@@ -165,7 +166,6 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     import numpy as np
 
     from slideviz.cli.mesh_source import open_mesh, progress_of
-    from slideviz.errors import CaseError
     from slideviz.session.passages import keeps
     from slideviz.streaming.quality import quality_blocks
     from slideviz.streaming.source import cut_cells, join_blocks
@@ -307,7 +307,6 @@ def _section_and_passages(
     """Return the section, and the transformation (4, 4) of each passage."""
     import numpy as np
 
-    from slideviz.errors import CaseError
     from slideviz.sections.span import find_walls
     from slideviz.session.passages import find_period, find_periods, passages
 

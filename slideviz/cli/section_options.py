@@ -11,6 +11,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Literal
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
+from slideviz.errors import CaseError
 from slideviz.terms import AXES
 
 if TYPE_CHECKING:
@@ -138,7 +139,6 @@ def _section(
     kind: str, origin: Sequence[float], direction: Sequence[float], size: float = 0.0
 ) -> Section:
     """Return a section; its CaseError becomes an ArgumentTypeError. Missing numbers are 0."""
-    from slideviz.errors import CaseError
     from slideviz.sections.model import Section
 
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0

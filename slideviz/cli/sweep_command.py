@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, integer, read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
+from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +81,6 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz.cli.terminal import DONE
     from slideviz.design.sweeps.results import RESULTS
     from slideviz.design.sweeps.table import read_designs
-    from slideviz.errors import CaseError
 
     case = read_case(arguments)
     if arguments.columns:
@@ -147,8 +147,6 @@ def _print_columns(case: Any) -> int:
 @contextmanager
 def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
     """Context with the executor of ``--scheduler``, or None; CaseError if there is none."""
-    from slideviz.errors import CaseError
-
     if arguments.scheduler is None:
         yield None
         return
