@@ -54,8 +54,8 @@ def without_repair(case: Case) -> tuple[Case, tuple[str, ...]]:
     if case.repair == "no":
         return case, ()
     said = (
-        f"REPAIR= {case.repair.upper()} is left out here: where nodes go to mend cells is no "
-        "smooth function of the displacement; points and derivatives are those before the repair"
+        f"REPAIR= {case.repair.upper()} is ignored by a Deformer, because repaired positions are "
+        "not differentiable; points and derivatives are those before the repair"
     )
     return case.change(repair="no"), (said if case.repair == "yes" else Note(said),)
 

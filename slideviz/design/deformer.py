@@ -473,7 +473,7 @@ class Deformer:
         design = self._checked(displacement, "displacement")
         if design.ndim == 3:
             raise CaseError(
-                "derivatives are taken at one displacement; call it for each of several"
+                "derivatives are taken at one displacement; call it for each displacement"
             )
         start = Tape().variable(design)
         end = self._points(start)

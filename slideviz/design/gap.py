@@ -308,8 +308,8 @@ def _by_zone(mesh: Mesh, between: Sequence[tuple[str, str]]) -> list[list[tuple[
                 break
         else:
             raise CaseError(
-                f"{one} and {other} are of two zones, whose passages repeat differently, so there "
-                "is no one distance between them; name two boundaries of one zone"
+                f"{one} and {other} belong to zones with different periods, so their distance is "
+                "not unique; name two boundaries of one zone"
             )
     return out
 

@@ -62,7 +62,7 @@ class SpanVariables:
         """
         span = [k for k, motion in enumerate(case.motions) if isinstance(motion, SpanMotion)]
         if not span:
-            raise CaseError("the case has no motion over the span; add one, as SpanMotion(...)")
+            raise CaseError("the case has no motion over the span; add one, e.g. SpanMotion(...)")
         _require_last(case, span[0])
         moved = displacements(case, mesh)
         self.mesh = mesh
@@ -147,6 +147,6 @@ def _require_last(case: Case, first: int) -> None:
     for place, motion in enumerate(case.motions[first:], start=first + 1):
         if motion.depends_on_place:
             raise CaseError(
-                f"motion {place} turns or scales what motion {first + 1} has moved over the span, "
-                "so derivatives would have to go through it; put it before"
+                f"motion {place} turns or scales nodes that motion {first + 1} has moved over the "
+                "span, which has no derivatives; put it before that motion"
             )

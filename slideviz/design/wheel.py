@@ -104,8 +104,8 @@ def wheel(
     Raises
     ------
     CaseError, MeshError, DeformError
-        The case has no periodic boundaries that are turned images, their angle is no whole part of
-        a turn, passages do not meet, or one cannot be deformed.
+        The case has no periodic boundaries that are turned images, their angle is not a whole part
+        of a turn, passages do not meet, or one cannot be deformed.
 
     Examples
     --------
@@ -132,7 +132,10 @@ def wheel(
     counts = [count for *_, count in _repeated(case, mesh, passages)]
     rows = read_designs(case, designs).rows if designs is not None else ()
     if len(rows) > max(counts):
-        raise CaseError(f"the table has {len(rows)} rows for {max(counts)} passages; one for each")
+        raise CaseError(
+            f"the table has {len(rows)} rows for {max(counts)} passages; give at most one row for "
+            "each"
+        )
     _require_passages(case, mesh, [row.case for row in rows], counts)
     cases = [row.case for row in rows]
     if len(rows) < max(counts):
@@ -157,7 +160,7 @@ def _require_passages(case: Case, mesh: Mesh, rows: Sequence[Case], counts: Sequ
             if motions[zone] != moved[0][zone]:
                 raise CaseError(
                     f"row {number} of the table moves zone {zone + 1}, which has {count} passages "
-                    "only; let it move there as the case does"
+                    f"only; let zone {zone + 1} move there as in the case"
                 )
 
 
@@ -219,8 +222,8 @@ def _repeated_zone(case: Case, mesh: Mesh, passages: Count) -> tuple[Mesh, tuple
     count = round(2.0 * np.pi / period) if passages == "all" else passages
     if passages == "all" and abs(count * period - 2.0 * np.pi) > 1e-9:
         raise CaseError(
-            f"the period is {np.degrees(period):.6g}°, which is no whole part of a turn; give "
-            "the number of passages"
+            f"the period is {np.degrees(period):.6g}°, and 360° is not a multiple of it; give the "
+            "number of passages"
         )
     most = int(2.0 * np.pi / period + 1e-9)
     if count > most:

@@ -378,8 +378,8 @@ class BoxDeformation:
         lost = int(self.nodes[nodes].any(axis=1).sum())
         if lost and not box.level:
             self.notes.append(
-                f"{lost} nodes in the FFD box {box.name!r} are in one before it, too: as in SU2, "
-                f"they move with the last one, and lose the motion of the other"
+                f"{lost} nodes in the FFD box {box.name!r} are also in an earlier box; as in SU2, "
+                "they move with the last box only"
             )
 
     def _bound(self, box: Box) -> None:
@@ -409,9 +409,11 @@ class BoxDeformation:
         )
         mine = [drive for drive in self.drives if drive.box == box.name]
         if not all(drive.relaxed for drive in mine):
-            text += ", but those of several values are applied twice, as in SU2"
+            text += ", but variables with several values are applied twice, as in SU2"
         if after := self._after(box, relaxed=True):
-            text += f"; as in SU2, those of {after} get {self._relax:.6g} for OPT_RELAX_FACTOR"
+            text += (
+                f"; as in SU2, the variables of {after} get {self._relax:.6g} for OPT_RELAX_FACTOR"
+            )
         self.notes.append(text)
 
     def _after(self, box: Box, *, relaxed: bool = False) -> str:
@@ -453,7 +455,7 @@ class BoxDeformation:
                 total += step
         self._factor *= step
         text = f"FFD_INTPREV: the FFD box {box.name!r} is deformed by {100.0 * total:g} % only"
-        text += ", and still intersects itself" if folded else ", as it intersected itself"
+        text += ", and still intersects itself" if folded else ", since it intersected itself"
         if after := self._after(box):
             text += f"; as in SU2, the variables of {after} get {self._factor:g} times their values"
         self.notes.append(text)

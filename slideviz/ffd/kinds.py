@@ -197,7 +197,7 @@ def variable_problem(box: Box, request: Request, dim: int, values: Sequence[floa
         kind in ("FFD_ROTATION", "FFD_CONTROL_SURFACE")
         and request.numbers[:3] == request.numbers[3:]
     ):
-        return f"{kind}: its two points are one; the line between them has no direction"
+        return f"{kind}: its two points coincide, so the line between them has no direction"
     across = 2 if box.system.kind == "CARTESIAN" else 1  # in which a plane mesh must not move
     moves = moves_of(box, request)
     for move, value in zip(moves, values, strict=False):

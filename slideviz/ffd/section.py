@@ -78,9 +78,7 @@ def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
     word = _value(line)
     if not word.isdecimal() or int(word) != len(names):
         has = f"{len(names)} ({', '.join(names)})" if names else "none"
-        raise _error(
-            mesh, at, f"FFD_NBOX= {word}, but the FFD boxes that follow are {has}; correct it"
-        )
+        raise _error(mesh, at, f"FFD_NBOX= {word}, but the file has {has}; correct it")
 
 
 def _error(mesh: Mesh, line: int, why: str) -> MeshError:
@@ -166,7 +164,7 @@ class _Reader:
         """Raise MeshError where a parent or child is not among the names of the boxes."""
         for name in (*self.tags("FFD_PARENTS"), *self.tags("FFD_CHILDREN")):
             if name not in names:
-                raise self.error(f"there is no FFD box {name!r} beside it, but {', '.join(names)}")
+                raise self.error(f"there is no FFD box {name!r}, only {', '.join(names)}")
 
     def check_nesting(self, box: Box, boxes: tuple[Box, ...], levels: int) -> None:
         """Raise MeshError where SU2 could not deform a nested box with those around it."""
@@ -179,12 +177,12 @@ class _Reader:
             why = f"FFD_LEVEL is {box.level}; FFD_NLEVEL must be larger, and is {levels}"
             raise self.error(why, "FFD_LEVEL")
         if parents and box.level <= by_name[box.parent].level:
-            why = f"FFD_LEVEL is {box.level}, as low as that of its parent {box.parent!r}"
+            why = f"FFD_LEVEL is {box.level}, not above the level of its parent {box.parent!r}"
             raise self.error(f"{why}; make it larger", "FFD_LEVEL")
         inner = {each.name for each in boxes if each.parent == box.name}
         if inner != set(self.tags("FFD_CHILDREN")):
             named = ", ".join(sorted(inner)) or "none"
-            why = f"FFD_CHILDREN must list the boxes that have it for a parent, which are {named}"
+            why = f"FFD_CHILDREN must list the boxes whose parent it is: {named}"
             raise self.error(why)
 
     def orders(self, letters: str) -> Index | None:
@@ -237,7 +235,7 @@ class _Reader:
             bad = (number != np.floor(number)) | (number < 0) | (number >= most)
             if bad.any():
                 line, words = tails[int(np.argmax(bad))]
-                raise self.error(f"{key} names node {words[0]}, which is none", line)
+                raise self.error(f"{key} names node {words[0]}, which does not exist", line)
             far = np.abs(table[:, 1:]).max(axis=1) > _FARTHEST
             if far.any():
                 line, words = tails[int(np.argmax(far))]
@@ -258,7 +256,7 @@ class _Reader:
         """Return the value of a key, a whole number from 0."""
         word = (self.entry(key).value.split() or [""])[0]
         if not word.isdecimal():
-            raise self.error(f"{key}= {word} is no whole number from 0", key)
+            raise self.error(f"{key}= {word} is not a whole number from 0", key)
         return int(word)
 
     def numbers(self, key: str, count: int, width: int) -> FloatArray:
@@ -328,7 +326,7 @@ def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:
     for file, (nodes, uvw) in box.embedded.items():
         name, zone = _holder(mesh, part, file, box)
         if nodes.max(initial=-1) >= len(zone.mesh.points):
-            why = f"lists node {nodes.max()} of {name}, which has none of that number"
+            why = f"lists node {nodes.max()} of {name}, which does not exist"
             raise MeshError(f"{mesh.name}: the FFD box {box.name!r} {why}")
         embedded[name] = nodes + zone.points.start, uvw
     return replace(box, embedded=embedded)

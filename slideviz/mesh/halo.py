@@ -119,7 +119,7 @@ def make_halo(
 def _rooted(
     count: int, receivers: IntArray, donors: IntArray, rotations: FloatArray, mismatch: FloatArray
 ) -> tuple[IntArray, FloatArray]:
-    """Return donors (h,) and rotations (h, d, d) without chains: donors that are no receivers.
+    """Return donors (h,) and rotations (h, d, d) without chains: donors that are not receivers.
 
     ``mismatch`` (h,) is summed along the chains, in place.
     """

@@ -63,8 +63,8 @@ def disjoint_interfaces(mesh: Mesh, names: Sequence[str]) -> tuple[str, ...]:
             other = mesh.points[mesh.marker(pair[1]).nodes]
             gap = nearest(other, one, np.inf, COINCIDENT * mesh.extent)[0].min(initial=np.inf)
             sentences.append(
-                f"MARKER_ZONE_INTERFACE: {pair[0]} and {pair[1]} coincide nowhere, their nodes are "
-                f"{gap:.3g} apart or more; each moves by its own role, as beside a mixing plane"
+                f"MARKER_ZONE_INTERFACE: {pair[0]} and {pair[1]} do not coincide (closest nodes "
+                f"{gap:.3g} apart) and are treated as independent"
             )
     return tuple(sentences)
 
@@ -83,7 +83,7 @@ def torn_interfaces(mesh: Mesh, points: FloatArray, names: Sequence[str] = ()) -
         gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
         if gap > ROUNDING * mesh.extent:
             said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
-            remedy = "move both alike, or let one of them be fixed, so that it follows the other"
+            remedy = "move both alike, or make one of them fixed, so that it follows the other"
             if not mesh.zone_parts:
                 remedy = "keep it fixed, or deform all zones (without ZONE=)"
             elif each not in kept:

@@ -320,7 +320,7 @@ def _boundary_areas(mesh: Mesh) -> FloatArray:
     """Return the smallest and the largest area (n, 2) of the markers at each node; inf, 0 for none.
 
     A marker's area at a node is the length of the sum of its facets' normals there. Facets between
-    two cells (internal boundaries) are no boundary of a control volume, nor is a halo's.
+    two cells (internal boundaries) do not bound a control volume, nor do a halo's.
     """
     limits = np.empty((len(mesh.points), 2))
     limits[:] = np.inf, 0.0

@@ -307,7 +307,7 @@ def _left_over(
     """
     good: list[Pair] = []
     alone = list(names)
-    why = "they are no images of each other; choose other markers"
+    why = "they are not images of each other; choose other markers"
     for each in _KINDS[kind]:
         for one, other in combinations(names, 2):
             if one in alone and other in alone:

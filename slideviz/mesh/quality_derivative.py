@@ -79,7 +79,7 @@ def derivative_of(
     ``sums`` (m,): those of the corner Jacobians of the undeformed cells. None if there is no
     undeformed mesh: there is no factor of size then, and Jacobians of inverted cells are not
     divided by a mean. ``going_on`` is called every few thousand cells; what it raises ends the
-    work. Raises MeshError if a point is no number, or an undeformed cell has no positive volume to
+    work. Raises MeshError if a point is not finite, or an undeformed cell has no positive volume to
     compare with, and CaseError if the exponent is below 1 or no number.
     """
     _check_exponent(p)
@@ -113,7 +113,9 @@ def derivative_of(
 def _check_exponent(p: float) -> None:
     """Raise CaseError if the exponent of a smooth minimum is below 1 or no number."""
     if not 1 <= p < np.inf:
-        raise CaseError(f"the exponent of the smooth minimum is {p}; give one of 1 or more, as 50")
+        raise CaseError(
+            f"the exponent of the smooth minimum, p = {p}, is too small; give p >= 1 (default 50)"
+        )
 
 
 def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
@@ -135,8 +137,8 @@ def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
 def _flat_sentence(cell: int, mesh: Mesh) -> str:
     """Return the message that an undeformed cell has no positive volume."""
     return (
-        f"cell {cell} of the undeformed mesh has no positive volume that the one of {mesh.name} "
-        "could be compared with; repair it, or leave the reference away"
+        f"cell {cell} of the undeformed mesh has no positive volume to compare {mesh.name} with; "
+        "repair it, or leave out the reference"
     )
 
 
@@ -254,7 +256,7 @@ def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
 def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
     """Return minus each scaled coefficient (k, m) of inverted cells, and -1 for positive ones.
 
-    Coefficients that are no corner Jacobians count only where all of these are positive: they may
+    Coefficients that are not corner Jacobians count only where all of these are positive: they may
     be negative in a valid cell, and there would be a jump where the first corner folds.
     """
     coefficients = -scale * _coefficients(vtk, at)

@@ -202,7 +202,7 @@ def facet_connectivity(facets: IntArray) -> IntArray:
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     """Return a surface for each marker of the mesh, in their order.
 
-    Raises MeshError if a marker element is no side of any cell.
+    Raises MeshError if a marker element is not a side of any cell.
     """
     if not mesh.markers:
         return ()

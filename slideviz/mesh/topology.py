@@ -66,7 +66,7 @@ class Boundary:
 def find_boundary(mesh: Mesh) -> Boundary:
     """Return the oriented boundary of a mesh, without the facets that belong to its halo.
 
-    Raises MeshError if a marker element is no side of any cell.
+    Raises MeshError if a marker element is not a side of any cell.
     """
     mesh, ids = without_halo(mesh)
     width = 2 if mesh.dim == 2 else 4
@@ -144,7 +144,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
         lost = int(np.argmin(owner))
         raise MeshError(
             f"{mesh.name}: marker {mesh.marker_names[marker_of[lost]]!r} has an element with the "
-            f"nodes {', '.join(map(str, np.unique(facets[lost])))} that is no side of any cell; "
+            f"nodes {', '.join(map(str, np.unique(facets[lost])))} that is not a side of any cell; "
             "remove it from the marker or add the missing cell"
         )
     return owner

@@ -23,7 +23,7 @@ height ratio        first height after over before.
 angle change        absolute difference of the wall angles after and before.
 ==================  ==============================================================================
 
-At a periodic side only the facets of this side count. A halo's cells are no part of a stack.
+At a periodic side only the facets of this side count. A halo's cells are not part of a stack.
 Sources: AIAA drag prediction workshops 4 to 7, gridding guidelines (growth, equal layers).
 """
 
@@ -117,7 +117,7 @@ def find_columns(
 ) -> Columns:
     """Return the columns of at most ``layers`` layers that leave ``markers``; None: all.
 
-    Raises MeshError if a marker element is no side of any cell.
+    Raises MeshError if a marker element is not a side of any cell.
     """
     boundary = boundary_of(mesh)
     if markers is not None and set(markers) != set(boundary.names):
@@ -337,7 +337,7 @@ class Walls:
         others = [name for name in markers if name not in self.columns.markers]
         if others:
             raise MeshError(
-                f"the walls at {', '.join(others)} were not measured, but those at "
+                f"the walls at {', '.join(others)} were not measured, only those at "
                 f"{', '.join(self.columns.markers)}; give all of them to walls(mesh, markers=...)"
             )
         return replace(self, markers=tuple(markers))
@@ -482,8 +482,8 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     Raises
     ------
     MeshError
-        A boundary is not there, an element of one is no side of a cell, or the reference is another
-        mesh.
+        A boundary is not there, an element of one is not a side of a cell, or the reference is
+        another mesh.
 
     Examples
     --------

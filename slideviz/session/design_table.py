@@ -273,13 +273,13 @@ def write_results(path: Path, table: DesignTable) -> None:
 def read_results(path: Path) -> DesignTable:
     """Return the table that `write_results` wrote, with its results.
 
-    Raises CaseError if the file cannot be read, or is no table of results.
+    Raises CaseError if the file cannot be read, or is not a table of results.
     """
     try:
         head, *lines = csv_rows(path.read_text(encoding="utf-8"))
         results = [replace(result_of(head, c), design=k) for k, c in enumerate(lines, start=1)]
     except (OSError, ValueError, KeyError) as problem:
-        raise CaseError(f"{path}: is no table of results ({problem})") from problem
+        raise CaseError(f"{path}: is not a table of results ({problem})") from problem
     columns = design_columns(head)
     done = [row for row in results if row.problem or row.steps]
     return DesignTable(tuple(head[columns]), tuple(tuple(c[columns]) for c in lines)).with_results(

@@ -198,7 +198,7 @@ def test_each_zone_has_the_gaps_that_it_has_alone(tmp_path, monkeypatch, capsys)
     still = case.change(roles=roles | {"1:blade": "fixed"})
     assert [one.zone for one in sv.gaps(still, mesh)] == [2]
     assert [one.zone for one in sv.gaps(still, mesh, between=[("1:hub", "1:blade")])] == [1, 2]
-    with pytest.raises(CaseError, match="1:hub and 2:hub are of two zones, whose passages repeat"):
+    with pytest.raises(CaseError, match="1:hub and 2:hub belong to zones with different periods"):
         sv.gaps(case, mesh, between=[("1:hub", "2:hub")])
     with pytest.raises(CaseError, match="no boundary moves besides hub and shroud"):
         sv.gaps(case.change(roles={}), mesh)

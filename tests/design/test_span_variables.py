@@ -76,7 +76,7 @@ def test_what_has_no_such_derivatives_is_refused(impeller):
     mesh, case = impeller.mesh, impeller.case
     with pytest.raises(CaseError, match="has no motion over the span; add one"):
         sv.SpanVariables(mesh, case.change(motions=(sv.Rotate("BLADE", 1.0),)))
-    with pytest.raises(CaseError, match="motion 3 turns or scales what motion 1 has moved"):
+    with pytest.raises(CaseError, match="motion 3 turns or scales nodes that motion 1 has moved"):
         sv.SpanVariables(mesh, case.change(motions=(*case.motions, sv.Rotate("BLADE", 1.0))))
     design = sv.SpanVariables(mesh, case)
     weights = np.ones((len(design.nodes), 3))

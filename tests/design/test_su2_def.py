@@ -318,7 +318,7 @@ def test_surface_file_gives_positions_in_any_order(here):
         ("3 1 2\n4 1 2 1\n", r"dat:2: z is '1', and the mesh has 2 dim"),
         ("3 1 2 0 0\n", r"dat:1: '3 1 2 0 0' has 5 columns; expected 3"),
         ("99 1 2\n", r"node 99 is not in the mesh; its nodes are 0 to 48"),
-        ("30 1 2\n48 1 1\n", r"none of its 2 nodes is on DV_MARKER= \(low\), so that nothing"),
+        ("30 1 2\n48 1 1\n", r"none of its 2 nodes is on DV_MARKER= \(low\), so nothing"),
     ],
 )
 def test_mistakes_of_a_surface_file_speak_of_positions(text, message, here):
@@ -498,7 +498,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
             r"5: DV_KIND: SU2 has no kind HIKS_HENNE; did you mean",
         ),
         ("DV_KIND= XYZ\nDV_VALUE= 1", "SU2 has no kind XYZ; supported: NO_DEFORMATION, "),
-        ("DV_KIND= SCALE, AIRFOIL", "AIRFOIL is not supported, as SU2 asks for its file at a term"),
+        ("DV_KIND= SCALE, AIRFOIL", "AIRFOIL is not supported, because SU2 asks for its file"),
         (
             "DV_KIND= FFD_TWIST_2D",
             "is not supported: it moved nothing in SU2 7, and SU2 8 lacks it",
@@ -545,7 +545,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ),
         (
             "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1.5, 0, 0, 1)",
-            "an index is no whole number from -1",
+            "an index is not a whole number from -1",
         ),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nSLIDING_MODE= sideways", "SLIDING_MODE: 'sideways' is not"),
         (
@@ -561,7 +561,10 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ("DV_KIND= SCALE\nDV_VALUE= 1\nOPT_RELAX_FACTOR= x", "OPT_RELAX_FACTOR: 'x' is not a numb"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nDV_VALUE= 2", "a.cfg:6: DV_VALUE is given again in line 7"),
         ("NDIME= 2\n0 1", "^a.cfg: is an SU2 mesh, not a case file; name it in MESH_FILENAME=$"),
-        ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_FIX_I= (a)", r"FFD_FIX_I: '\(a\)' is no list of whole"),
+        (
+            "DV_KIND= SCALE\nDV_VALUE= 1\nFFD_FIX_I= (a)",
+            r"FFD_FIX_I: '\(a\)' is not a list of whole",
+        ),
     ],
 )
 def test_mistakes_are_told_with_their_line(text, message, here):

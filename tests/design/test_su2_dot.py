@@ -267,7 +267,7 @@ def test_surface_sensitivity_does_not_say_what_a_moved_grid_does(case, capsys):
     )
     write_surface_csv("adj_cd.csv", points, weights[:, 0], range(len(points)))
     assert run(["dot", "dot.cfg", "-q"]) == 1
-    assert "has Surface_Sensitivity only, which is of the surfaces in" in capsys.readouterr().err
+    assert "has Surface_Sensitivity only, which covers the surfaces in" in capsys.readouterr().err
 
 
 def test_surface_sensitivity_of_a_real_restart_is_its_sensitivity_along_the_normals(here):
@@ -329,7 +329,7 @@ def test_several_objectives_and_names_of_files(case):
     [
         (lambda p, w: None, "there is no adjoint solution of OBJECTIVE_FUNCTION= DRAG: none of"),
         (lambda p, w: write_csv("adj_cd.csv", p[:-1], w[:-1]), "has 79 points, and mesh.su2 80"),
-        (lambda p, w: write_csv("adj_cd.csv", p + 0.3, w), "its points are neither those of mesh"),
+        (lambda p, w: write_csv("adj_cd.csv", p + 0.3, w), "its points match neither mesh"),
         (lambda p, w: write_csv("adj_cd.csv", p, w * np.nan), "point 0 is not finite; did SU2"),
         (
             lambda p, w: write_csv("adj_cd.csv", p, w, order=[0, *range(len(p) - 1)]),
@@ -395,7 +395,7 @@ def test_wrong_unordered_files_are_told(case, capsys):
     rows = [", ".join(map(repr, map(float, [*p, 0, *w, 0]))) for p, w in zip(*case, strict=True)]
     for text, message in (
         ("1, 2\n", "expected rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers"),
-        ("1, 2, 3, 4, 5, six\n", "unordered_sensitivity.dat:1: has something that is no number"),
+        ("1, 2, 3, 4, 5, six\n", "unordered_sensitivity.dat:1: has a value that is not a number"),
         ("\n".join([*rows, rows[0]]), "several rows are at the point 0; one each is needed"),
     ):
         Path("unordered_sensitivity.dat").write_text(text)
@@ -511,7 +511,7 @@ def test_sensitivities_of_a_slightly_other_design_are_warned_about(case, capsys)
     write_csv("adj_cd.csv", points + 1e-7, weights)
     assert run(["dot", "dot.cfg", "-q"]) == 0
     assert (
-        "its points are off those of this design by 1e-07: is it older?" in capsys.readouterr().err
+        "its points differ from this design by 1e-07: is the file older?" in capsys.readouterr().err
     )
 
 

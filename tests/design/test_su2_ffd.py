@@ -289,11 +289,11 @@ def test_nested_boxes_are_read_deformed_and_written(here):
         (
             "FFD_PARENTS= 1\nOUT",
             "FFD_PARENTS= 1\nOTHER",
-            "no FFD box 'OTHER' beside it, but OUT, IN",
+            "no FFD box 'OTHER', only OUT, IN",
         ),
         ("FFD_PARENTS= 1\nOUT", "FFD_PARENTS= 2\nOUT\nIN", "FFD_PARENTS is 2; supported is one"),
-        ("FFD_LEVEL= 1", "FFD_LEVEL= 0", "FFD_LEVEL is 0, as low as that of its parent 'OUT'"),
-        ("FFD_CHILDREN= 1\nIN", "FFD_CHILDREN= 0", "FFD_CHILDREN must list the boxes that have it"),
+        ("FFD_LEVEL= 1", "FFD_LEVEL= 0", "FFD_LEVEL is 0, not above the level of its parent 'OUT'"),
+        ("FFD_CHILDREN= 1\nIN", "FFD_CHILDREN= 0", "FFD_CHILDREN must list the boxes whose parent"),
         ("FFD_PARENTS= 1\nOUT", "FFD_PARENTS= 2\nOUT", "1 rows follow FFD_PARENTS= 2"),
     ],
 )
@@ -355,7 +355,7 @@ def test_overlapping_boxes_give_nodes_to_the_last_one(here):
     inside = found.displacer.embedded["IN"].nodes
     np.testing.assert_array_equal(found.displacement[inside], alone.displacement[inside])
     (said,) = found.warnings
-    assert f"{len(inside)} nodes in the FFD box 'IN' are in one before it, too: as in SU2" in said
+    assert f"{len(inside)} nodes in the FFD box 'IN' are also in an earlier box; as in SU2" in said
 
 
 def test_limits_of_su2_hold_and_have_exact_gradients(here, capsys):
@@ -437,7 +437,9 @@ def test_convexity_that_cannot_be_had_is_told(here, capsys):
     Path("surface_positions.dat").write_text("\n".join(rows))
     Path("a.cfg").write_text(text + "DV_KIND= SURFACE_FILE\n")
     assert run(["def", "a.cfg", "-q"]) == 3
-    assert "values, which SURFACE_FILE has none of: all of it is applied" in capsys.readouterr().err
+    assert (
+        "values, but SURFACE_FILE has no values: it is applied in full" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(
@@ -445,7 +447,7 @@ def test_convexity_that_cannot_be_had_is_told(here, capsys):
     [
         ("FFD_CAMBER", "(BOX, -1, 0)", "variable 1: FFD_CAMBER has no index -1; write one from 0"),
         ("FFD_GULL", "(BOX, 9)", "has no control point with j = 9"),
-        ("FFD_ROTATION", "(BOX, 0, 0, 0, 0, 0, 0)", "its two points are one; the line between"),
+        ("FFD_ROTATION", "(BOX, 0, 0, 0, 0, 0, 0)", "its two points coincide, so the line between"),
         ("FFD_TWIST", "(BOX, 1, 0, 0)", "3 parameters are given|needs .BOX, j, x0"),
         ("FFD_CAMBER", "(NONE, 1, 1)", "has no FFD box 'NONE'"),
     ],
@@ -543,9 +545,9 @@ def test_symmetry_planes_are_not_held(system, here):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("REF_LENGTH= 0", "REF_LENGTH: '0' is no number above 0"),
-        ("FFD_INTPREV_ITER= 2.5", "FFD_INTPREV_ITER: '2.5' is no whole number above 0"),
-        ("OPT_LINE_SEARCH_BOUND= -1", "OPT_LINE_SEARCH_BOUND: '-1' is no number above 0"),
+        ("REF_LENGTH= 0", "REF_LENGTH: '0' is not a number above 0"),
+        ("FFD_INTPREV_ITER= 2.5", "FFD_INTPREV_ITER: '2.5' is not a whole number above 0"),
+        ("OPT_LINE_SEARCH_BOUND= -1", "OPT_LINE_SEARCH_BOUND: '-1' is not a number above 0"),
         ("CONVEXITY_CHECK= MAYBE", "CONVEXITY_CHECK: 'MAYBE' is not supported; supported: YES, NO"),
         ("FFD_INTPREV= x", "FFD_INTPREV: 'x' is not supported"),
     ],

@@ -304,7 +304,7 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
     Path("dot.cfg").write_text(text)
     write_csv("adj_cd.csv", mesh.points, np.ones_like(mesh.points))
     assert run(["dot", "dot.cfg", "-q"]) == 0
-    assert "adj_cd.csv has no SENS_AOA=, as text of SU2 has: 0 is" in capsys.readouterr().err
+    assert "adj_cd.csv has no SENS_AOA= (SU2's text files have it): 0" in capsys.readouterr().err
     assert gradient()[1] == 0.0
 
 
@@ -322,9 +322,13 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
         ),
         ("PARABOLIC", (1.0, 12), r"\(PARABOLIC\): the centre is 1; it must not be 0 or 1"),
         ("PARABOLIC", (1e300, 2), "1e.300. is too large to compute with; expected a number up to"),
-        ("PARABOLIC", (1e-320, 2), "a.cfg: the variables take nodes farther than can be computed"),
+        ("PARABOLIC", (1e-320, 2), "a.cfg: the variables move nodes too far for the arithmetic"),
         ("CST", (1, 2, 101), "CST term 2 of 101 is out of range; .* k <= n <= 100"),
-        ("TRANSLATE_GRID", (0, 0, 0), r"\(TRANSLATE_GRID\): its direction has no length; give one"),
+        (
+            "TRANSLATE_GRID",
+            (0, 0, 0),
+            r"\(TRANSLATE_GRID\): its direction has no length; give e.g. ",
+        ),
     ],
 )
 def test_parameters_that_make_no_shape_are_refused(kind, numbers, message, here):

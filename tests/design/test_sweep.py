@@ -149,7 +149,7 @@ def test_numbers_of_every_motion():
     made = read_designs(case, [{"a+b.scale.py": 7, "*.radial.dr": 3}]).rows[0].case
     assert made.motions[2].point == (0.0, 7.0)
     assert made.motions[3].distance == 3.0
-    with pytest.raises(CaseError, match=r"several motions have it; say which, as motion1.x"):
+    with pytest.raises(CaseError, match=r"several motions have it; say which, e.g. motion1.x"):
         columns_of(case, ["a.translate.x"])
 
 
@@ -192,7 +192,7 @@ def test_markers_that_differ_in_capitals_alone():
     case = sv.Case(motions=(sv.Translate("ab", (0.0, 0.0)), sv.Translate("AB", (0.0, 0.0))))
     found = columns_of(case, ["AB.translate.dx", "ab.translate.dx"])
     assert [place.motion for place in found.values()] == [1, 0]
-    with pytest.raises(CaseError, match=r"say which, as ab.translate.x, .*AB.translate.x"):
+    with pytest.raises(CaseError, match=r"say which, e.g. ab.translate.x, .*AB.translate.x"):
         columns_of(case, ["Ab.translate.dx"])
 
 
@@ -319,7 +319,7 @@ def test_results_of_something_else_are_refused(passage, here, tmp_path):
         sv.sweep(passage.case, DESIGNS, here, **(asked | {"mesh": moved}))
     table = tmp_path / "results.csv"
     table.write_text(table.read_text() + "1,2\n")
-    with pytest.raises(CaseError, match=r"results.csv:5: is no row of a sweep"):
+    with pytest.raises(CaseError, match=r"results.csv:5: is not a row of a sweep"):
         sv.sweep(passage.case, DESIGNS, here, **asked)
     (tmp_path / "sweep.json").unlink()
     for text in ("", "[" * 10**5, '{"mesh": 3}', "[]"):
@@ -493,13 +493,16 @@ def test_fields_of_endless_length_are_told(passage, here, tmp_path):
     long = "x" * 200_000
     for head, row, line in ((f"STEPS,{long}", "1,2", 1), ("STEPS", long, 2)):
         (tmp_path / "a.csv").write_text(f"{head}\n{row}\n")
-        with pytest.raises(CaseError, match=rf"a.csv:{line}: is no line of values \(field larger"):
+        with pytest.raises(
+            CaseError,
+            match=rf"a.csv:{line}: is not a line of values \(field larger",
+        ):
             read_designs(passage.case, tmp_path / "a.csv")
     asked = {"mesh": passage.mesh, "folder": tmp_path, "resume": True}
     list(sv.sweep(passage.case, {"STEPS": [1]}, here, **asked))
     table = tmp_path / "results.csv"
     table.write_text(f"{table.read_text()}{long}\n")
-    with pytest.raises(CaseError, match=r"results.csv: is no table of a sweep \(field larger"):
+    with pytest.raises(CaseError, match=r"results.csv: is not a table of a sweep \(field larger"):
         sv.sweep(passage.case, {"STEPS": [1]}, here, **asked)
-    with pytest.raises(CaseError, match=r"results.csv: is no table of results \(field larger"):
+    with pytest.raises(CaseError, match=r"results.csv: is not a table of results \(field larger"):
         read_results(table)

@@ -86,8 +86,8 @@ def test_displacement_files_are_designs_at_the_times_in_their_names(filed, tmp_p
 @pytest.mark.parametrize(
     ("times", "step", "match"),
     [
-        ([0.5], None, "the time 0.5 is no whole number of time steps, from 0 on"),
-        ([-1.0], 0.5, "the time -1 is no whole number of time steps of 0.5"),
+        ([0.5], None, "the time 0.5 is not a whole number of time steps, from 0 on"),
+        ([-1.0], 0.5, "the time -1 is not a whole number of time steps of 0.5"),
         ([1.0, 1.0], None, "designs 1 and 2 are at time iteration 1 both"),
         ([1.0], 0.0, "the time step is 0; it must be above 0"),
     ],

@@ -49,7 +49,7 @@ def test_a_table_gives_passages_motions_of_their_own(tmp_path):
     whole, mean = sv.read(made.path), mesh.points[mesh.marker("blade").nodes, 2].mean()
     shifts = [whole.points[whole.marker(f"blade_{k}").nodes, 2].mean() - mean for k in range(1, 5)]
     assert shifts == pytest.approx([0.01, 0.02, 0.0, 0.0], abs=1e-12)
-    with pytest.raises(CaseError, match="2 rows for 1 passages; one for each"):
+    with pytest.raises(CaseError, match="2 rows for 1 passages; give at most one row for each"):
         sv.wheel(tmp_path / "w.su2b", case, mesh, designs=table, passages=1)
     moving = case.change(periodic="fixed")
     with pytest.raises(MeshError, match="passages 1 and 2 do not meet"):
@@ -66,7 +66,7 @@ def test_cases_without_a_wheel_are_refused(tmp_path):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "y_p": "periodic"}), square(4))
     with pytest.raises(CaseError, match=r"images by a translation \(.*\), so there is no wheel"):
         sv.wheel(path, sv.Case(roles={"x_m": "periodic", "x_p": "periodic"}), square(4))
-    with pytest.raises(CaseError, match=r"35°, which is no whole part of a turn; give the number"):
+    with pytest.raises(CaseError, match=r"35°, and 360° is not a multiple of it; give the number"):
         sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 35.0))
     with pytest.raises(CaseError, match="0 passages; expected 1 or more, or all"):
         sv.wheel(path, case_of(motions=()), passage((2, 4, 4), 40.0), passages=0)

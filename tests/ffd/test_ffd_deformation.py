@@ -119,7 +119,7 @@ def test_last_box_takes_the_nodes_and_says_what_is_lost():
     right[within] = alone[1].nodes[within]
     np.testing.assert_array_equal(outside.nodes, right)
     assert len(outside.notes) == 1
-    assert f"{len(within)} nodes in the FFD box 'IN' are in one before it, too" in outside.notes[0]
+    assert f"{len(within)} nodes in the FFD box 'IN' are also in an earlier box" in outside.notes[0]
     assert not outside.slope(0)[within].any()
     still = deformed([outer(), inner()], two[:1])  # a box without variables takes them, too
     assert not still.nodes[within].any()
@@ -224,7 +224,7 @@ def test_bound_does_twice_what_has_several_values_and_lasts():
     free = deformed([inner()], [three])
     held = deformed([inner()], [three], bound=0.01)
     np.testing.assert_allclose(held.nodes, 2.0 * free.nodes, rtol=1e-14)
-    assert "those of several values are applied twice" in held.notes[0]
+    assert "variables with several values are applied twice" in held.notes[0]
     one = ("OUT", "FFD_GULL", (1,), (), 0.2)
     after = deformed([inner(), outer()], [three, one], bound=0.05)
     assert "those of OUT get -" in after.notes[0]

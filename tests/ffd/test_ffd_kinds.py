@@ -107,7 +107,7 @@ def test_polar_control_points_have_their_second_index_along_k():
         ("FFD_CAMBER", (-1, 0), (), 3, "FFD_CAMBER has no index -1; write one from 0"),
         ("FFD_GULL", (5,), (), 3, "no control point with j = 5"),
         ("FFD_TWIST", (7,), LINE, 3, "no control point with j = 7"),
-        ("FFD_ROTATION", (), (1.0, 2.0, 3.0) * 2, 3, "its two points are one"),
+        ("FFD_ROTATION", (), (1.0, 2.0, 3.0) * 2, 3, "its two points coincide"),
         (
             "FFD_ROTATION",
             (),

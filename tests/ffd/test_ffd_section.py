@@ -227,9 +227,7 @@ def test_new_boxes_of_several_zones_are_read_where_su2_has_them(tmp_path):
     assert again([second], anew=True) is False
     assert again([*boxes_of(mesh), both])
     path.write_text(path.read_text().replace("y_low\t0\t", "second_y_low\t99\t", 1))
-    with pytest.raises(
-        MeshError, match="'A' lists node 99 of second_y_low, which has none of that"
-    ):
+    with pytest.raises(MeshError, match="'A' lists node 99 of second_y_low, which does not exist"):
         boxes_of(sv.read(path))
 
 
@@ -268,7 +266,7 @@ def test_mesh_without_boxes_has_none():
     ("old", "new", "message"),
     [
         ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD_LEVEL is 1; FFD_NLEVEL must be larger, and is 1"),
-        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is no whole number from 0"),
+        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is not a whole number from 0"),
         ("FFD_DEGREE_J= 1\n", "", "FFD_DEGREE_J= is missing"),
         ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; expected 1 to 50"),
         ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; expected BEZIER or BSPLINE_UNIFORM"),
@@ -278,14 +276,14 @@ def test_mesh_without_boxes_has_none():
         (
             "NBOX= 1",
             "NBOX= 3",
-            r"FFD_NBOX= 3, but the FFD boxes that follow are 1 \(MAIN\); correct",
+            r"FFD_NBOX= 3, but the file has 1 \(MAIN\); correct",
         ),
-        ("NBOX= 1", "NBOX= one", "FFD_NBOX= one, but the FFD boxes"),
+        ("NBOX= 1", "NBOX= one", "FFD_NBOX= one, but the file has 1"),
         ("FFD_NBOX= 1\n", "", "FFD_NBOX= is missing; write FFD_NBOX= 1 before the FFD boxes"),
-        (SECTION[12:], "", "FFD_NBOX= 1, but the FFD boxes that follow are none"),
+        (SECTION[12:], "", "FFD_NBOX= 1, but the file has none"),
         ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; expected 12"),
-        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which is none"),
-        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 9223372036854775808 0 0 0", "which is none"),
+        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which does not"),
+        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 9223372036854775808 0 0 0", "which does not"),
         (
             "SURFACE_POINTS= 0",
             "SURFACE_POINTS= 1\nlow 0 0 1e308 0",

@@ -205,7 +205,7 @@ def test_designs_that_cannot_be_read_are_told_and_the_session_is_restored(make, 
     window.recovery_banner.answers["Restore"].click()
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     qtbot.waitUntil(window.banner.isVisible)
-    assert "is no table of results" in window.banner.text.text()
+    assert "is not a table of results" in window.banner.text.text()
     assert window.store.session.case.steps == 7
 
 

@@ -81,7 +81,7 @@ def test_numbers_do_not_depend_on_which_boundaries_are_measured(mesh):
 
 def test_boundaries_that_were_not_measured_are_not_reported():
     mesh = grid((4, 4))
-    with pytest.raises(MeshError, match="y_p were not measured, but those at y_m"):
+    with pytest.raises(MeshError, match="y_p were not measured, only those at y_m"):
         sv.walls(mesh, markers=["y_m"]).of(["y_p"])
 
 

@@ -131,9 +131,9 @@ def test_files(passage, tmp_path):
 @pytest.mark.parametrize("text", ["", "a,b\n1\n", "design,STEPS\n1,2\n"])
 def test_other_files_are_no_results(tmp_path, text):
     (tmp_path / "out.csv").write_text(text)
-    with pytest.raises(CaseError, match="is no table of results"):
+    with pytest.raises(CaseError, match="is not a table of results"):
         read_results(tmp_path / "out.csv")
-    with pytest.raises(CaseError, match="is no table of results"):
+    with pytest.raises(CaseError, match="is not a table of results"):
         read_results(tmp_path / "missing.csv")
 
 

@@ -254,7 +254,7 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
     """Return the values of keys of a configuration among texts KEY=VALUE, and the other texts.
 
     The first replace those in the file: they are SU2's keys, and lists of boundaries. Raises
-    CaseError if a key is none of a configuration or of slideviz, or has no meaning here.
+    CaseError if a key is unknown to SU2 and to slideviz, or has no meaning here.
     """
     found = {}
     others = []
@@ -470,7 +470,7 @@ class _Reader:
         return default if entry is None else entry.value.strip('"') or default
 
     def file(self, key: str, default: str) -> Path:
-        """Return the path that is the value of a key; one that can be no file is noted."""
+        """Return the path that is the value of a key; a value that cannot be a file is noted."""
         path = Path(self.word(key, default))
         if path.name in ("", ".."):
             self.note(
@@ -561,12 +561,12 @@ class _Reader:
                 self.note(self.rows[key], sentence)
         for key in ("FFD_FIX_I", "FFD_FIX_J", "FFD_FIX_K"):
             if any(not word.text.isdecimal() for word in list_of(words[key])):
-                self.note(self.rows[key], f"{shown(words[key])} is no list of whole numbers")
+                self.note(self.rows[key], f"{shown(words[key])} is not a list of whole numbers")
         for key, least in NUMBERS.items():
             try:
                 value = number(words[key])
                 if value <= least or (key.endswith(COUNTS) and value != int(value)):
                     needed = "whole number" if key.endswith(COUNTS) else "number"
-                    raise CaseError(f"{shown(words[key])} is no {needed} above {least:g}")
+                    raise CaseError(f"{shown(words[key])} is not a {needed} above {least:g}")
             except CaseError as problem:
                 self.note(self.rows[key], str(problem))

@@ -138,7 +138,9 @@ def _gradients(
     if angles.any():
         rate = angle_sensitivity(found.path)
         gradient[angles] = rate or 0.0
-        lacks = f"{found.path} has no SENS_AOA=, as text of SU2 has: 0 is written for the angle"
+        lacks = (
+            f"{found.path} has no SENS_AOA= (SU2's text files have it): 0 is written for the angle"
+        )
         said = [*said, lacks] if rate is None else said
     return Gradients(
         surface=pulled,

@@ -260,8 +260,8 @@ def match(
     normal_only = found.values.shape[1] == 1
     if normal_only and not markers:
         raise CaseError(
-            f"{found.path}: has Surface_Sensitivity only, which is of the surfaces in DV_MARKER, "
-            "and the design variables move the whole mesh; give Sensitivity_x, Sensitivity_y, ..."
+            f"{found.path}: has Surface_Sensitivity only, which covers the surfaces in DV_MARKER, "
+            "but the design variables move the whole mesh; give Sensitivity_x, Sensitivity_y, ..."
         )
     design = None if design is None else cache(design)
     if found.points is None:
@@ -279,8 +279,8 @@ def match(
             at_design = True
     if gap > SAME * unit:
         raise CaseError(
-            f"{found.path}: its points are neither those of {mesh.name} nor those of this design: "
-            f"off by {gap:.3g}; run the adjoint solver on the mesh that `slideviz def` writes"
+            f"{found.path}: its points match neither {mesh.name} nor this design (they differ by "
+            f"{gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
         )
     for each in mesh.interfaces if mesh.zone_parts else ():
         # A place with one row of two nodes: the row is that of the node that moves.
@@ -293,7 +293,7 @@ def match(
     if gap > CLOSE * unit:
         where = "this design" if at_design else mesh.name
         notes.append(
-            f"{found.path}: its points are off those of {where} by {gap:.2g}: is it older?"
+            f"{found.path}: its points differ from {where} by {gap:.2g}: is the file older?"
         )
     values = np.zeros((len(mesh.points), found.values.shape[1]))
     index, counts = np.unique(rows, return_counts=True)
@@ -369,7 +369,7 @@ def _rows(path: Path) -> Iterator[list[float]]:
         try:
             yield [float(word) for word in words]
         except ValueError:
-            raise CaseError(f"{path}:{number}: has something that is no number") from None
+            raise CaseError(f"{path}:{number}: has a value that is not a number") from None
 
 
 def _require_finite(path: Path, values: FloatArray) -> None:

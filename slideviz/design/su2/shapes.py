@@ -159,7 +159,7 @@ def _shifted_mesh(variable: DesignVariable, on: MovedNodes, amount: float) -> Fl
     vector = np.array(variable.numbers[: on.mesh.dim])
     length = np.linalg.norm(vector)
     if length == 0.0:
-        raise CaseError("its direction has no length; give one, as (1, 0, 0)")
+        raise CaseError("its direction has no length; give e.g. (1, 0, 0)")
     return np.broadcast_to(amount * (vector / length), on.points.shape)
 
 
@@ -344,7 +344,7 @@ def _turned(
         )
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise CaseError("its two points are one; the line between them has no direction")
+        raise CaseError("its two points coincide, so the line between them has no direction")
     arm = np.zeros((len(points), 3))
     arm[:, :dim] = points - first[:dim]
     across = np.cross(axis / length, arm)

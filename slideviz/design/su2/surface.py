@@ -86,7 +86,9 @@ def convex_part(
     if full is not None and not first:
         return 1.0, full, ()
     if kind.group in WITHOUT_VALUE and full is not None:
-        note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is applied"
+        note = (
+            f"CONVEXITY_CHECK scales values, but {kind.kind} has no values: it is applied in full"
+        )
         return 1.0, full, (note,)
     best: tuple[float, Attempt] | None = None
     part = 1.0
@@ -163,8 +165,8 @@ def read_positions(
     others = int(np.count_nonzero(~moving))
     if others == len(listed):
         raise CaseError(
-            f"{path}: none of its {others} nodes is on {of}, so that nothing would move; correct "
-            "the file or the boundaries"
+            f"{path}: none of its {others} nodes is on {of}, so nothing would move; correct the "
+            "file or the boundaries"
         )
     positions = mesh.points[nodes]
     positions[np.searchsorted(nodes, listed[moving])] = table[moving, 1:]
@@ -374,7 +376,7 @@ def _overflow_as_case_error(config: Su2Config) -> Iterator[None]:
             yield
     except OverflowError as problem:
         raise CaseError(
-            f"{config.source}: the variables take nodes farther than can be computed with; correct "
+            f"{config.source}: the variables move nodes too far for the arithmetic; correct "
             "DV_PARAM or DV_VALUE"
         ) from problem
 
@@ -396,7 +398,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     left = [] if group == "ffd" else _left_behind(config, mesh)
     if group == "grid" and mesh.halo is not None:
         sentence = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
-        left.append(f"{sentence}; they do not fit where the axis or the vector of its period moves")
+        left.append(f"{sentence}; they are wrong if the axis or the vector of the period moves")
     return MovingSurface(config, mesh, nodes, displacer, (*displacer.warnings, *left))
 
 

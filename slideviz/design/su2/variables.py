@@ -54,7 +54,7 @@ KINDS = {
     "AIRFOIL": VariableKind(
         "nothing",
         "one, two",
-        refused="is not supported, as SU2 asks for its file at a terminal; use SURFACE_FILE",
+        refused="is not supported, because SU2 asks for its file at a terminal; use SURFACE_FILE",
     ),
     "SURFACE_FILE": VariableKind("file"),
     "TRANSLATE_GRID": VariableKind("grid", "x, y, z"),
@@ -243,7 +243,7 @@ def _variable(name: str, group: list[Word]) -> DesignVariable:
     variable = DesignVariable(name, (0.0,), numbers, group[0].text if boxed else "")
     at = [variable.parameter(letter, -1.0) for letter in "ijk"]
     if boxed and any(place != int(place) or place < -1 for place in at):
-        raise CaseError(f"an index is no whole number from -1; {needed}")
+        raise CaseError(f"an index is not a whole number from -1; {needed}")
     several = kind.several.split(", ") if kind.several else []
     if several and not any(variable.parameter(each) for each in several):
         variable = replace(variable, values=(0.0,) * len(several))

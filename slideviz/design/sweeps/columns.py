@@ -186,7 +186,7 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
         for part, _ in _parts(motion, at)
     )
     if several:
-        raise CaseError(f"several motions have it; say which, as {_names_text(shortest)}")
+        raise CaseError(f"several motions have it; say which, e.g. {_names_text(shortest)}")
     there = (
         f"the motions have {_names_text(shortest)}" if shortest else "the motions have no numbers"
     )
@@ -194,7 +194,7 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
         raise CaseError(f"the case has no motion {absent}; add one to MOTION, for {there}")
     close = nearest(name, [*shortest, *KEYS])
     raise CaseError(
-        "there is no such number of a motion, and no such key"
+        "there is no such number of a motion and no such key"
         f"{close or f'; {there}; `slideviz keys` lists the keys'}"
     )
 
@@ -237,7 +237,7 @@ def _names_text(known: Iterable[str]) -> str:
 
 
 def number_of(value: Value) -> float:
-    """Return a value of a table as a finite number; raise CaseError where it is none."""
+    """Return a value of a table as a finite number; raise CaseError if it is not."""
     if isinstance(value, str):
         return number(value.strip())
     if not isinstance(value, Real) or not math.isfinite(value):

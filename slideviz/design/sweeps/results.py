@@ -134,7 +134,9 @@ class SweepResults:
         try:
             head, *lines = csv_rows(whole.decode("utf-8", "replace")) or [[]]
         except ValueError as problem:
-            raise CaseError(f"{self.path}: is no table of a sweep ({problem}); {_REMEDY}") from None
+            raise CaseError(
+                f"{self.path}: is not a table of a sweep ({problem}); {_REMEDY}"
+            ) from None
         if head != self._head:
             names = ", ".join(head[design_columns(head)])
             raise CaseError(
@@ -173,7 +175,7 @@ class SweepResults:
             row = result_of(self._head, cells, self._folder)
         except ValueError:
             raise CaseError(
-                f"{self.path}:{line}: is no row of a sweep; remove the line, or {_REMEDY}"
+                f"{self.path}:{line}: is not a row of a sweep; remove the line, or {_REMEDY}"
             ) from None
         rows = self._designs.rows
         values = dict(zip(self._designs.columns, cells[1:], strict=False))

@@ -68,8 +68,8 @@ def sweep(
     designs : path, sequence of mappings, or mapping of sequences
         A CSV file, the designs one by one, or the columns; or a pattern with * of displacement
         files, each the design at the time that is the last number in its name. A column is a
-        number of a motion, as ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the
-        case, as ``STEPS``; where a value is empty, that of the case holds.
+        number of a motion, e.g. ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the
+        case, e.g. ``STEPS``; an empty value means the value of the case.
     executor : concurrent.futures.Executor, optional
         Runs the designs: ``ProcessPoolExecutor``, ``mpi4py.futures.MPIPoolExecutor``, Dask's
         ``client.get_executor()``. Without it, processes of this machine, which are replaced when

@@ -142,8 +142,8 @@ def iterations(designs: Designs, time_step: float | None = None) -> dict[int, in
         if whole < 0 or not isclose(ratio, whole, rel_tol=1e-6, abs_tol=1e-6):
             of = f"time steps of {time_step:g}" if time_step else "time steps"
             raise CaseError(
-                f"design {design.number}: the time {time:g} is no whole number of {of}, from 0 on; "
-                "give the length of a time step (--time-step, time_step=), or times that fit it"
+                f"design {design.number}: the time {time:g} is not a whole number of {of}, from 0 "
+                "on; give the length of a time step (--time-step, time_step=), or times that fit it"
             )
         if whole in designs_at:
             raise CaseError(
@@ -178,7 +178,9 @@ def _files_in_time(pattern: Path) -> list[dict[str, Any]]:
         row = {TIME: int(digits[-1]), "DEFORMATION_FILENAME": str(path.absolute())}
         rows.append(row)
     if not rows:
-        raise CaseError(f"{pattern}: there is no such file; give a pattern as displacement_*.txt")
+        raise CaseError(
+            f"{pattern}: there is no such file; give a pattern, e.g. displacement_*.txt"
+        )
     return sorted(rows, key=lambda row: row[TIME])
 
 
@@ -210,7 +212,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     lines = _filled_lines(text)
     if len(lines) < 2:
         raise CaseError(
-            f"{path}: has no designs; expected a line with the names of the columns, as "
+            f"{path}: has no designs; expected a line with the names of the columns, e.g. "
             "BLADE.translate.y, and a line of values for each design"
         )
     (first, head), *rest = lines
@@ -287,7 +289,7 @@ def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) 
 
 
 def design_columns(head: Sequence[str]) -> slice:
-    """Return the slice of the columns of designs; a table of results has others around them."""
+    """Return the slice of the design columns; result tables have further columns."""
     at = len(head) - 1
     while at > 0 and list(head[at : at + len(NUMBERS)]) != list(NUMBERS):
         at -= 1
@@ -337,4 +339,6 @@ def _split(line: str, separator: str) -> list[str]:
     try:
         return csv_rows(line, separator)[0]
     except ValueError as problem:
-        raise CaseError(f"is no line of values ({problem}); check its quotation marks") from problem
+        raise CaseError(
+            f"is not a line of values ({problem}); check its quotation marks"
+        ) from problem
