@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Mesh
 
 LARGEST = 1e50
 """Largest absolute coordinate that is computed with, so that products of several are finite."""
@@ -46,13 +46,14 @@ def no_node(node: str, n_points: int) -> str:
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the index of the first element that has a node twice, and that node, or None."""
     repeated: list[tuple[int, int]] = []
+    numbers = np.arange(len(cells))
 
-    def look(_vtk: int, ids: IntArray, nodes: IntArray) -> None:
+    def look(_vtk: int, rows: Index, nodes: IntArray) -> None:
         ordered = np.sort(nodes, axis=1)
         same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
         if same.any():
             k = int(np.argmax(same.any(axis=1)))
-            repeated.append((int(ids[k]), int(ordered[k, int(np.argmax(same[k]))])))
+            repeated.append((int(numbers[rows][k]), int(ordered[k, int(np.argmax(same[k]))])))
 
     cells.in_parts(look)
     return min(repeated, default=None)

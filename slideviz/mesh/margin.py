@@ -43,7 +43,7 @@ from slideviz.terms import FARTHEST
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import FloatArray, IntArray, Mesh
+    from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh
 
 GAP = 2.0**-9
 """Largest relative distance from a lower bound to the margin at which a cell is not cut again."""
@@ -107,11 +107,11 @@ def margins(
     found = np.empty(len(cells))
     turns = np.ones(len(cells), np.int8) if signs is None else signs
 
-    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        values = np.empty(len(ids))
-        arrays = points, displacement, nodes, CORNERS[vtk], turns[ids]
+    def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
+        values = np.empty(len(nodes))
+        arrays = points, displacement, nodes, CORNERS[vtk], turns[rows].copy()
         _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
-        found[ids] = values
+        found[rows] = values
 
     cells.in_parts(of_part)
     return found
@@ -200,11 +200,11 @@ def least_margin(
     ends = cap * BOUNDED
     bounded = np.zeros(len(cells), np.int8)
 
-    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+    def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
         if vtk == 12:
-            values = np.empty(len(ids), np.int8)
-            _write_bounds(before.points, after.points, nodes, signs[ids], ends, values)
-            bounded[ids] = values
+            values = np.empty(len(nodes), np.int8)
+            _write_bounds(before.points, after.points, nodes, signs[rows].copy(), ends, values)
+            bounded[rows] = values
 
     cells.in_parts(of_part)
     if after.halo is not None:

@@ -22,7 +22,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import path_margins
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, sealed
+from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Marker, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, checked_reference, quality
 from slideviz.mesh.topology import vertex_normals
@@ -255,11 +255,11 @@ def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     """Return the metrics of `shape_loops.SHAPES`, which need one cell only."""
     found = np.empty((len(shape_loops.SHAPES), len(mesh.cells)))
 
-    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        values = np.empty((len(found), len(ids)))
+    def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
+        values = np.empty((len(found), len(nodes)))
         tables = shape_loops.CORNERS[vtk], shape_loops.EDGES[vtk], shape_loops.POLYGONS[vtk]
-        shape_loops.write_shapes(vtk, mesh.points, nodes, signs[ids], *tables, values)
-        found[:, ids] = values
+        shape_loops.write_shapes(vtk, mesh.points, nodes, signs[rows].copy(), *tables, values)
+        found[:, rows] = values
 
     mesh.cells.in_parts(of_part)
     return dict(zip(shape_loops.SHAPES, found, strict=True))
@@ -272,18 +272,19 @@ def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     centres = np.empty((len(cells), 3))
     volumes = np.empty(len(cells))
     found = np.empty((3, len(cells)))
+    numbers = np.arange(len(cells))
 
-    def find_centres(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        centre = np.empty((len(ids), 3))
-        volume = np.empty(len(ids))
+    def find_centres(vtk: int, rows: Index, nodes: IntArray) -> None:
+        centre = np.empty((len(nodes), 3))
+        volume = np.empty(len(nodes))
         polygons = shape_loops.POLYGONS[vtk]
-        face_loops.write_centres(mesh.points, nodes, signs[ids], polygons, centre, volume)
-        centres[ids] = centre
-        volumes[ids] = volume
+        face_loops.write_centres(mesh.points, nodes, signs[rows].copy(), polygons, centre, volume)
+        centres[rows] = centre
+        volumes[rows] = volume
 
-    def rate_faces(vtk: int, ids: IntArray, nodes: IntArray) -> None:
+    def rate_faces(vtk: int, rows: Index, nodes: IntArray) -> None:
         around = (sides.first, sides.neighbour), (centres, volumes)
-        own = mesh.points, nodes, ids, signs[ids], SIDE_NODES[vtk, : SIDES[vtk]]
+        own = mesh.points, nodes, numbers[rows], signs[rows].copy(), SIDE_NODES[vtk, : SIDES[vtk]]
         face_loops.write_faces(*own, *around, *found)
 
     cells.in_parts(find_centres)

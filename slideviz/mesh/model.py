@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Index = slice | IntArray
+"""Rows of an array: a slice where they follow one another, which selects without a copy."""
 
 DEFAULT_FEATURE_ANGLE_DEG = 40.0
 """Angle in degrees between smoothly joined facets; also the default in `Case.feature_angle_deg`."""
@@ -149,19 +151,23 @@ class Cells:
 
     def in_parts(
         self,
-        work: Callable[[int, IntArray, IntArray], object],
+        work: Callable[[int, Index, IntArray], object],
         going_on: Callable[[], object] = lambda: None,
     ) -> None:
-        """Call ``work(vtk, ids, nodes)`` for parts of the elements of each type, on all cores.
+        """Call ``work(vtk, rows, nodes)`` for parts of the elements of each type, on all cores.
 
-        ``going_on`` is called every few thousand elements; what it raises ends the work.
+        ``rows``: the indices of the elements. ``going_on`` is called every few thousand elements;
+        what it raises ends the work.
         """
         for vtk, (ids, nodes) in self.by_type.items():
-            in_parts(
-                lambda part: work(vtk, ids[part], nodes[part]),  # noqa: B023
-                len(ids),
-                lambda _: going_on(),
-            )
+            first = int(ids[0])
+            is_block = int(ids[-1]) - first + 1 == len(ids)
+
+            def of_part(part: slice) -> None:
+                block = slice(first + part.start, first + part.stop)  # noqa: B023
+                work(vtk, block if is_block else ids[part], nodes[part])  # noqa: B023
+
+            in_parts(of_part, len(ids), lambda _: going_on())
 
     @cached_property
     def nodes(self) -> IntArray:

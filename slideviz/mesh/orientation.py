@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import Cells, FloatArray, IntArray
+    from slideviz.mesh.model import Cells, FloatArray, Index, IntArray
 
 
 @weak_cache
@@ -42,10 +42,10 @@ def corner_sums(mesh: Mesh) -> FloatArray:
     """Return the sum (m,) of each cell's corner Jacobians, without `orientation`'s sign."""
     sums = np.empty(len(mesh.cells))
 
-    def add(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        alpha = np.empty((len(CORNERS[vtk]), len(ids)))
+    def add(vtk: int, rows: Index, nodes: IntArray) -> None:
+        alpha = np.empty((len(CORNERS[vtk]), len(nodes)))
         write_corners(mesh.points, nodes, CORNERS[vtk], alpha)
-        sums[ids] = ordered_sum(alpha)
+        sums[rows] = ordered_sum(alpha)
 
     mesh.cells.in_parts(add)
     return sums

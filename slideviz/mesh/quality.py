@@ -27,7 +27,7 @@ from slideviz.mesh.jacobians import (
     measure,
     write_corners,
 )
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.skew import SKEW_METRICS, ordered_sum
@@ -305,10 +305,10 @@ def quality(
     values, size, skew = np.empty((3, len(mesh.cells)))
     status = np.empty(len(mesh.cells), np.uint8)
 
-    def of_part(vtk: int, ids: IntArray, nodes: IntArray) -> None:
-        result = cell_quality(mesh.points, vtk, nodes, signs[ids], sums[ids], metric)
-        size[ids], skew[ids], status[ids] = result
-        values[ids] = np.sqrt(result[0]) * result[1]
+    def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
+        result = cell_quality(mesh.points, vtk, nodes, signs[rows].copy(), sums[rows], metric)
+        size[rows], skew[rows], status[rows] = result
+        values[rows] = np.sqrt(result[0]) * result[1]
 
     mesh.cells.in_parts(of_part, going_on)
     result = Quality(

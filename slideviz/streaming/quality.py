@@ -24,13 +24,13 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2b.read import read_markers
 from slideviz.mesh.margin import SafeFraction, step_safety
 from slideviz.mesh.metrics import MetricValues, rated_metric
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums, facets_of
 from slideviz.mesh.quality import INVERTED, Quality, quality, quality_totals
 from slideviz.solver.deform import folded_at
 from slideviz.solver.growth import Farthest, farthest_node
 from slideviz.streaming.interior import InteriorDisplacer
-from slideviz.streaming.skin import Index, index_of
+from slideviz.streaming.skin import index_of
 from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch, ZoneSource
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick

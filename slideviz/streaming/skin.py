@@ -33,7 +33,17 @@ from slideviz.formats.su2b.read import (
 )
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, Part, sealed
+from slideviz.mesh.model import (
+    Cells,
+    FloatArray,
+    Index,
+    IntArray,
+    Marker,
+    Mesh,
+    Origin,
+    Part,
+    sealed,
+)
 from slideviz.mesh.zones import join_zones
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, equal_shares, progress_share
@@ -52,7 +62,6 @@ def naming_text(text: Text, path: Path) -> Iterator[None]:
 
 
 T = TypeVar("T")
-Index = slice | IntArray  # numbers of cells, as an index of an array
 
 
 def read_skin(
