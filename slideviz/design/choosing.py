@@ -22,6 +22,7 @@ from slideviz.solver.stepping import (
     one_step,
     with_halo_copies,
 )
+from slideviz.solver.steps import step_timer
 
 Report = Callable[[Progress], None]
 
@@ -102,10 +103,6 @@ def _reference(
     return [step.part for step in steps], chosen, steps[-1].mesh.points
 
 
-def _report(report: Report, step: int, total: int, phase: str, fraction: float) -> None:
-    report(Progress(step, total, phase, fraction))
-
-
 def _further(
     mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], report: Report
 ) -> list[Solution]:
@@ -123,7 +120,7 @@ def _further(
         if made:
             more = made[-1].control
             control = np.concatenate([control, more[~np.isin(more, control)]])
-        timer = PhaseTimer(partial(_report, report, k + 1, total))
+        timer = step_timer(report, k + 1, total)
         goal = value(setup.goal(setup.target, part))
         # Relaxation, after the last step, chooses no control nodes.
         begun = replace(setup.at_step(False), solve=partial(_continued, setup, solution.stages))

@@ -21,11 +21,10 @@ from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
-from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.tape import value
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
-from slideviz.solver.steps import Progress, Step, Trial
+from slideviz.solver.steps import Progress, Step, Trial, step_timer
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
@@ -103,9 +102,7 @@ def deform(
         for step in deform_zones(case, mesh, partial(deform, certify=certify), report):
             yield replace(step, check_limits=check_limits)
         return
-    timer = PhaseTimer(
-        lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction))
-    )
+    timer = step_timer(report, 1, max(1, case.steps))
     if setup is None:
         with timer.phase("classify"):
             setup = make_setup(case, mesh)

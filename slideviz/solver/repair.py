@@ -31,13 +31,12 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, quality_ratings
 from slideviz.mesh.repair.repair import repair as mend_cells
 from slideviz.mesh.zones import spellings, with_zones, zones_of
-from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
 from slideviz.solver.remedies import MOST_NAMES
 from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
-from slideviz.solver.steps import MeshRepair, Progress, Step
+from slideviz.solver.steps import MeshRepair, Progress, Step, step_timer
 from slideviz.solver.zones import joined_repairs
 from slideviz.system.threads import Tick, equal_shares
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, SLIDES, RepairTarget, Role, SkewMetric
@@ -117,7 +116,7 @@ def repair(
     if reference is not None:
         reference = checked_reference(reference, mesh)
     report = progress or (lambda _: None)
-    timer = PhaseTimer(lambda phase, part: report(Progress(1, 1, phase, part)))
+    timer = step_timer(report)
     shapes = None if target == "ideal" else reference
     with timer.phase("repair") as tick:
         return mend(case.change(quality_metric=metric), mesh, mesh, shapes, tick)
@@ -168,7 +167,7 @@ def mended_step(
     case: Case, mesh: Mesh, setup: Setup | None, report: Callable[[Progress], None], step: Step
 ) -> Step:
     """Return a step of a run with its bad cells mended; ``mesh`` is undeformed."""
-    timer = PhaseTimer(lambda phase, part: report(Progress(step.index, step.total, phase, part)))
+    timer = step_timer(report, step.index, step.total)
     with timer.phase("repair") as tick:
         done = mend(case, mesh, step.mesh, mesh, tick, setup)
     seconds = {**step.seconds, "repair": timer.seconds["repair"]}
@@ -186,7 +185,7 @@ def mended_frame(
         moving = dict.fromkeys(case.markers_with("moving"), "fixed")
         case = case.change(roles={**case.roles, **moving}, motions=())
         step = Step(1, 1, mesh, 0, 0.0, nan, node_counts={}, seconds={}, warnings=())
-        timer = PhaseTimer(lambda phase, part: report(Progress(1, 1, phase, part)))
+        timer = step_timer(report)
         with timer.phase("repair") as tick:
             mended = mend(case, mesh, mesh, None, tick)
         done = replace(step, mesh=mended.mesh, repaired=mended, seconds=timer.seconds)

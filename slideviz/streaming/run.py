@@ -24,13 +24,12 @@ from slideviz.errors import CaseError, NodeError
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import zones_of
-from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
-from slideviz.solver.steps import Progress, RunResult, Step
+from slideviz.solver.steps import Progress, RunResult, Step, step_timer
 from slideviz.solver.zones import InterfaceMotion, joined_steps, zone_runs
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
@@ -160,7 +159,7 @@ def stream(
     if is_text:
         phases.append("write")
     remaining = RemainingTime(report, *phases)
-    timer = PhaseTimer(lambda phase, part: remaining(Progress(total, total, phase, part)))
+    timer = step_timer(remaining, total, total)
     with ExitStack() as stack:
         target = stack.enter_context(target_file(output, replaces))
         with timer.phase("read") as tick:
@@ -258,7 +257,7 @@ class _ZoneRuns:
         assert skin.part is not None
         zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
         case = with_marker_names(case, skin)
-        timer = PhaseTimer(lambda phase, part: report(Progress(1, max(1, case.steps), phase, part)))
+        timer = step_timer(report, 1, max(1, case.steps))
         give_back()
         with _naming_file_nodes(skin.part.points):
             with timer.phase("classify"):
