@@ -246,9 +246,7 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     bins = meridional_bins(undeformed, walls)
     wide, high = arguments.size or (1600, 1000)
     figure = empty_figure((8.0, 8.0 * high / wide), wide / 8.0, "constrained")
-    label = f"mean {QUANTITIES[painted.label].axis}"
-    values = painted.values
-    draw_meridional(figure, bins, values, label, painted.limits, color_map=arguments.map)
+    draw_meridional(figure, bins, replace(painted, color_map=arguments.map))
     if not arguments.axes:
         figure.axes[0].set_axis_off()
     summary = painted.summary(np.arange(len(mesh.cells)))
@@ -263,7 +261,8 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
             "between": list(one.walls),
             "places": one.places.tolist(),
             "means": [
-                [None if np.isnan(x) else x for x in row] for row in one.means(values).tolist()
+                [None if np.isnan(x) else x for x in row]
+                for row in one.means(painted.values).tolist()
             ],
         }
         for one in bins

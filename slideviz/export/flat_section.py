@@ -15,7 +15,7 @@ from slideviz.export.titles import pair_names
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.plots.cells import surroundings
-from slideviz.plots.section_paint import paint
+from slideviz.plots.section_paint import paint, shown_paint
 from slideviz.plots.section_picture import (
     SectionInRun,
     SectionStyle,
@@ -31,7 +31,7 @@ from slideviz.session.panes import shown_views
 from slideviz.session.passages import Period, find_periods, matrices, show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
-from slideviz.terms import COLOR_MAPS, NO_REFERENCE, WALL_VALUES, ColorMap, Quantity, quantity_of
+from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity
 
 _SHOWN = "shown: "  # begin of the note about a threshold
 
@@ -95,13 +95,6 @@ def save_section(
 def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     frame = session.frame
     assert frame is not None
-    by = session.view.color_by
-    painted = paint(frame.mesh, frame.quality, quantity_of(by), session.mesh)
-    if by in WALL_VALUES:  # of the boundaries that the case has as walls
-        painted = replace(painted, values=frame.values(by, session.mesh))
-    painted = replace(painted, color_map=session.view.color_map)
-    if by != "role":
-        painted = painted.within(*session.color_range)
     around = matrices(session, Period().of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
     cutter = Cutter.of(frame.mesh)
@@ -110,7 +103,7 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     at = session.view.frame
     return SectionInRun(
         show_passages(cutter, points, section, every, only),
-        painted,
+        shown_paint(session),
         surroundings(cutter, points, every),
         name,
         f"step {min(at, len(session.frames) - 1)}" if at else "",

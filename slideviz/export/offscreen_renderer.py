@@ -32,7 +32,7 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.session.changes import show_frame
 from slideviz.session.opening import session_of_runs
-from slideviz.session.panes import shown_views
+from slideviz.session.panes import second_session, shown_views
 from slideviz.session.pieces import render_in_groups, run_to_end
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.system.atomic import atomic_write
@@ -133,7 +133,7 @@ class OffscreenRenderer:
     @property
     def beside(self) -> Session | None:
         """Return the session as the second view shows it, or None without a comparison."""
-        return next((one for one in shown_views(self.session) if one is not self.session), None)
+        return second_session(self.session)
 
     def image(self, options: PictureOptions) -> Pixels:
         """Draw a picture and return it, (height, width, 3), or 4 with a transparent background.

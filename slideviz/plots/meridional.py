@@ -15,8 +15,10 @@ import numpy as np
 from slideviz.machine.span import SpanField
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.zones import zones_of
+from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT, Style, style_axes
 from slideviz.sections.span import SpanChannel, SpanWalls
+from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,22 +114,17 @@ def _bins_of(mesh: Mesh, used: FloatArray) -> int:
 def draw_meridional(
     figure: Figure,
     zones: Sequence[MeridionalBins],
-    values: FloatArray,
-    label: str,
-    limits: tuple[float, float],
-    *,
-    color_map: str = "viridis",
+    paint: Paint,
     style: Style = PRINT,
-    unit: str = "mesh units",
 ) -> None:
-    """Draw the means of values of all cells by z and r, with a color bar; ``label`` names them."""
+    """Draw the means of values of all cells by z and r, with a color bar."""
     axes: Any = figure.add_subplot()
-    style_axes(axes, style, f"z [{unit}]", f"r [{unit}]")
+    style_axes(axes, style, "z [mesh units]", "r [mesh units]")
     axes.grid(False)
     for bins in zones:
         z, r = np.moveaxis(bins.places, -1, 0)
-        means = bins.means(values)
-        mesh = axes.pcolormesh(z, r, means, cmap=color_map, vmin=limits[0], vmax=limits[1])
+        means = bins.means(paint.values)
+        mesh = axes.pcolormesh(z, r, means, cmap=paint.color_map, clim=paint.limits)
         mesh.set_rasterized(True)
         for row, name in zip((0, -1), bins.walls, strict=True):
             axes.plot(z[row], r[row], color=style.scheme.text, linewidth=style.width)
@@ -142,6 +139,7 @@ def draw_meridional(
     axes.locator_params(axis="x", nbins=4)
     axes.set_aspect("equal", adjustable="datalim")
     bar = figure.colorbar(mesh, ax=axes)
+    label = f"mean {QUANTITIES[paint.label].axis}"
     bar.set_label(label, fontsize=style.size, color=style.scheme.text)
     bar.ax.tick_params(colors=style.scheme.text, labelsize=style.size)
     bar.outline.set_edgecolor(style.scheme.edge)

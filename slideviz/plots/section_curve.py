@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.shape import Label
+from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,23 +45,21 @@ class Curve:
         return int(self.cells[here[np.argmax(self.inverted[here])]])
 
 
-def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np.ndarray) -> Curve:
+def curve_of(lines: Polygons, section: Section, paint: Paint) -> Curve:
     """Return the curve of a section's cut through a 2D mesh.
 
     ``lines``: the cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
-    ``values`` and ``inverted`` (m,): the value of every cell of the mesh, and whether it is
-    inverted.
     """
     corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
     ends = np.sort(section.in_plane.positions(section, corners), axis=1)
     order = np.lexsort(ends.T)
     cells = lines.cells[order]
-    return Curve(ends[order], values[cells], inverted[cells], cells)
+    return Curve(ends[order], paint.values[cells], paint.inverted[cells], cells)
 
 
-def position_label(section: Section) -> Label:
-    """Return the label of the positions along a section."""
-    return section.in_plane.position_label(section)
+def labels_of(section: Section, paint: Paint) -> tuple[str, str]:
+    """Return the labels of both axes of curves: the positions along a section, and the values."""
+    return section.in_plane.position_label(section).full, QUANTITIES[paint.label].axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,26 +71,18 @@ class CurveRow:
     series: int | None = None
 
 
-@dataclass(frozen=True)
-class Colors:
-    """Color map and range of the values, for the areas below a curve."""
-
-    color_map: str = COLOR_MAP
-    limits: tuple[float, float] = (0.0, 1.0)
-
-
 def draw_curves(
     axes: Axes,
     rows: Sequence[CurveRow],
     labels: tuple[str, str],
     style: Style = PRINT,
-    colors: Colors | None = None,
+    colors: Paint | None = None,
 ) -> None:
     """Draw curves as steps onto empty axes; they are interrupted where there is no cell.
 
     ``rows``: the last one is the main one: its inverted cells are marked, and areas are below it.
-    ``labels`` (str, str): labels of the positions and of the values. ``colors``: colors of the
-    areas; without them no areas are drawn.
+    ``labels`` (str, str): labels of the positions and of the values. ``colors``: has the colors of
+    the areas; without it no areas are drawn.
     """
     style_axes(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
@@ -130,7 +120,7 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
     return np.insert(x, 2 * breaks, np.nan), np.insert(y, 2 * breaks, np.nan)
 
 
-def _areas(axes: Any, curve: Curve, colors: Colors, bottom: float) -> None:
+def _areas(axes: Any, curve: Curve, colors: Paint, bottom: float) -> None:
     from matplotlib.collections import PolyCollection
 
     shown = PolyCollection(

@@ -14,7 +14,17 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import walls
 from slideviz.plots.ticks import rounded_out
-from slideviz.terms import QUANTITIES, RATED, WALL_VALUES, Metric, Quantity, field_of
+from slideviz.session.results import StepFrame
+from slideviz.session.state import Session
+from slideviz.terms import (
+    QUANTITIES,
+    RATED,
+    WALL_VALUES,
+    Metric,
+    Quantity,
+    field_of,
+    quantity_of,
+)
 
 
 def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
@@ -112,6 +122,19 @@ class Paint:
         if np.isnan(facts["min"]) and self.label in WALL_VALUES:
             return f"{RATED[self.label].label}: no cell at a wall; {count}"
         return f"{self.label}: {end} {facts[end]:{number}}, mean {facts['mean']:{number}}; {count}"
+
+
+def shown_paint(session: Session, frame: StepFrame | None = None) -> Paint:
+    """Return the values of the shown frame, or another one, in the colors of the view.
+
+    A view in the colors of roles has size-skew.
+    """
+    frame = frame or session.frame
+    assert frame is not None
+    what = quantity_of(session.view.color_by)
+    inverted = frame.quality.status == INVERTED
+    values = frame.values(what, session.mesh)
+    return Paint(what, values, inverted, session.color_range, session.view.color_map)
 
 
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:

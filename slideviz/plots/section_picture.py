@@ -25,13 +25,13 @@ from slideviz.plots.cells import (
     window,
 )
 from slideviz.plots.figure_io import empty_figure, fitted, lay_out, trim, write_figure
-from slideviz.plots.section_curve import Colors, CurveRow, curve_of, draw_curves, position_label
+from slideviz.plots.section_curve import CurveRow, curve_of, draw_curves, labels_of
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
-from slideviz.terms import QUANTITIES, WALL_VALUES
+from slideviz.terms import WALL_VALUES
 
 TITLE = 10.0  # size of the title's letters in points
 LETTERS = 9.0  # of all others
@@ -311,12 +311,11 @@ def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> Non
     for one in reversed(shown):
         if one.drawn:
             lines = joined(list(one.drawn.values()))
-            curve = curve_of(lines, section, one.paint.values, one.paint.inverted)
+            curve = curve_of(lines, section, one.paint)
             rows.append(CurveRow(one.name if len(shown) > 1 else "", curve))
     paint = shown[0].paint
-    labels = position_label(section).full, QUANTITIES[paint.label].axis
-    colors = Colors(paint.color_map, paint.limits)
-    draw_curves(figure.add_subplot(), rows, labels, replace(PRINT, size=LETTERS), colors)
+    style = replace(PRINT, size=LETTERS)
+    draw_curves(figure.add_subplot(), rows, labels_of(section, paint), style, paint)
 
 
 def _cells(

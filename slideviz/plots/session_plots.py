@@ -12,12 +12,12 @@ import numpy as np
 from slideviz.case.motion_words import deformation
 from slideviz.design.gap import Gap, gaps
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import FINE, INVERTED
+from slideviz.mesh.quality import FINE
 from slideviz.plots.gap import Measured
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.meridional import draw_meridional, meridional_bins
-from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
-from slideviz.plots.section_paint import Paint
+from slideviz.plots.section_curve import CurveRow, curve_of
+from slideviz.plots.section_paint import shown_paint
 from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
 from slideviz.plots.spanwise import Profile, along, in_layers
 from slideviz.plots.style import Style
@@ -176,18 +176,10 @@ def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None
 
     Raises CaseError or MeshError if there is no hub and shroud.
     """
-    frame = session.frame
     mesh = session.mesh
     walls = walls_in(session)
-    assert frame is not None
     assert mesh is not None
-    bins = meridional_bins(mesh, walls)
-    what = quantity_drawn(session)
-    limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
-    values = frame.values(what, mesh)
-    color_map = session.view.color_map
-    label = f"mean {QUANTITIES[what].axis}"
-    draw_meridional(figure, bins, values, label, limits, color_map=color_map, style=style)
+    draw_meridional(figure, meridional_bins(mesh, walls), shown_paint(session), style)
 
 
 def gaps_of(session: Session) -> list[Measured]:
@@ -229,7 +221,7 @@ class CurveRows:
         line = _line(section)
         states = [(session, cuts) for session, cuts in reversed(shown) if session.view.frame]
         first = shown[0][0]
-        if first.first is not None and quantity_drawn(first) != "displacement":
+        if first.first is not None and first.view.color_by != "displacement":
             states.insert(0, (show_frame(first, 0), self._first))
         curves = (self._row(session, cuts, line) for session, cuts in states)
         return tuple(row for row in curves if row is not None)
@@ -241,27 +233,10 @@ class CurveRows:
         lines = cuts.of(frame.mesh, line)
         if not len(lines):
             return None
-        values = frame.values(quantity_drawn(session), session.mesh)
-        curve = curve_of(lines, line, values, frame.quality.status == INVERTED)
+        curve = curve_of(lines, line, shown_paint(session))
         if run is None or session.view.frame == 0:
             return CurveRow("undeformed", curve, UNDEFORMED)
         return CurveRow(run.label, curve, series_of(run))
-
-
-def quantity_drawn(session: Session) -> Quantity:
-    """Return the quantity of the curve: that of the colors, or the quality for roles."""
-    return quantity_of(session.view.color_by)
-
-
-def labels_of(session: Session, section: Section) -> tuple[str, str]:
-    """Return the labels of both axes of the curves."""
-    return position_label(section).full, QUANTITIES[quantity_drawn(session)].axis
-
-
-def colors_of(session: Session) -> Colors:
-    """Return the colors of the areas below a curve: those of the view."""
-    limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
-    return Colors(session.view.color_map, limits)
 
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
@@ -269,12 +244,7 @@ def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
     frame = session.frame
     assert frame is not None
     lines = cuts.of(frame.mesh, _line(section))
-    if not len(lines):
-        return "it cuts no cell"
-    what = quantity_drawn(session)
-    inverted = frame.quality.status == INVERTED
-    values = frame.values(what, session.mesh)
-    return Paint(what, values, inverted, (0.0, 1.0)).sentence(lines.cell_ids)
+    return shown_paint(session).sentence(lines.cell_ids) if len(lines) else "it cuts no cell"
 
 
 def _line(section: Section) -> Section:

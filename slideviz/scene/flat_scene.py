@@ -10,7 +10,7 @@ from slideviz.color_scheme import LIGHT, SELECTED_COLOR, ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
-from slideviz.plots.section_paint import Paint
+from slideviz.plots.section_paint import shown_paint
 from slideviz.scene import pick
 from slideviz.scene.actors import draw_in_front
 from slideviz.scene.camera import Camera
@@ -24,7 +24,6 @@ from slideviz.session.colors import with_drawable_colors
 from slideviz.session.passages import Period, keeps, matrices
 from slideviz.session.section_cuts import NO_POLYGONS, Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
-from slideviz.terms import quantity_of
 
 FILL = 0.94  # part of the view's height or width that a fitted section takes
 READING = "its cells are being read from the file of the mesh"  # summary while cells are being read
@@ -195,18 +194,9 @@ class FlatScene:
         every = len(self._all.cell_ids)
         if only is not None and not len(cells):
             return f"none of {every:,} cells cut is shown: {only.words}"
-        frame = self.session.frame
-        mesh = self.session.mesh
-        assert frame is not None
+        assert self.session.frame is not None
         assert self.section is not None
-        frame = cut_frame(frame, self.section)
-        what = quantity_of(self.session.view.color_by)
-        paint = Paint(
-            what,
-            frame.values(what, mesh),
-            frame.quality.status == INVERTED,
-            self.session.color_range,
-        )
+        paint = shown_paint(self.session, cut_frame(self.session.frame, self.section))
         more = "; line: undeformed" if self._undeformed_of else ""
         return paint.sentence(cells, *(() if only is None else (every, only.words))) + more
 

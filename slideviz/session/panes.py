@@ -35,12 +35,19 @@ def panes(session: Session) -> tuple[int | None, int | None]:
     return (second, first) if session.view.swapped and second is not None else (first, second)
 
 
-def shown_views(session: Session) -> tuple[Session, ...]:
-    """Return a session for each view, the left one first: with the view's run and frame shown."""
+def second_session(session: Session) -> Session | None:
+    """Return the session as the second view shows it; None while there is only one view."""
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return None
+    return second_view(session)
+
+
+def shown_views(session: Session) -> tuple[Session, ...]:
+    """Return a session for each view, the left one first: with the view's run and frame shown."""
+    second = second_session(session)
+    if second is None:
         return (session,)
-    second = second_view(session)
     return (second, session) if session.view.swapped else (session, second)
 
 

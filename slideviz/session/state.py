@@ -246,11 +246,11 @@ class Session:
     @property
     def color_range(self) -> tuple[float, float]:
         """Return the values at the ends of the color bar."""
-        if self.view.color_range is not None:
-            return self.view.color_range
         what = self.view.color_by
         if what == "role":
             return 0.0, 1.0
+        if self.view.color_range is not None:
+            return self.view.color_range
         if what == "displacement":
             return 0.0, round_up(self.largest_displacement) or 1.0
         if what in WALL_VALUES:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.plots.meridional import draw_meridional, meridional_bins
+from slideviz.plots.section_paint import Paint
 from slideviz.samples.impeller import impeller_mesh
 from slideviz.sections.span import find_walls
 from tests.builders import cube, passage
@@ -46,10 +47,11 @@ def test_a_radial_passage_is_drawn_between_its_walls():
     assert np.ptp(bins.places[0, :, 1]) == pytest.approx(np.ptp(hub[:, 1]), rel=0.02)
     figure = Figure()
     values = sv.quality(mesh).values
-    draw_meridional(figure, [bins], values, "mean", (0.0, 1.0))
+    paint = Paint("size-skew", values, np.zeros(len(values), bool), (0.0, 1.0))
+    draw_meridional(figure, [bins], paint)
     axes, bar = figure.axes
     assert [text.get_text() for text in axes.texts] == ["HUB", "SHROUD"]
-    assert (axes.get_xlabel(), bar.get_ylabel()) == ("z [mesh units]", "mean")
+    assert (axes.get_xlabel(), bar.get_ylabel()) == ("z [mesh units]", "mean size-skew [-]")
     assert np.isfinite(bins.means(values)).mean() > 0.9
 
 

@@ -1,5 +1,7 @@
 """The curve along a line or circle, its plot, and the picture of cells with what is around them."""
 
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -7,26 +9,23 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from slideviz.color_scheme import COLOR_MAP
-from slideviz.mesh.quality import INVERTED, quality
+from slideviz.mesh.quality import quality
 from slideviz.plots import cells as plot_cells
 from slideviz.plots.cells import surroundings, window
 from slideviz.plots.section_curve import (
-    Colors,
     Curve,
     CurveRow,
     curve_of,
     draw_curves,
-    position_label,
+    labels_of,
     steps,
 )
-from slideviz.plots.section_paint import paint
+from slideviz.plots.section_paint import Paint, paint, shown_paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
 from slideviz.plots.session_plots import (
     UNDEFORMED,
     CurveRows,
-    colors_of,
     facts_of,
-    labels_of,
     series_of,
 )
 from slideviz.sections.cut import Cutter
@@ -38,6 +37,7 @@ from slideviz.session.state import StepFrame
 from tests.builders import cube, square
 
 EYE = {0: np.eye(4)}
+PAINT = Paint("size-skew", np.zeros(0), np.zeros(0, bool), (0.0, 1.0))
 LINE = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0))
 RING = Section("cylinder", (0.5, 0.5, 0.0), radius=0.4)
 
@@ -53,7 +53,7 @@ def mesh():
 def curve(mesh, section):
     found = quality(mesh)
     lines = Cutter.of(mesh).cut(mesh.points, section)
-    return curve_of(lines, section, found.values, found.status == INVERTED)
+    return curve_of(lines, section, paint(mesh, found, "size-skew"))
 
 
 def row(ends, values, inverted=None):
@@ -90,10 +90,10 @@ def test_positions_along_a_slope_are_lengths():
     mesh = square(4, block=False)
     found = curve(mesh, Section("plane", (0.1, 0.0, 0.0), (1.0, -1.0, 0.0)))
     assert (found.ends[:, 1] - found.ends[:, 0]).sum() == pytest.approx(0.9 * np.sqrt(2.0))
-    assert position_label(Section("plane", direction=(1.0, -1.0, 0.0))).full == (
+    assert labels_of(Section("plane", direction=(1.0, -1.0, 0.0)), PAINT)[0] == (
         "along (0.707, 0.707, 0)"
     )
-    assert position_label(LINE).full == "x"
+    assert labels_of(LINE, PAINT)[0] == "x"
 
 
 def test_positions_on_a_circle_are_angles_with_the_same_seam_always():
@@ -105,7 +105,7 @@ def test_positions_on_a_circle_are_angles_with_the_same_seam_always():
     lengths = found.ends[:, 1] - found.ends[:, 0]
     assert (lengths < 30.0).all()
     assert lengths.sum() == pytest.approx(360.0)
-    assert position_label(RING).full == "angle [°]"
+    assert labels_of(RING, PAINT)[0] == "angle [°]"
 
 
 def test_a_curve_breaks_where_there_is_no_cell():
@@ -129,7 +129,7 @@ def test_the_areas_below_a_curve_have_the_colors_of_the_view():
     values = (0.4, 0.9)
     limits = (0.2, 1.0)
     one = CurveRow("run 1", row([(0, 1), (1, 2)], values), 0)
-    axes = axes_of([one], colors=Colors("plasma", limits))
+    axes = axes_of([one], colors=replace(PAINT, color_map="plasma", limits=limits))
     (areas,) = axes.collections
     areas.update_scalarmappable()
     wanted = mpl.colormaps["plasma"]((np.array(values) - 0.2) / 0.8)[:, :3]
@@ -199,11 +199,12 @@ def test_the_curve_is_of_what_the_colors_say(session):
     moved = changes.set_view(session, color_by="displacement")
     (only,) = CurveRows().of([(moved, Cuts())], LINE)
     assert only.curve.values.max() > 0.02
-    assert labels_of(moved, LINE) == ("x", "displacement [mesh units]")
-    assert colors_of(moved).limits == moved.color_range
+    assert labels_of(LINE, shown_paint(moved)) == ("x", "displacement [mesh units]")
+    assert shown_paint(moved).limits == moved.color_range
     role = changes.set_view(session, color_by="role")
-    assert labels_of(role, RING) == ("angle [°]", "size-skew [-]")
-    assert colors_of(role) == Colors(COLOR_MAP, (0.0, 1.0))
+    drawn = shown_paint(role)
+    assert labels_of(RING, drawn) == ("angle [°]", "size-skew [-]")
+    assert (drawn.color_map, drawn.limits) == (COLOR_MAP, (0.0, 1.0))
 
 
 def test_the_facts_are_those_of_the_cut_cells(session):

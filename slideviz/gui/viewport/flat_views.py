@@ -20,14 +20,15 @@ from slideviz.gui.viewport.viewing import TitleBar, Viewing
 from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, ask_and_write_plot
-from slideviz.plots.section_curve import Colors, CurveRow, draw_curves
-from slideviz.plots.session_plots import CurveRows, colors_of, facts_of, labels_of
+from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of
+from slideviz.plots.section_paint import Paint, shown_paint
+from slideviz.plots.session_plots import CurveRows, facts_of
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import ticks
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.changes import UNDEFORMED, second_view
+from slideviz.session.panes import second_session
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -240,14 +241,6 @@ class FlatViews(QWidget):
             self.first.close_view()
 
 
-def second_session(session: Session) -> Session | None:
-    """Return the session as the second 3D view shows it; None while there is only one view."""
-    other = session.view.beside
-    if other is None or (other != UNDEFORMED and session.run(other) is None):
-        return None
-    return second_view(session)
-
-
 def pane_name(session: Session) -> str:
     """Return the name of what a view shows: ``Run 3``, or ``Undeformed``."""
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
@@ -277,23 +270,35 @@ def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
 NOTHING = "The section cuts no cell."  # text shown instead of the plot
 
 
-class CurveView(QWidget):
-    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared."""
+class _SectionView(QWidget):
+    """A view of a section, with a title and a line of facts; ``name`` begins its parts' names."""
 
     closed = Signal()
 
-    def __init__(self, store: Store, scheme: ColorScheme) -> None:
+    def __init__(self, name: str, tip: str) -> None:
         super().__init__()
-        self.setObjectName("curve_view")
-        self.store = store
-        self.title = TitleBar("curve_title", "Close the curve")
+        self.setObjectName(f"{name}_view")
+        self.title = TitleBar(f"{name}_title", tip)
         self.title.closed.connect(self.closed)
         self.title.show()
+        self.facts = ElidedLabel()
+        self.facts.setObjectName(f"{name}_facts")
+
+    def describe(self, title: str, facts: str) -> None:
+        self.title.set_text(title)
+        self.facts.setText(facts)
+        self.facts.setToolTip(facts)
+
+
+class CurveView(_SectionView):
+    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared."""
+
+    def __init__(self, store: Store, scheme: ColorScheme) -> None:
+        super().__init__("curve", "Close the curve")
+        self.store = store
         self.save_button = self.title.add_button(
             "picture", "Save the curve as PNG, SVG or PDF…", self._save
         )
-        self.facts = ElidedLabel()
-        self.facts.setObjectName("curve_facts")
         canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(canvas)
         canvas.picked = self._picked
@@ -301,20 +306,16 @@ class CurveView(QWidget):
         in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
         self._made = CurveRows()
         self.rows: tuple[CurveRow, ...] = ()
-        self._labels = ("", "")
-        self._colors = Colors()
+        self._draw: Draw = lambda _figure, _style: None
         self.set_scheme(scheme)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
         """Show the curves along a section, given each view's session and cuts, the first first."""
         session, cuts = shown[0]
         self.rows = self._made.of(shown, section)
-        self._labels = labels_of(session, section)
-        self._colors = colors_of(session)
-        self.title.set_text(section.describe(2))
-        facts = facts_of(session, cuts, section)
-        self.facts.setText(facts)
-        self.facts.setToolTip(facts)
+        paint = shown_paint(session)
+        self._draw = partial(_draw, self.rows, labels_of(section, paint), paint)
+        self.describe(section.describe(2), facts_of(session, cuts, section))
         self.save_button.setEnabled(bool(self.rows))
         if self.rows:
             self.area.plot()
@@ -322,7 +323,7 @@ class CurveView(QWidget):
             self.area.show_text(NOTHING)
 
     def drawing(self) -> Draw:
-        return partial(_draw, self.rows, self._labels, self._colors)
+        return self._draw
 
     def set_scheme(self, scheme: ColorScheme) -> None:
         self.area.canvas.set_scheme(scheme)
@@ -339,32 +340,24 @@ class CurveView(QWidget):
 
 
 def _draw(
-    rows: Sequence[CurveRow], labels: tuple[str, str], colors: Colors, figure: Figure, style: Style
+    rows: Sequence[CurveRow], labels: tuple[str, str], paint: Paint, figure: Figure, style: Style
 ) -> None:
     if rows:
-        draw_curves(figure.add_subplot(), rows, labels, style, colors)
+        draw_curves(figure.add_subplot(), rows, labels, style, paint)
 
 
-class FlatView(QWidget):
+class FlatView(_SectionView):
     """The view of a section laid flat, with rulers, a line of facts, and buttons to fit and close.
 
     ``cuts``: the cuts of the 3D view, shared with it. ``multi_samples``: samples per pixel for
     antialiasing; 0 for none.
     """
 
-    closed = Signal()
-
     def __init__(
         self, store: Store, cuts: Cuts, scheme: ColorScheme, multi_samples: int = 4
     ) -> None:
-        super().__init__()
-        self.setObjectName("flat_view")
-        self.title = TitleBar("flat_title", "Close the flat view")
-        self.title.closed.connect(self.closed)
-        self.title.show()
+        super().__init__("flat", "Close the flat view")
         self.fit_button = self.title.add_button("fit", "Make the section fill this view", self.fit)
-        self.facts = ElidedLabel()
-        self.facts.setObjectName("flat_facts")
         self.view = View3D(self, multi_samples=multi_samples)
         self.view.setMinimumSize(120, 80)
         self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
@@ -412,9 +405,7 @@ class FlatView(QWidget):
         """
         self.scene.update(session, section)
         words = section.describe()
-        self.title.set_text(f"{called}: {words}" if called else words)
-        self.facts.setText(self.scene.summary)
-        self.facts.setToolTip(self.scene.summary)
+        self.describe(f"{called}: {words}" if called else words, self.scene.summary)
         about = section.origin if section.shape.terms.point else ()
         kind = (session.mesh, section.kind, section.direction, about, session.view.passages)
         if kind != self._fitted:

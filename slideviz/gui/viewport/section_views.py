@@ -13,13 +13,7 @@ from vtkmodules.vtkInteractionWidgets import vtkImplicitPlaneRepresentation, vtk
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.flat_views import (
-    FRAME_PX,
-    CurveView,
-    FlatView,
-    FlatViews,
-    second_session,
-)
+from slideviz.gui.viewport.flat_views import FRAME_PX, CurveView, FlatView, FlatViews
 from slideviz.gui.viewport.point_handle import (
     HANDLE_COLOR,
     POINT_PX,
@@ -34,6 +28,7 @@ from slideviz.scene.axis_handle import points_near
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.panes import second_session
 from slideviz.session.section_cuts import can_cut
 from slideviz.session.state import Session
 
