@@ -37,7 +37,6 @@ from slideviz.solver.remedies import MOST_NAMES
 from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step, step_timer
-from slideviz.solver.zones import joined_repairs
 from slideviz.system.threads import Tick, equal_shares
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, SLIDES, RepairTarget, Role, SkewMetric
 
@@ -255,7 +254,7 @@ def _mended_zones(
         zone_cases(case, mesh, False), zones_of(mesh), zones_of(now), shapes, shares, strict=True
     )
     done = {k: mend(*of_zone) for k, of_zone in enumerate(each)}
-    mended = joined_repairs(mesh, with_zones(now, [one.mesh for one in done.values()]), done)
+    mended = MeshRepair.joined(mesh, with_zones(now, [one.mesh for one in done.values()]), done)
     assert mended is not None
     return mended
 

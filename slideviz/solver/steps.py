@@ -5,16 +5,20 @@ Steps are made in `slideviz.solver.stepping`, their number is chosen in `slidevi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from dataclasses import field as made_by
 from functools import cached_property
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.errors import Note
 from slideviz.mesh.margin import SafeFraction, chain
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, ZonePart, sealed
+from slideviz.mesh.zones import join_zones, names_from
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Cycle, PhaseTimer, Relaxed
@@ -92,6 +96,44 @@ class MeshRepair:
     """Cells of ``left`` that no motion of the free nodes mends, each with the reason."""
     warnings: tuple[str, ...] = ()  # what the user should know
 
+    @classmethod
+    def joined(
+        cls, mesh: Mesh, now: Mesh, repairs: Mapping[int, MeshRepair | None]
+    ) -> MeshRepair | None:
+        """Return the repairs of zones, by their places in the mesh, as one; None if there are none.
+
+        ``mesh`` and ``now``: of all zones, undeformed and repaired.
+        """
+        done = [(mesh.zone_parts[k], one) for k, one in repairs.items() if one is not None]
+        if not done:
+            return None
+
+        def numbers(name: str, start: str = "first_cell") -> IntArray:
+            each = [getattr(one, name) + getattr(part, start) for part, one in done]
+            return sealed(np.concatenate(each))
+
+        if mesh.part is not None:  # of streamed zones, the bad cells and the moved nodes
+            parts = [(place, one.mesh.part) for place, one in done if one.mesh.part is not None]
+            points = np.concatenate([each.points + place.first_point for place, each in parts])
+            cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
+            part = Part(sealed(points), sealed(cells), mesh.part.n_points, mesh.part.n_cells)
+            bare = [replace(one.mesh, markers=()) for _, one in done]
+            now = replace(join_zones(bare), part=part)
+        return cls(
+            mesh=now,
+            cells=numbers("cells"),
+            left=numbers("left"),
+            folded=numbers("folded"),
+            folded_left=numbers("folded_left"),
+            nodes=numbers("nodes", "first_point"),
+            points=sealed(np.concatenate([one.points for _, one in done])),
+            largest_move=max(one.largest_move for _, one in done),
+            unmendable=tuple(
+                (cell + part.first_cell, why) for part, one in done for cell, why in one.unmendable
+            ),
+            warnings=tuple(text for _, one in done for text in one.warnings),
+        )
+
     def report(self) -> dict[str, Any]:
         """Return the entry ``repair`` of a report."""
         return {
@@ -127,62 +169,188 @@ class MeshRepair:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """The mesh after one step."""
+class ZoneSteps:
+    """The steps of zones, by their places in a mesh, that are joined to one of the mesh."""
 
-    index: int
-    total: int
+    mesh: Mesh  # of all zones, undeformed
+    now: Mesh  # after the steps
+    steps: Mapping[int, Step]
+    fresh: Mapping[int, Step]  # those that are no step of the round before
+    leader: Step  # the one that numbers the steps of the mesh
+
+    def each(self, name: str) -> list[tuple[ZonePart, Any]]:
+        """Return each zone with the value of a field of its step."""
+        parts = self.mesh.zone_parts
+        return [(parts[k], getattr(step, name)) for k, step in self.steps.items()]
+
+    def values(self, name: str) -> list[Any]:
+        """Return the value of a field of each step."""
+        return [getattr(step, name) for step in self.steps.values()]
+
+    def new(self, name: str) -> list[Any]:
+        """Return the value of a field of each step of this round."""
+        return [getattr(step, name) for step in self.fresh.values()]
+
+
+Rule = Callable[[ZoneSteps, str], Any]
+"""Returns the value that a field has in the step of a mesh of several zones."""
+
+
+def _leading(zones: ZoneSteps, name: str) -> Any:
+    return getattr(zones.leader, name)
+
+
+def _sum(zones: ZoneSteps, name: str) -> int:
+    return sum(zones.values(name))
+
+
+def _largest(zones: ZoneSteps, name: str) -> float | None:
+    return max((value for value in zones.values(name) if value is not None), default=None)
+
+
+def _counted(values: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    total: Counter[str] = Counter()
+    for value in values:
+        total.update(value)
+    return dict(total)
+
+
+def _chained(zones: ZoneSteps, name: str) -> tuple[Any, ...]:
+    return tuple(one for value in zones.new(name) for one in value)
+
+
+def _of_each_zone(_zones: ZoneSteps, _name: str) -> None:
+    """Return nothing: what belongs to a zone alone, and is used before zones are joined."""
+
+
+def _worst_condition(zones: ZoneSteps, name: str) -> float:
+    return max(filter(isfinite, zones.values(name)), default=nan)
+
+
+def _warnings(zones: ZoneSteps, name: str) -> tuple[str, ...]:
+    def of_zones() -> Iterator[str]:
+        for index, step in zones.steps.items():
+            for text in getattr(step, name):
+                said = f"zone {index + 1}: {text}"
+                yield Note(said) if isinstance(text, Note) else said
+
+    return tuple(of_zones())
+
+
+def _control(zones: ZoneSteps, name: str) -> IntArray:
+    return np.concatenate([nodes + part.points.start for part, nodes in zones.each(name)])
+
+
+def _relaxed(zones: ZoneSteps, name: str) -> Relaxed | None:
+    return Relaxed.joined([one for one in zones.new(name) if one is not None])
+
+
+def _repaired(zones: ZoneSteps, name: str) -> MeshRepair | None:
+    repairs = {k: getattr(step, name) for k, step in zones.fresh.items()}
+    return MeshRepair.joined(zones.mesh, zones.now, repairs)
+
+
+def _kept_layers(zones: ZoneSteps, name: str) -> KeptLayers | None:
+    walls = []
+    nodes = 0
+    for part, kept in zones.each(name):
+        if kept is not None:
+            label = names_from(zones.mesh, part)
+            nodes += kept.nodes
+            walls += [(tuple(label[one] for one in wall), delta) for wall, delta in kept.walls]
+    return KeptLayers(tuple(walls), nodes) if walls else None
+
+
+def _first_to_fold(zones: ZoneSteps, name: str) -> SafeFraction | None:
+    safe = []
+    for index, step in zones.fresh.items():
+        one = getattr(step, name)
+        if one is not None and one.cell is not None:
+            first = zones.mesh.zone_parts[index].first_cell
+            one = replace(one, cell=one.cell + first, zone=index + 1)
+        safe.append(one)
+    return min(filter(None, safe), key=lambda one: one.fraction, default=None)
+
+
+def by(rule: Rule) -> dict[str, Rule]:
+    """Return the metadata of a field of a step with that rule."""
+    return {"joined": rule}
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The mesh after one step.
+
+    Of a mesh with several zones each is deformed alone; each field has a rule that makes its value
+    from those of the zones.
+    """
+
+    index: int = made_by(metadata=by(_leading))
+    total: int = made_by(metadata=by(_leading))
     """`index`, `total`: number of the step, from 1, and of all steps."""
-    mesh: Mesh
+    mesh: Mesh = made_by(metadata=by(lambda zones, _: zones.now))
     """The deformed mesh."""
-    control_nodes: int
+    control_nodes: int = made_by(metadata=by(_sum))
     """Nodes in the interpolation system of this step, or of known displacement where a method has
     no such system."""
-    max_error: float
+    max_error: float = made_by(metadata=by(_largest))
     """Largest misfit at nodes of known or projected displacement before the correction sets them
     exactly, with data reduction that of all steps so far, in the mesh's length unit."""
-    condition: float
+    condition: float = made_by(metadata=by(_worst_condition))
     """Estimated condition number of the interpolation system; NaN where a method has none."""
-    node_counts: Mapping[str, int]
+    node_counts: Mapping[str, int] = made_by(
+        metadata=by(lambda zones, name: _counted(zones.values(name)))
+    )
     """``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``."""
-    seconds: Mapping[str, float]
+    seconds: Mapping[str, float] = made_by(
+        metadata=by(lambda zones, name: _counted(zones.new(name)))
+    )
     """Spent in this step, by phase; ``classify`` only in the first."""
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...] = made_by(metadata=by(_warnings))
     """What the user should know of case, mesh and all steps so far."""
-    history: tuple[Cycle, ...] = ()
+    history: tuple[Cycle, ...] = made_by(default=(), metadata=by(_chained))
     """Convergence of the greedy selection in this step; empty without data reduction."""
-    tried: tuple[Trial, ...] = ()
+    tried: tuple[Trial, ...] = made_by(default=(), metadata=by(_chained))
     """The numbers of steps tried by STEPS= auto; empty but in the last step of such a run."""
-    control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
+    control: IntArray = made_by(
+        default_factory=lambda: np.empty(0, np.int64), metadata=by(_control)
+    )
     """(c,): the control nodes of this step; empty where a method has none."""
-    candidates: int = 0
+    candidates: int = made_by(default=0, metadata=by(_sum))
     """Nodes that could have been control nodes; periodic images count as one."""
-    tolerance: float | None = None
+    tolerance: float | None = made_by(default=None, metadata=by(_largest))
     """The tolerance of the data reduction, in the mesh's length unit; None where there was none."""
-    layers: float = 0.0
+    layers: float = made_by(default=0.0, metadata=by(_largest))
     """The tolerance that layers at moving boundaries need where it is smaller than ``tolerance``
     (`slideviz.solver.setup.LAYER`); else 0."""
-    periodic_misfit: float | None = None
+    periodic_misfit: float | None = made_by(default=None, metadata=by(_largest))
     """Largest difference of the displacements of periodic images so far, in the mesh's length unit.
     It is rounding only, since more raises. None where images need not move alike."""
-    part: float = 1.0
+    part: float = made_by(default=1.0, metadata=by(_leading))
     """The part of the whole displacement that is reached after this step, 0 to 1."""
-    support_radius: float | None = None
+    support_radius: float | None = made_by(default=None, metadata=by(_largest))
     """Of the radial functions, in the mesh's length unit; None where a method has none."""
-    field: Field | None = None
+    field: Field | None = made_by(default=None, metadata=by(_of_each_zone))
     """The function that displaced the nodes off the boundary in this step; kept in streamed
     runs."""
-    relaxed: Relaxed | None = None
+    relaxed: Relaxed | None = made_by(default=None, metadata=by(_relaxed))
     """How the step was relaxed; None where it was not."""
-    repaired: MeshRepair | None = None
+    repaired: MeshRepair | None = made_by(default=None, metadata=by(_repaired))
     """The repair after the step; None where there was none."""
-    kept_layers: KeptLayers | None = None
+    kept_layers: KeptLayers | None = made_by(default=None, metadata=by(_kept_layers))
     """The walls that carried the nodes near them along (LAYERS); None where none did."""
-    safe: SafeFraction | None = None
+    safe: SafeFraction | None = made_by(default=None, metadata=by(_first_to_fold))
     """How far this step, straight on, may go until the first cell folds; None where it was not
     asked for."""
-    check_limits: Callable[[Mesh], tuple[LimitResult, ...]] | None = None
+    check_limits: Callable[[Mesh], tuple[LimitResult, ...]] | None = made_by(
+        default=None, metadata=by(_of_each_zone)
+    )
     """Returns whether a mesh meets each limit of the case; None where it has none."""
+
+    @classmethod
+    def joined(cls, zones: ZoneSteps) -> Step:
+        """Return the steps of zones as one of the mesh of all."""
+        return cls(**{one.name: one.metadata["joined"](zones, one.name) for one in fields(cls)})
 
     @cached_property
     def limits(self) -> tuple[LimitResult, ...]:

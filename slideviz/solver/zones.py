@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from math import isfinite, nan
 
 import numpy as np
 
@@ -14,20 +12,18 @@ from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.zones import with_marker_names, zone_cases
-from slideviz.errors import Note, SlidevizError
+from slideviz.errors import SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,
     disjoint_interfaces,
     named_interfaces,
     torn_interfaces,
 )
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, ZoneInterface, sealed
-from slideviz.mesh.zones import join_zones, names_from, names_in, with_zones
-from slideviz.rbf.layers import KeptLayers
-from slideviz.rbf.problem import Relaxed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
+from slideviz.mesh.zones import names_in, with_zones
 from slideviz.solver.prescribed import check_motion
 from slideviz.solver.rims import on_walls
-from slideviz.solver.steps import MeshRepair, Progress, Step
+from slideviz.solver.steps import Progress, Step, ZoneSteps
 from slideviz.terms import Role
 
 Report = Callable[[Progress], None]
@@ -243,121 +239,6 @@ def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
         # Before the last step, nodes that follow sliding ones are on a straight way to them.
         last = leader is longest[-1]
         torn = torn_interfaces(mesh, now.points, motion.names) if last else ()
-        yield replace(
-            joined_step(mesh, now, steps, fresh),
-            index=leader.index,
-            total=len(longest),
-            part=leader.part,
-            warnings=(*motion.warnings, *_warnings(steps), *torn),
-        )
+        step = Step.joined(ZoneSteps(mesh, now, steps, fresh, leader))
+        yield replace(step, warnings=(*motion.warnings, *step.warnings, *torn))
         before = steps
-
-
-def _warnings(steps: Mapping[int, Step]) -> Iterator[str]:
-    for index, step in steps.items():
-        for text in step.warnings:
-            said = f"zone {index + 1}: {text}"
-            yield Note(said) if isinstance(text, Note) else said
-
-
-def joined_step(
-    mesh: Mesh, now: Mesh, steps: Mapping[int, Step], fresh: Mapping[int, Step]
-) -> Step:
-    """Return the steps of zones as one of the mesh of all, which is ``now`` then.
-
-    ``fresh`` are those that are not a step of the round before.
-    """
-    each = list(steps.values())
-    new = list(fresh.values())
-    counts: Counter[str] = Counter()
-    spent: Counter[str] = Counter()
-    for step in each:
-        counts.update(step.node_counts)
-    for step in new:
-        spent.update(step.seconds)
-    relaxed = [step.relaxed for step in new if step.relaxed is not None]
-    safe = [
-        step.safe if step.safe.cell is None else replace(step.safe, cell=cell, zone=index + 1)
-        for index, step in fresh.items()
-        if step.safe is not None
-        for cell in [mesh.zone_parts[index].first_cell + (step.safe.cell or 0)]
-    ]
-    return Step(
-        index=1,
-        total=1,
-        mesh=now,
-        control_nodes=sum(step.control_nodes for step in each),
-        max_error=max(step.max_error for step in each),
-        condition=max((s.condition for s in each if isfinite(s.condition)), default=nan),
-        node_counts=dict(counts),
-        seconds=dict(spent),
-        warnings=(),
-        history=tuple(cycle for step in new for cycle in step.history),
-        tried=tuple(trial for step in new for trial in step.tried),
-        control=np.concatenate(
-            [step.control + mesh.zone_parts[k].points.start for k, step in steps.items()]
-        ),
-        candidates=sum(step.candidates for step in each),
-        tolerance=_largest(step.tolerance for step in each),
-        layers=max(step.layers for step in each),
-        periodic_misfit=_largest(step.periodic_misfit for step in each),
-        support_radius=_largest(step.support_radius for step in each),
-        relaxed=Relaxed.joined(relaxed),
-        repaired=joined_repairs(mesh, now, {k: step.repaired for k, step in fresh.items()}),
-        kept_layers=_kept_layers(mesh, steps),
-        safe=min(safe, key=lambda one: one.fraction, default=None),
-    )
-
-
-def _largest(values: Iterable[float | None]) -> float | None:
-    return max((value for value in values if value is not None), default=None)
-
-
-def _kept_layers(mesh: Mesh, steps: Mapping[int, Step]) -> KeptLayers | None:
-    walls = []
-    nodes = 0
-    for index, step in steps.items():
-        if step.kept_layers is None:
-            continue
-        name = names_from(mesh, mesh.zone_parts[index])
-        nodes += step.kept_layers.nodes
-        walls += [
-            (tuple(name[one] for one in boundaries), thickness)
-            for boundaries, thickness in step.kept_layers.walls
-        ]
-    return KeptLayers(tuple(walls), nodes) if walls else None
-
-
-def joined_repairs(
-    mesh: Mesh, now: Mesh, repairs: Mapping[int, MeshRepair | None]
-) -> MeshRepair | None:
-    """Return the repairs of zones, by the place of each, as one of the mesh; None of none."""
-    done = [(mesh.zone_parts[k], one) for k, one in repairs.items() if one is not None]
-    if not done:
-        return None
-
-    def numbers(name: str, start: str = "first_cell") -> IntArray:
-        each = [getattr(one, name) + getattr(part, start) for part, one in done]
-        return sealed(np.concatenate(each))
-
-    if mesh.part is not None:  # of streamed zones, the bad cells and the moved nodes
-        parts = [(place, one.mesh.part) for place, one in done if one.mesh.part is not None]
-        points = np.concatenate([each.points + place.first_point for place, each in parts])
-        cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
-        part = Part(sealed(points), sealed(cells), mesh.part.n_points, mesh.part.n_cells)
-        bare = [replace(one.mesh, markers=()) for _, one in done]
-        now = replace(join_zones(bare), part=part)
-    return MeshRepair(
-        mesh=now,
-        cells=numbers("cells"),
-        left=numbers("left"),
-        folded=numbers("folded"),
-        folded_left=numbers("folded_left"),
-        nodes=numbers("nodes", "first_point"),
-        points=sealed(np.concatenate([one.points for _, one in done])),
-        largest_move=max(one.largest_move for _, one in done),
-        unmendable=tuple(
-            (cell + part.first_cell, why) for part, one in done for cell, why in one.unmendable
-        ),
-        warnings=tuple(text for _, one in done for text in one.warnings),
-    )

@@ -31,8 +31,7 @@ from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.solver.setup import make_setup
-from slideviz.solver.steps import Step
-from slideviz.solver.zones import joined_step
+from slideviz.solver.steps import Step, ZoneSteps
 
 Attempt = TypeVar("Attempt")
 
@@ -417,7 +416,8 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
     if mesh.zone_parts:
         zones = enumerate(each_zone(case, mesh))
         steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
-        step = joined_step(mesh, mesh, steps, steps)
+        leader = next(iter(steps.values()))
+        step = Step.joined(ZoneSteps(mesh, mesh, steps, steps, leader))
         return replace(step, warnings=(*case.warnings, *step.warnings))
     setup = make_setup(case, mesh)
     return Step(
