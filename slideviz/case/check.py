@@ -16,12 +16,12 @@ from slideviz.case.motions.box import box_motions
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.zones import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Note, nearest
+from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
 from slideviz.terms import KERNELS, ROLES, SLIDES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
 
 _LISTED = 12
 
@@ -29,7 +29,7 @@ _LISTED = 12
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
     case = with_marker_names(case, mesh)
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         return tuple(_problems_of_zones(case, mesh))
     return (
         *_radius_problems(case, mesh),
@@ -68,7 +68,7 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     except CaseError as problem:
         yield str(problem)
         return
-    for number, (one, part) in enumerate(zip(cases, mesh.zone_parts, strict=True), 1):
+    for number, (one, part) in enumerate(zip(cases, mesh.parts, strict=True), 1):
         if one.markers_with("moving"):
             yield from (f"zone {number}: {text}" for text in check_case(one, part.mesh))
 
@@ -155,7 +155,7 @@ def _keys_of_markers(case: Case) -> dict[str, str]:
 
 def _of_several_zones(mesh: Mesh, marker: str) -> str:
     """Return the spellings of a marker that several zones have, as ``1:blade or 2:blade``."""
-    if not mesh.zone_parts or marker in mesh.marker_names:
+    if not isinstance(mesh, Assembly) or marker in mesh.marker_names:
         return ""
     return " or ".join(name for name in mesh.marker_names if without_zone(name) == marker)
 

@@ -120,7 +120,7 @@ def in_zones(
     """
     each = [
         (k, part.points.start, part.mesh, here)
-        for k, part in enumerate(mesh.zone_parts, 1)
+        for k, part in enumerate(mesh.parts, mesh.zone or 1)
         if len(here := nodes[(part.points.start <= nodes) & (nodes < part.points.stop)])
     ] or [(mesh.zone or 1, 0, mesh, nodes)]
     named = mesh.zones > 1 and ":" in text and ":" in _COMMENT.sub("", text)

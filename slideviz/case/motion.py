@@ -21,7 +21,7 @@ from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.zones import each_zone, of_several_zones, zone_motion
 from slideviz.errors import CaseError
 from slideviz.mesh.check import LARGEST, within
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.zones import names_in
 
 PlacedDisplacements = Mapping[int, Displacements]
@@ -42,7 +42,7 @@ def placed_displacements(
     """
     found: dict[int, Displacements] = {}
     for family in families:
-        if mesh.zone_parts and family in IN_ZONES:
+        if isinstance(mesh, Assembly) and family in IN_ZONES:
             found |= _of_zones(case, mesh, on, problems, family)
         else:
             found |= family.placed(case, mesh, on, problems)
@@ -58,7 +58,7 @@ def _of_zones(
 ) -> dict[int, Displacements]:
     """Return what the displacements of each zone are together, by the place in the case."""
     parts: dict[int, list[Displacements]] = {}
-    for part, (zone_case, zone) in zip(mesh.zone_parts, each_zone(case, mesh), strict=True):
+    for part, (zone_case, zone) in zip(mesh.parts, each_zone(case, mesh), strict=True):
         names = names_in(mesh, part)
         start = part.points.start
         mine = {names[name]: nodes - start for name, nodes in on.items() if name in names}

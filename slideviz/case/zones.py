@@ -10,7 +10,7 @@ from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.motions.onto import Onto
 from slideviz.case.words import first_of
 from slideviz.errors import CaseError, Note
-from slideviz.mesh.model import Mesh, ZonePart
+from slideviz.mesh.model import Assembly, Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
 
 
@@ -87,7 +87,7 @@ def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...
     several zones onto one target is always refused.
     """
     case = with_marker_names(case, mesh)
-    if not mesh.zone_parts:
+    if not isinstance(mesh, Assembly):
         return (case,)
     for place, motion in enumerate(case.motions, start=1):
         if (computed or isinstance(motion, Onto)) and of_several_zones(motion, case, mesh):
@@ -95,14 +95,14 @@ def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...
                 f"motion {place} is of boundaries of several zones together, which are deformed "
                 "alone; give one for each"
             )
-    zones = [names_in(mesh, part) for part in mesh.zone_parts]
+    zones = [names_in(mesh, part) for part in mesh.parts]
     if case.span and all(_zone_span(case, names) is None for names in zones):
         raise CaseError(
             f"SPAN: {' and '.join(case.span)} are not both boundaries of one zone of {mesh.name}, "
             f"which has {', '.join(mesh.marker_names)}"
         )
     settings = case.zone_settings or (case,) * mesh.zones
-    each = zip(settings, mesh.zone_parts, strict=True)
+    each = zip(settings, mesh.parts, strict=True)
     return tuple(_zone_case(case, one, mesh, part) for one, part in each)
 
 
@@ -117,7 +117,7 @@ def of_several_zones(motion: Motion, case: Case, mesh: Mesh) -> bool:
     So do those about their common centroid, and displacement files.
     """
     moved = [name for name in case.markers_with("moving") if applies_to(motion, name)]
-    zones = [not names_in(mesh, part).keys().isdisjoint(moved) for part in mesh.zone_parts]
+    zones = [not names_in(mesh, part).keys().isdisjoint(moved) for part in mesh.parts]
     return motion.joins_zones and sum(zones) > 1
 
 

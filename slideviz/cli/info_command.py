@@ -80,14 +80,15 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
     for remark in mesh.remarks:
         print(f"  {remark}")
     print("markers:" if mesh.markers else "no markers")
+    several = len(mesh.parts) > 1
     if mesh.markers:
         rows = [(m["name"], m["elements"], "elements") for m in report["markers"]]
         zones = [f"zone {zone}" for zone in marker_zones(mesh)]
         more = [(*row, zone) for row, zone in zip(rows, zones, strict=True)]
-        print(table(more if mesh.zone_parts else rows))
+        print(table(more if several else rows))
     zone_of = dict(zip(mesh.marker_names, marker_zones(mesh), strict=True))
     for interface in mesh.interfaces:
-        if mesh.zone_parts and zone_of[interface.marker] > interface.zone:
+        if several and zone_of[interface.marker] > interface.zone:
             continue  # the same, seen from the other zone
         print(f"  {interface.marker} is {interface.describe()}")
     for pair in report["periodic_pairs"]:

@@ -274,7 +274,7 @@ def info_report(
         "extents": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
         "markers": [
             {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)}
-            | ({"zone": zone} if mesh.zone_parts else {})
+            | ({"zone": zone} if len(mesh.parts) > 1 else {})
             for zone, m in zip(marker_zones(mesh), mesh.markers, strict=True)
         ],
         "periodic_pairs": [

@@ -32,7 +32,7 @@ from slideviz.design.known_nodes import known_node_map
 from slideviz.design.zones import Work, ZoneDesign, over_zones, zone_designs
 from slideviz.errors import CaseError, DeformError, Note, not_one_of
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
-from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+from slideviz.mesh.model import Assembly, FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR
@@ -182,7 +182,7 @@ class Deformer:
         self.warnings: tuple[str, ...]
         """About case and mesh, zones that no longer fit at the reference, and systems that are
         solved with twice the digits (a note)."""
-        if mesh.zone_parts:
+        if isinstance(mesh, Assembly):
             require_valid(case, mesh)
             case = motion.by_zone(case, mesh)
             make = partial(Deformer, progress=report)

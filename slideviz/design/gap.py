@@ -23,7 +23,7 @@ from slideviz.machine.gap import (
 )
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.interfaces import ROUNDING
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.mesh.zones import names_from, names_in, spellings, zones_of
@@ -139,16 +139,17 @@ def gaps(
     at = np.asarray(places, float)
     base = reference or mesh
     zones = zip(zone_cases(case, mesh, False), zones_of(mesh), zones_of(base), strict=True)
-    names = [names_from(mesh, part) for part in mesh.zone_parts] or [{}]
+    names = [names_from(mesh, part) for part in mesh.parts]
+    several = isinstance(mesh, Assembly)
     each = zip(zones, names, _by_zone(mesh, between), strict=True)
     out = list[Gap]()
     blades = False
     for number, ((one, zone, start), name, pairs) in enumerate(each, 1):
-        if one.markers_with("moving") or pairs or not mesh.zone_parts:
+        if one.markers_with("moving") or pairs or not several:
             measure = _Measure(one, zone, start, at, name)
             blades = blades or bool(measure.blades)
             found = measure.all(pairs)
-            out += [replace(gap, zone=number) for gap in found] if mesh.zone_parts else found
+            out += [replace(gap, zone=number) for gap in found] if several else found
     if not blades and not between:
         raise CaseError(
             f"{mesh.name}: no boundary moves besides hub and shroud, so there is no blade; list "
@@ -294,14 +295,12 @@ class _Measure:
 
 def _by_zone(mesh: Mesh, between: Sequence[tuple[str, str]]) -> list[list[tuple[str, str]]]:
     """Return pairs of boundaries for each zone, with the names of its file."""
-    if not mesh.zone_parts:
-        return [list(between)]
     written = spellings(mesh)
-    out = [list[tuple[str, str]]() for _ in mesh.zone_parts]
+    out = [list[tuple[str, str]]() for _ in mesh.parts]
     for first, second in between:
         one = mesh.marker(written.get(first, first)).name
         other = mesh.marker(written.get(second, second)).name
-        for some, part in zip(out, mesh.zone_parts, strict=True):
+        for some, part in zip(out, mesh.parts, strict=True):
             names = names_in(mesh, part)
             if one in names and other in names:
                 some.append((names[one], names[other]))

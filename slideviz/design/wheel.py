@@ -21,7 +21,7 @@ from slideviz.formats.files import read
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.zones import unique_names, zones_of
@@ -170,7 +170,7 @@ def _in_zone(mesh: Mesh, index: int) -> Iterator[None]:
     try:
         yield
     except SlidevizError as problem:
-        if mesh.zone_parts:
+        if isinstance(mesh, Assembly):
             problem.args = (f"zone {index + 1}: {problem}",)
         raise
 

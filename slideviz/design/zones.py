@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.zones import InterfaceMotion
 
@@ -66,7 +66,7 @@ def over_zones(zones: Sequence[ZoneDesign], start: FloatArray, design: Array, wo
 
 def zone_designs(
     case: Case,
-    mesh: Mesh,
+    mesh: Assembly,
     nodes: IntArray,
     references: FloatArray,
     make: Callable[[Mesh, Case, FloatArray], Deformer],
@@ -82,7 +82,7 @@ def zone_designs(
     shift = np.zeros((len(references), *mesh.points.shape))
     deformed = np.zeros(len(mesh.points), bool)
     for index, ahead in motion.leaders_first():
-        part = mesh.zone_parts[index]
+        part = mesh.parts[index]
         own = motion.cases[index]
         points = np.arange(part.points.start, part.points.stop)
         on = [part.mesh.marker(name).nodes for name in own.markers_with("moving")]

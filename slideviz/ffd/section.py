@@ -26,7 +26,7 @@ from slideviz.ffd.box import (
 )
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZonePart
 from slideviz.mesh.zones import names_from, names_in, require_one_zone, with_zones, zones_of
 
 _LETTERS = "IJK"
@@ -305,10 +305,10 @@ _BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakK
 def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
     """Return a mesh's boxes, in the order of its file, in a coordinate system; or MeshError."""
     cache = _BOXES.setdefault(mesh, {})
-    if system not in cache and mesh.zone_parts:
+    if system not in cache and isinstance(mesh, Assembly):
         cache[system] = tuple(
             _in_whole(mesh, part, box)
-            for part, zone in zip(mesh.zone_parts, zones_of(mesh), strict=True)
+            for part, zone in zip(mesh.parts, zones_of(mesh), strict=True)
             for box in boxes_of(zone, system)
         )
     if system not in cache:
@@ -334,7 +334,7 @@ def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:
 
 def _holder(mesh: Mesh, part: ZonePart, file: str, box: Box) -> tuple[str, ZonePart]:
     """Return the boundary that has a name in the file, from a zone's section, and its zone."""
-    each = [(names_from(mesh, zone).get(file), zone) for zone in (part, *mesh.zone_parts)]
+    each = [(names_from(mesh, zone).get(file), zone) for zone in (part, *mesh.parts)]
     known = [(name, zone) for name, zone in each if name is not None] or [(file, part)]
     if len(known) > 1 and known[0][1] is not part:
         raise MeshError(_ALIKE.format(mesh.name, box.name, file))
@@ -358,7 +358,7 @@ def with_boxes(
     Raises MeshError where two zones have boxes of one name, or boundaries of one name with nodes in
     a box.
     """
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         return _with_boxes_of_zones(mesh, boxes, renewed, anew)
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)
@@ -380,7 +380,7 @@ def with_boxes(
 
 
 def _with_boxes_of_zones(
-    mesh: Mesh, boxes: Sequence[Box], renewed: Collection[str], anew: bool
+    mesh: Assembly, boxes: Sequence[Box], renewed: Collection[str], anew: bool
 ) -> Mesh:
     """Return the mesh of several zones with changed boxes in the zone that has them, and new ones.
 
@@ -397,13 +397,13 @@ def _with_boxes_of_zones(
         k
         for box in boxes
         if not uses[box.name]
-        for k, part in enumerate(mesh.zone_parts)
+        for k, part in enumerate(mesh.parts)
         if not box.embedded.keys().isdisjoint(names_in(mesh, part))
     }
     last = max((k for k in range(count) if names[k]), default=count - 1)
     home = within.pop() if len(within) == 1 and not any(names) else last
     zones = []
-    for k, (part, zone) in enumerate(zip(mesh.zone_parts, alone, strict=True)):
+    for k, (part, zone) in enumerate(zip(mesh.parts, alone, strict=True)):
         mine = [_in_file(mesh, part, box) for box in boxes if (uses[box.name] or [home])[0] == k]
         without = replace(zone.origin, ffd=b"", ffd_at=()) if anew and _lines(zone) else zone.origin
         boxed = with_boxes(zone, mine, anew=anew, renewed=renewed) if mine else None
@@ -413,7 +413,7 @@ def _with_boxes_of_zones(
 
 def _in_file(mesh: Mesh, part: ZonePart, box: Box) -> Box:
     """Return a box as in the section of a zone: the reverse of `_in_whole`."""
-    files = {n: (f, zone) for zone in mesh.zone_parts for n, f in names_in(mesh, zone).items()}
+    files = {n: (f, zone) for zone in mesh.parts for n, f in names_in(mesh, zone).items()}
     embedded = {}
     for name, (nodes, uvw) in box.embedded.items():
         file, zone = files.get(name, (name, part))

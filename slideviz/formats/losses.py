@@ -13,7 +13,7 @@ from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.text import SEND_RECEIVE, Text
 from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.terms import FileFormat
 
@@ -35,7 +35,7 @@ def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
     same = mesh.origin.ending == row.ending != ""
     if same and row.copies:
         return lost
-    if same or (mesh.zone_parts and row.zones):  # the other zones are kept
+    if same or (isinstance(mesh, Assembly) and row.zones):  # the other zones are kept
         mesh = replace(mesh, zones=1)
     if mesh.markers and row.boundaries == "numbers":
         lost.append("the names of the boundaries (they are numbers now)")
@@ -60,7 +60,9 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
             has_halo = has_halo or bool(document.sends)
     halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
     lost = lost_of_text(keys, mesh.zones)
-    return *halo, *(DIVISION if mesh.zone_parts and one == OTHER_ZONES else one for one in lost)
+    return *halo, *(
+        DIVISION if isinstance(mesh, Assembly) and one == OTHER_ZONES else one for one in lost
+    )
 
 
 def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, Mesh, ZoneInterface, frozen_array
+from slideviz.mesh.model import Assembly, FloatArray, Mesh, ZoneInterface, frozen_array
 from slideviz.mesh.nearest import nearest
 
 COINCIDENT = 1e-6  # nodes of two zones nearer than this part of the mesh's extent are in one place
@@ -76,20 +76,21 @@ def torn_interfaces(mesh: Mesh, points: FloatArray, names: Sequence[str] = ()) -
     """
     sentences = dict[frozenset[object], str]()
     kept = named_interfaces(mesh, names)
+    both = isinstance(mesh, Assembly)
     for each in mesh.interfaces:
         apart = points[each.nodes] - mesh.points[each.nodes]
-        if mesh.zone_parts:
+        if both:
             apart -= points[each.partners] - mesh.points[each.partners]
         gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
         if gap > ROUNDING * mesh.extent:
             said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
             remedy = "move both alike, or make one of them fixed, so that it follows the other"
-            if not mesh.zone_parts:
+            if not both:
                 remedy = "keep it fixed, or deform all zones (without ZONE=)"
             elif each not in kept:
                 remedy = "name both in MARKER_ZONE_INTERFACE, so that they stay together"
             # A mesh of all zones has each pair twice, once from either side.
-            pair = frozenset((each.marker, each.other if mesh.zone_parts else each))
+            pair = frozenset((each.marker, each.other if both else each))
             text = f"zone {each.zone} no longer fits: {said} {gap:.3g}; {remedy}"
             sentences.setdefault(pair, text)
     return tuple(sentences.values())

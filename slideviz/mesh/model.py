@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -265,7 +265,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class ZonePart:
-    """Where a zone is in a mesh that has all zones of its file (`slideviz.mesh.zones`)."""
+    """Where a zone is in a mesh (`Mesh.parts`)."""
 
     mesh: Mesh  # the zone alone, as it was read
     points: slice
@@ -280,7 +280,7 @@ class ZonePart:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Points, cells and boundaries of one zone, or of all zones of a file."""
+    """Points, cells and boundaries."""
 
     points: FloatArray
     """(n, d): Cartesian coordinates, d = 2 or 3, in the file's length unit."""
@@ -296,8 +296,6 @@ class Mesh:
     zones: int = 1
     """`zone`, `zones`: number of this zone in the file (from 1; None: it has all), and how many the
     file has."""
-    zone_parts: tuple[ZonePart, ...] = ()
-    """Where each zone is, if there are several; they share no points."""
     source: Path | None = None
     """The file it was read from, which is overwritten only on request."""
     halo: Halo | None = None
@@ -321,6 +319,13 @@ class Mesh:
             f"Mesh({self.name!r}, {self.dim}D, {len(self.points)} points, {self.cells!r}, "
             f"markers: {', '.join(self.marker_names) or 'none'})"
         )
+
+    @property
+    def parts(self) -> tuple[ZonePart, ...]:
+        """Return where each zone is: this mesh is one."""
+        points = slice(0, len(self.points))
+        cells = slice(0, len(self.cells))
+        return (ZonePart(self, points, cells, slice(0, len(self.markers)), 0, 0),)
 
     @property
     def dim(self) -> int:
@@ -368,7 +373,7 @@ class Mesh:
         return cell if self.part is None else int(self.part.cells[cell])
 
     @check_types
-    def with_points(self, points: ArrayLike) -> Mesh:
+    def with_points(self, points: ArrayLike) -> Self:
         """Return the same mesh with other ``points`` (n, d).
 
         Raises
@@ -380,3 +385,11 @@ class Mesh:
         if moved.shape != self.points.shape:
             raise MeshError(f"points have shape {moved.shape}; expected {self.points.shape}")
         return replace(self, points=moved)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembly(Mesh):
+    """Several zones of a file as one mesh (`slideviz.mesh.zones`)."""
+
+    parts: tuple[ZonePart, ...] = ()
+    """Where each zone is; they share no points."""

@@ -17,7 +17,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.mesh.nearest import nearest
 from slideviz.mesh.zones import names_from, names_in
 from slideviz.system.weak_cache import weak_cache
@@ -238,8 +238,8 @@ def _paired(
     axis: tuple[float, ...],
     origin: tuple[float, ...],
 ) -> tuple[Pair, ...]:
-    if mesh.zone_parts:
-        of_zones = [(part, names_in(mesh, part)) for part in mesh.zone_parts]
+    if isinstance(mesh, Assembly):
+        of_zones = [(part, names_in(mesh, part)) for part in mesh.parts]
         here = [(part, [own[n] for n in names if n in own]) for part, own in of_zones]
         return tuple(
             _in_whole(mesh, part, pair)
@@ -352,12 +352,13 @@ def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tup
     to be computed with.
     """
     check_size(mesh)
-    if mesh.zone_parts:
-        return tuple(
-            _in_whole(mesh, part, pair)
-            for part in mesh.zone_parts
-            for pair in find_pairs(part.mesh, going_on)
-        )
+    return tuple(
+        _in_whole(mesh, part, pair) for part in mesh.parts for pair in _pairs(part.mesh, going_on)
+    )
+
+
+def _pairs(mesh: Mesh, going_on: Callable[[], object]) -> list[Pair]:
+    """Return the pairs of a zone, as `find_pairs` does."""
     count = {name: len(mesh.marker(name).nodes) for name in mesh.marker_names}
     tries: list[tuple[PeriodicKind, tuple[float, float, float]]] = [("translational", Z_AXIS)]
     tries += [("rotational", axis) for axis in (_AXES[:1] if mesh.dim == 2 else _AXES)]
@@ -374,4 +375,4 @@ def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tup
             )
             if pair is not None and worst <= allowed:
                 found.append(pair)
-    return tuple(found)
+    return found

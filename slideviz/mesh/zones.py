@@ -16,7 +16,17 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import find_interfaces
-from slideviz.mesh.model import Cells, IntArray, Marker, Mesh, Part, ZoneInterface, ZonePart, sealed
+from slideviz.mesh.model import (
+    Assembly,
+    Cells,
+    IntArray,
+    Marker,
+    Mesh,
+    Part,
+    ZoneInterface,
+    ZonePart,
+    sealed,
+)
 
 
 def numbered(zone: int, name: str) -> str:
@@ -54,7 +64,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
         replace(zone, points=coords[part], interfaces=())
         for zone, part in zip(zones, points, strict=True)
     ]
-    mesh = Mesh(
+    mesh = Assembly(
         points=coords,
         cells=Cells.joined(
             [_shifted(zone.cells, part.start) for zone, part in zip(zones, points, strict=True)]
@@ -68,7 +78,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
         name=first.name,
         zone=None,
         zones=len(zones),
-        zone_parts=tuple(map(ZonePart, alone, points, cells, markers, first_point, first_cell)),
+        parts=tuple(map(ZonePart, alone, points, cells, markers, first_point, first_cell)),
         part=part,
         source=first.source,
         remarks=tuple(f"zone {zone.zone}: {text}" for zone in zones for text in zone.remarks),
@@ -87,10 +97,8 @@ def unique_names(zones: Sequence[Sequence[str]]) -> list[list[str]]:
 
 def zones_of(mesh: Mesh) -> tuple[Mesh, ...]:
     """Return each zone of a mesh alone, its boundaries with their names in the file."""
-    if not mesh.zone_parts:
-        return (mesh,)
     out = []
-    for part in mesh.zone_parts:
+    for part in mesh.parts:
         points = mesh.points[part.points]
         before = part.mesh.points
         same = points.ctypes.data == before.ctypes.data
@@ -98,14 +106,14 @@ def zones_of(mesh: Mesh) -> tuple[Mesh, ...]:
     return tuple(out)
 
 
-def with_zones(mesh: Mesh, zones: Sequence[Mesh]) -> Mesh:
+def with_zones(mesh: Assembly, zones: Sequence[Mesh]) -> Assembly:
     """Return a mesh with the points and the origins of its zones as in ``zones``."""
     parts = [
         replace(part, mesh=replace(part.mesh, origin=zone.origin))
-        for part, zone in zip(mesh.zone_parts, zones, strict=True)
+        for part, zone in zip(mesh.parts, zones, strict=True)
     ]
     points = sealed(np.concatenate([zone.points for zone in zones]))
-    return replace(mesh, points=points, origin=zones[0].origin, zone_parts=tuple(parts))
+    return replace(mesh, points=points, origin=zones[0].origin, parts=tuple(parts))
 
 
 def names_in(mesh: Mesh, part: ZonePart) -> dict[str, str]:
@@ -121,18 +129,16 @@ def names_from(mesh: Mesh, part: ZonePart) -> dict[str, str]:
 
 def marker_zones(mesh: Mesh) -> list[int]:
     """Return the number of the zone of each boundary, in their order."""
-    if not mesh.zone_parts:
-        return [mesh.zone or 1] * len(mesh.markers)
     return [
         number
-        for number, part in enumerate(mesh.zone_parts, 1)
+        for number, part in enumerate(mesh.parts, mesh.zone or 1)
         for _ in range(part.markers.start, part.markers.stop)
     ]
 
 
 def require_one_zone(mesh: Mesh, what: str) -> None:
     """Raise MeshError if a mesh has several zones; ``what`` is of one, for the message."""
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         raise MeshError(
             f"{mesh.name}: has {mesh.zones} zones, but {what} is of one; choose it with ZONE= in a "
             "case, or --zone"
@@ -142,10 +148,8 @@ def require_one_zone(mesh: Mesh, what: str) -> None:
 def spellings(mesh: Mesh) -> Mapping[str, str]:
     """Return the names of the boundaries by all that may be written for them, as ``1:blade``."""
     out: dict[str, str] = {}
-    for number, part in enumerate(mesh.zone_parts, 1):
+    for number, part in enumerate(mesh.parts if mesh.zones > 1 else (), mesh.zone or 1):
         out |= {numbered(number, file): name for name, file in names_in(mesh, part).items()}
-    if mesh.zones > 1 and mesh.zone is not None:
-        out = {numbered(mesh.zone, name): name for name in mesh.marker_names}
     return out
 
 
@@ -178,7 +182,7 @@ def _shifted(cells: Cells, by: int) -> Cells:
 
 def _halo(mesh: Mesh) -> Halo | None:
     """Return the halos of all zones as one."""
-    halos = [(part, part.mesh.halo) for part in mesh.zone_parts if part.mesh.halo is not None]
+    halos = [(part, part.mesh.halo) for part in mesh.parts if part.mesh.halo is not None]
     if not halos:
         return None
     cells = np.zeros(len(mesh.cells), bool)
@@ -206,11 +210,11 @@ def _halo(mesh: Mesh) -> Halo | None:
 def _interfaces(mesh: Mesh) -> Iterator[ZoneInterface]:
     places = [
         (number, marker.name, mesh.points[marker.nodes])
-        for number, part in enumerate(mesh.zone_parts, 1)
+        for number, part in enumerate(mesh.parts, 1)
         for marker in mesh.markers[part.markers]
         if len(marker.cells)
     ]
-    for number, part in enumerate(mesh.zone_parts, 1):
+    for number, part in enumerate(mesh.parts, 1):
         pairs = zip(names_in(mesh, part), part.mesh.markers, strict=True)
         markers = tuple(Marker(name, marker.cells) for name, marker in pairs)
         others = [each for each in places if each[0] != number]

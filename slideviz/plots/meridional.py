@@ -65,8 +65,8 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> tuple[MeridionalBins, ...]:
     zones = zones_of(mesh)
     for one in walls.channels:
         if one.field not in _BINS:
-            part = mesh.zone_parts[one.zone].cells if mesh.zone_parts else slice(None)
-            _BINS[one.field] = _zone_bins(zones[one.zone], one, part)
+            cells = mesh.parts[one.zone].cells
+            _BINS[one.field] = _zone_bins(zones[one.zone], one, cells)
     return tuple(_BINS[one.field] for one in walls.channels)
 
 

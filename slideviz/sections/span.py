@@ -350,8 +350,7 @@ def find_walls(
         except CaseError as problem:
             missing.append(problem)
             continue
-        label = dict(zip(zone.marker_names, zone.marker_names, strict=True))
-        label = names_from(mesh, mesh.zone_parts[number]) if mesh.zone_parts else label
+        label = names_from(mesh, mesh.parts[number])
         pair = next((each for each in periods if each.first in label.values()), None)
         if pair is not None and pair.kind != "rotational":
             if mesh.dim == 3 and one.markers_with("periodic"):

@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
@@ -220,9 +220,9 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
 
 def zones_of_cells(mesh: Mesh, numbers: IntArray | Sequence[int]) -> tuple[int, ...]:
     """Return the zones, from 1, of cells with ``numbers`` (k,) in the file; () for only one."""
-    if not mesh.zone_parts:
+    if not isinstance(mesh, Assembly):
         return ()
-    first = [part.first_cell for part in mesh.zone_parts]
+    first = [part.first_cell for part in mesh.parts]
     return tuple(np.searchsorted(first, numbers, side="right").tolist())
 
 

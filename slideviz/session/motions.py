@@ -47,7 +47,7 @@ class TableRows:
         """Return the rows for the boundaries of a motion; all moving ones where it is empty."""
         names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
-        for zone in (part for part in mesh.zone_parts if len(nodes)):
+        for zone in (part for part in mesh.parts if len(nodes)):
             if zone.points.start <= nodes[0] and nodes[-1] < zone.points.stop:
                 nodes = nodes - zone.points.start  # as a file numbers them
                 mesh = zone.mesh
@@ -201,7 +201,7 @@ def wheel_passages(session: Session) -> tuple[int, ...]:
     zone_of = dict(zip(session.mesh.marker_names, marker_zones(session.mesh), strict=True))
     around = {zone_of[pair.first]: pair.around for pair in reversed(pairs)}
     counts = tuple(around[zone] or 0 for zone in sorted(around))
-    return counts if all(counts) and len(counts) == max(len(session.mesh.zone_parts), 1) else ()
+    return counts if all(counts) and len(counts) == len(session.mesh.parts) else ()
 
 
 def box_names(session: Session) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from slideviz.case.zones import zone_cases
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.fans import Fans, find_fans
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import Assembly, IntArray, Mesh
 from slideviz.session.motions import shown_case
 from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES, NodeType
@@ -70,7 +70,7 @@ class NodeTypes:
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
         from slideviz.solver.domain import find_classes, find_period, roles_of_copies
 
-        if mesh.zone_parts:
+        if isinstance(mesh, Assembly):
             return self._of_zones(mesh, case)
         if not mesh.markers:
             return NOTHING
@@ -107,7 +107,7 @@ class NodeTypes:
             return NOTHING
         each = [
             (part.points.start, NodeTypes()._classified(part.mesh, one))
-            for part, one in zip(mesh.zone_parts, cases, strict=True)
+            for part, one in zip(mesh.parts, cases, strict=True)
         ]
         return TypedNodes(
             np.concatenate([typed.nodes + first for first, typed in each]),

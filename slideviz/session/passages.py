@@ -34,7 +34,7 @@ def find_period(
     """
     periods = find_periods(mesh, case, pairs)
     named = case is not None and case.markers_with("periodic")
-    if not periods or (not named and len(periods) < len(mesh.zone_parts)):
+    if not periods or (not named and len(periods) < len(mesh.parts)):
         return None
     return periods[0] if all(agree(periods[0], one) for one in periods) else None
 
@@ -60,7 +60,7 @@ def find_periods(
         every: Sequence[Pair] = pair_up(mesh, sides, case.periodic_type, case.axis, case.origin)
     else:
         every = sorted(find_pairs(mesh) if pairs is None else pairs, key=rank)
-    zones = [mesh.marker_names[part.markers] for part in mesh.zone_parts] or [mesh.marker_names]
+    zones = [mesh.marker_names[part.markers] for part in mesh.parts]
     first = [next((pair for pair in every if pair.first in names), None) for names in zones]
     return tuple(pair for pair in first if pair is not None)
 

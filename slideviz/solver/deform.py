@@ -18,7 +18,7 @@ from slideviz.case.model import Case
 from slideviz.case.zones import with_marker_names
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.margin import step_safety
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import Assembly, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.tape import value
@@ -96,7 +96,7 @@ def deform(
     report = progress or (lambda _: None)
     case = with_marker_names(case, mesh)
     check_limits = partial(rated_limits, case, mesh)
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         from slideviz.solver.zones import deform_zones
 
         for step in deform_zones(case, mesh, partial(deform, certify=certify), report):

@@ -11,7 +11,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDES
@@ -101,7 +101,7 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
     names = case.markers_with("periodic")
     if not names or case.periodic == "none":
         return ""
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         return next(
             filter(None, (beyond_pitch(*one) for one in each_zone(by_zone(case, mesh), mesh))), ""
         )

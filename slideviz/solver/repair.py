@@ -24,7 +24,7 @@ from slideviz.elastic.conditions import conditions
 from slideviz.errors import CaseError, MeshError, not_one_of
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
@@ -155,7 +155,7 @@ def _case_alone(
             if pair.first in periodic and pair.second in periodic:
                 case = case.change(axis=pair.axis, origin=pair.origin)
         try:
-            alone = mesh if mesh.zone_parts else without_halo(mesh)[0]
+            alone = mesh if isinstance(mesh, Assembly) else without_halo(mesh)[0]
             pair_up(alone, periodic, "auto", case.axis, case.origin)
         except MeshError as problem:
             raise MeshError(str(problem).replace(CHECK_PERIODIC, _NO_IMAGES)) from None
@@ -178,7 +178,7 @@ def mended_frame(
 ) -> Step:
     """Return the last step of a run, mended afterwards; without one, the mesh as a mended step."""
     if step is not None:
-        setup = None if mesh.zone_parts else make_setup(case, mesh)
+        setup = None if isinstance(mesh, Assembly) else make_setup(case, mesh)
         done = mended_step(case, mesh, setup, report, step)
     else:
         moving = dict.fromkeys(case.markers_with("moving"), "fixed")
@@ -207,7 +207,7 @@ def mend(
     ``reference``: the mesh whose shapes cells shall have; None: the ideal ones.
     ``setup``: that of the run, if there was one.
     """
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly) and isinstance(now, Assembly):
         return _mended_zones(case, mesh, now, reference, tick)
     domain, cells = without_halo(now)
     shapes = None if reference is None else without_halo(reference)[0]
@@ -245,7 +245,7 @@ def mend(
 
 
 def _mended_zones(
-    case: Case, mesh: Mesh, now: Mesh, reference: Mesh | None, tick: Tick
+    case: Case, mesh: Assembly, now: Assembly, reference: Mesh | None, tick: Tick
 ) -> MeshRepair:
     """Return a mesh of all zones with the bad cells of each mended."""
     shapes = (None,) * mesh.zones if reference is None else zones_of(reference)

@@ -104,7 +104,7 @@ class MeshRepair:
 
         ``mesh`` and ``now``: of all zones, undeformed and repaired.
         """
-        done = [(mesh.zone_parts[k], one) for k, one in repairs.items() if one is not None]
+        done = [(mesh.parts[k], one) for k, one in repairs.items() if one is not None]
         if not done:
             return None
 
@@ -180,7 +180,7 @@ class ZoneSteps:
 
     def each(self, name: str) -> list[tuple[ZonePart, Any]]:
         """Return each zone with the value of a field of its step."""
-        parts = self.mesh.zone_parts
+        parts = self.mesh.parts
         return [(parts[k], getattr(step, name)) for k, step in self.steps.items()]
 
     def values(self, name: str) -> list[Any]:
@@ -266,7 +266,7 @@ def _first_to_fold(zones: ZoneSteps, name: str) -> SafeFraction | None:
     for index, step in zones.fresh.items():
         one = getattr(step, name)
         if one is not None and one.cell is not None:
-            first = zones.mesh.zone_parts[index].first_cell
+            first = zones.mesh.parts[index].first_cell
             one = replace(one, cell=one.cell + first, zone=index + 1)
         safe.append(one)
     return min(filter(None, safe), key=lambda one: one.fraction, default=None)

@@ -19,7 +19,7 @@ from slideviz.mesh.interfaces import (
     named_interfaces,
     torn_interfaces,
 )
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZoneInterface, sealed
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterface, sealed
 from slideviz.mesh.zones import names_in, with_zones
 from slideviz.solver.prescribed import check_motion
 from slideviz.solver.rims import on_walls
@@ -40,7 +40,7 @@ class InterfaceMotion:
     A boundary that follows gets the role moving.
     """
 
-    def __init__(self, case: Case, mesh: Mesh) -> None:
+    def __init__(self, case: Case, mesh: Assembly) -> None:
         self.mesh = mesh
         self.roles = case.roles
         self.names = case.interfaces  # those of MARKER_ZONE_INTERFACE
@@ -57,14 +57,14 @@ class InterfaceMotion:
         self._vectors = np.zeros_like(mesh.points)
         self._alone = tuple(self.cases)
         self._names: list[set[str]] = [set() for _ in self.cases]
-        self._zone = {n: k for k, part in enumerate(mesh.zone_parts) for n in names_in(mesh, part)}
+        self._zone = {n: k for k, part in enumerate(mesh.parts) for n in names_in(mesh, part)}
         asked = [each for each in self.interfaces if self.roles.get(each.marker) == "moving"]
         for index in self.moving(range(len(self.cases))):
             alone = self._alone[index]
-            zone = mesh.zone_parts[index].mesh
+            zone = mesh.parts[index].mesh
             moved = on_walls(alone, zone, displacements(alone, zone))
             shift = np.zeros_like(mesh.points)
-            shift[mesh.zone_parts[index].points][moved.nodes] = moved.vectors
+            shift[mesh.parts[index].points][moved.nodes] = moved.vectors
             self._lead(index, shift, asked, range(len(self.cases)))
 
     def moving(self, zones: Collection[int]) -> list[int]:
@@ -107,7 +107,7 @@ class InterfaceMotion:
 
         Those boundaries of it lead that have nodes which are among its ``moving`` points (k,).
         """
-        part = self.mesh.zone_parts[index]
+        part = self.mesh.parts[index]
         moved = np.zeros_like(self.mesh.points)
         moved[part.points] = shift
         leading = [
@@ -138,7 +138,7 @@ class InterfaceMotion:
         self.leader[nodes] = leaders
         self._vectors[nodes] = shift[leaders]
         index = each.zone - 1
-        part = self.mesh.zone_parts[index]
+        part = self.mesh.parts[index]
         alone = self._alone[index]
         self._names[index] |= {names_in(self.mesh, part)[each.other]}
         here = np.flatnonzero(self.led[part.points])
@@ -148,13 +148,13 @@ class InterfaceMotion:
         motions = *alone.motions, Prescribed(here, vectors, names)
         self.cases[index] = alone.change(roles=roles, motions=motions)
 
-    def after(self, steps: Mapping[int, Step]) -> Mesh:
+    def after(self, steps: Mapping[int, Step]) -> Assembly:
         """Return the mesh of all zones after steps of some, in which interfaces fit to the bit.
 
         Followers are where their leaders are, where both were so at first, and are apart by
         rounding only.
         """
-        parts = enumerate(self.mesh.zone_parts)
+        parts = enumerate(self.mesh.parts)
         now = with_zones(self.mesh, [steps[k].mesh if k in steps else z.mesh for k, z in parts])
         points = now.points
         nodes = np.flatnonzero(self.led)
@@ -173,12 +173,12 @@ def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
 
     Zones follow others here as far as these move by their motions, before sliding is known.
     """
-    if not mesh.zone_parts:
+    if not isinstance(mesh, Assembly):
         return check_motion(case, mesh)
     motion = InterfaceMotion(case, mesh)
     folded = None
     for index, _ in motion.leaders_first():
-        problem, overlap = check_motion(motion.cases[index], mesh.zone_parts[index].mesh)
+        problem, overlap = check_motion(motion.cases[index], mesh.parts[index].mesh)
         if problem:
             return problem, folded
         folded = folded or overlap
@@ -189,7 +189,7 @@ Runs = dict[int, list[Step]]
 """The steps of zones, by their place in the mesh, in the order in which they were deformed."""
 
 
-def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[Step]:
+def deform_zones(case: Case, mesh: Assembly, run: Run, report: Report) -> Iterator[Step]:
     """Yield the steps of a mesh of all zones, each of which ``run`` deforms alone.
 
     Where zones have different numbers of steps (STEPS= auto), the steps are those of the zone with
@@ -200,14 +200,14 @@ def deform_zones(case: Case, mesh: Mesh, run: Run, report: Report) -> Iterator[S
     yield from joined_steps(*zone_runs(case, mesh, run, report))
 
 
-def zone_runs(case: Case, mesh: Mesh, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
+def zone_runs(case: Case, mesh: Assembly, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
     """Return the motion of interfaces, and the steps of those zones that move."""
     require_valid(case, mesh)
     motion = InterfaceMotion(case, mesh)
     runs = Runs()
     for index, ahead in motion.leaders_first():
         done = len(runs)
-        part = mesh.zone_parts[index]
+        part = mesh.parts[index]
         count = 1 + len(motion.moving(ahead))
 
         def zone_report(

@@ -21,7 +21,7 @@ from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
 from slideviz.case.zones import with_marker_names
 from slideviz.errors import CaseError, NodeError
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import Assembly, IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import zones_of
 from slideviz.rbf.projection import Tracks
@@ -220,10 +220,12 @@ class _ZoneRuns:
 
     def deform_all(self, case: Case, read: Callable[[], Mesh]) -> None:
         """Deform all zones of the skin that ``read`` returns, and write all their points."""
-        if len(self._out.zones) == 1:
-            deque(self._deform(case, read(), self._remaining), 0)
-            return
         skin = read()
+        if not isinstance(skin, Assembly):
+            steps = self._deform(case, skin, self._remaining)
+            del skin  # the cells are let go of on the way
+            deque(steps, 0)
+            return
         motion, _ = zone_runs(with_marker_names(case, skin), skin, self._deform, self._remaining)
         self._joined = motion
         last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
@@ -320,7 +322,7 @@ class _ZoneRuns:
             motion = self._joined
             skin = without_cells(motion.mesh)
             steps = list(joined_steps(motion, runs))
-            first = [part.first_cell for part in motion.mesh.zone_parts]
+            first = [part.first_cell for part in motion.mesh.parts]
         folded = {
             start + cell: when
             for zone, start in enumerate(first)

@@ -34,6 +34,7 @@ from slideviz.formats.su2b.read import (
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import (
+    Assembly,
     Cells,
     FloatArray,
     Index,
@@ -149,12 +150,12 @@ def _skin_of_zone(
 def without_cells(skin: Mesh) -> Mesh:
     """Return a skin without its cells and the elements of its boundaries, to save memory."""
     none = Cells.from_blocks([])
-    return replace(
-        skin,
-        cells=none,
-        markers=tuple(replace(marker, cells=none) for marker in skin.markers),
-        zone_parts=tuple(replace(one, mesh=without_cells(one.mesh)) for one in skin.zone_parts),
-    )
+    markers = tuple(replace(marker, cells=none) for marker in skin.markers)
+    bare = replace(skin, cells=none, markers=markers)
+    if not isinstance(bare, Assembly):
+        return bare
+    parts = tuple(replace(one, mesh=without_cells(one.mesh)) for one in bare.parts)
+    return replace(bare, parts=parts)
 
 
 def _ticking(results: Iterator[T], tick: Tick, count: int) -> Iterator[T]:

@@ -22,7 +22,7 @@ from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Translate
 from slideviz.errors import Cancelled, CaseError, SlidevizError
-from slideviz.mesh.model import FloatArray, Mesh, frozen_array
+from slideviz.mesh.model import Assembly, FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
@@ -330,7 +330,7 @@ def compare(
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
     clock = _Clock()
     with clock:
-        setup = None if mesh.zone_parts else make_setup(combination.applied(case), mesh)
+        setup = None if isinstance(mesh, Assembly) else make_setup(combination.applied(case), mesh)
     return _Shared(combination, setup, clock.seconds, clock.processor)
 
 

@@ -180,7 +180,7 @@ def test_each_zone_has_the_gaps_that_it_has_alone(tmp_path, monkeypatch, capsys)
         "zone 2: throat of 2:blade",
         "zone 2: 2:inflow to 2:blade",
     ]
-    for one, part in zip((front, behind), mesh.zone_parts, strict=True):
+    for one, part in zip((front, behind), mesh.parts, strict=True):
         [alone] = sv.gaps(case_of(), part.mesh)
         assert one.distance == alone.distance
         assert np.array_equal(one.distances, alone.distances)

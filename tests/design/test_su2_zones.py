@@ -84,7 +84,7 @@ def test_a_file_for_each_zone_is_written_as_one(here, capsys):
     assert np.array_equal(sv.read("out.su2").points, sv.read(together).points)
     write(main.replace(", second.cfg", ""), f"MESH_FILENAME= 1.su2\nSTEPZ= 1\n{OTHER}")
     assert run(["def", "main.cfg", "-q", "--force"]) == 0
-    assert not sv.read("out.su2").zone_parts
+    assert len(sv.read("out.su2").parts) == 1
     assert "first.cfg:2: STEPZ is not read" in capsys.readouterr().err
     write(main, "MESH_FILENAME= stage.su2\n", f"MESH_FILENAME= 2.su2\n{OTHER}")
     with pytest.raises(CaseError, match=r"first\.cfg: stage\.su2 has 2 zones, and with MULTIZONE"):
@@ -107,7 +107,7 @@ def test_a_zone_without_design_variables_stays_or_follows(tmp_path, monkeypatch)
         points = sv.read("out.su2").points
         for each in mesh.interfaces:
             assert np.array_equal(points[each.nodes], points[each.partners])
-        assert not np.array_equal(points[mesh.zone_parts[1].points], zones_of(mesh)[1].points)
+        assert not np.array_equal(points[mesh.parts[1].points], zones_of(mesh)[1].points)
     write(main, "STEPS= 1\n", "DV_KIND= NO_DEFORMATION\n")
     assert run(["def", "main.cfg", "-q"]) == 0
     assert np.array_equal(sv.read("out.su2").points, mesh.points)
@@ -186,7 +186,7 @@ def adjoint(points, weights, name):
 
 def restarts(mesh, weights, stem="solution_adj_cd"):
     """Write the sensitivities of each zone, as SU2 names them."""
-    for k, part in enumerate(mesh.zone_parts):
+    for k, part in enumerate(mesh.parts):
         adjoint(mesh.points[part.points], weights[part.points], f"{stem}_{k}.csv")
 
 
@@ -311,7 +311,7 @@ def test_coincident_nodes_of_zones_share_the_rows_of_a_file(tmp_path, monkeypatc
 def test_a_surface_file_numbers_the_nodes_of_its_zone(here, capsys):
     mesh = sv.read("stage.su2")
     rows = []
-    for number, part in enumerate(mesh.zone_parts, 1):
+    for number, part in enumerate(mesh.parts, 1):
         nodes = part.mesh.marker("BLOCK").nodes
         new = part.mesh.points[nodes] + [0.0, 0.01 * number]
         lines = [f"{node} {x!r} {y!r}" for node, (x, y) in zip(nodes, new.tolist(), strict=True)]

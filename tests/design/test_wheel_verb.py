@@ -150,7 +150,7 @@ def test_each_zone_has_a_wheel_with_its_own_period_as_it_has_alone(tmp_path, end
         sides = {"per1": "periodic", "per2": "periodic"}
         moved = (sv.Translate("blade", (0.01, 0.0, 0.0)),) if roles else ()
         one = case_of(roles=roles | sides, motions=moved, periodic="none")
-        alone = mesh.zone_parts[number - 1].mesh
+        alone = mesh.parts[number - 1].mesh
         path = sv.wheel(tmp_path / f"alone{ending}", one, alone).path
         there, here = sv.read(path), sv.read(made.path, zone=number)
         assert np.array_equal(there.points, here.points)

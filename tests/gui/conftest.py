@@ -249,7 +249,7 @@ class Driver:
     def row(self, name):
         mesh = self.session.mesh
         place = mesh.marker_names.index(name)
-        return place + (marker_zones(mesh)[place] if mesh.zone_parts else 0)
+        return place + (marker_zones(mesh)[place] if len(mesh.parts) > 1 else 0)
 
     def click_row(self, name, modifier=None):
         table = self.window.boundaries.table

@@ -544,8 +544,8 @@ def test_a_stage_has_wheels_gaps_and_spans_of_its_zones(driver, answers, tmp_pat
     assert words[0] == "the whole wheel, 9 and 12"
     shown = np.asarray(Image.open(tmp_path / "preview.png").convert("L"), float)
     assert (shown < 250).mean() > 0.2  # two rings, not a passage of each
-    assert words[1].startswith(f"{21 * len(mesh.zone_parts[0].mesh.cells):,} cells")
-    assert len(read(tmp_path / "wheel.su2").cells) == 21 * len(mesh.zone_parts[0].mesh.cells)
+    assert words[1].startswith(f"{21 * len(mesh.parts[0].mesh.cells):,} cells")
+    assert len(read(tmp_path / "wheel.su2").cells) == 21 * len(mesh.parts[0].mesh.cells)
     section = first_section("span", window.store.session)
     assert section.describe() == "50 % span from 1:hub to 1:shroud, 2:hub to 2:shroud"
     [(_, _, gaps)] = gaps_of(window.store.session)

@@ -457,7 +457,7 @@ def test_cells_of_several_zones_have_their_zone(tmp_path):
     mesh = stage()
     frame = shaken(mesh, 0.02, 1)
     found = worst_cells([StepFrame(mesh, quality(mesh)), frame], 1, "size-skew")
-    parts = mesh.zone_parts
+    parts = mesh.parts
     zones = [
         next(k for k, part in enumerate(parts, 1) if part.cells.start <= cell < part.cells.stop)
         for cell in found.cells

@@ -25,7 +25,7 @@ def test_a_file_of_several_zones_is_one_mesh_and_is_written_back(tmp_path, order
     path = tmp_path / "m.su2"
     path.write_text(text_of(square(4), sector(4), square(6), order=order))
     mesh = sv.read(path)
-    assert (mesh.zone, mesh.zones, len(mesh.zone_parts)) == (None, 3, 3)
+    assert (mesh.zone, mesh.zones, len(mesh.parts)) == (None, 3, 3)
     for number, zone in enumerate(zones_of(mesh), 1):
         alone = sv.read(path, number)
         assert np.array_equal(zone.points, alone.points)

@@ -179,7 +179,7 @@ def test_each_zone_is_cut_by_the_span_between_its_own_walls(span):
     cut = Cutter.of(mesh).cut(mesh.points, section)
     alone = [
         Cutter.of(part.mesh).cut(part.mesh.points, bound(part.mesh, span)).cells + part.cells.start
-        for part in mesh.zone_parts
+        for part in mesh.parts
     ]
     assert cut.cells.tolist() == np.concatenate(alone).tolist()
     radius = 0.5 + 0.5 * span
@@ -199,9 +199,9 @@ def test_each_zone_is_cut_by_the_span_between_its_own_walls(span):
 
 def test_zones_without_walls_are_left_out_and_others_are_named():
     mesh = stage()
-    behind = mesh.zone_parts[1].mesh
+    behind = mesh.parts[1].mesh
     names = [replace(one, name=one.name.replace("hub", "inner")) for one in behind.markers]
-    other = join_zones([mesh.zone_parts[0].mesh, replace(behind, markers=tuple(names))])
+    other = join_zones([mesh.parts[0].mesh, replace(behind, markers=tuple(names))])
     assert find_walls(other).words == "hub to 1:shroud"
     named = sv.Case(span=("inner", "2:shroud"))
     assert find_walls(other, named).words == "hub to 1:shroud, inner to 2:shroud"

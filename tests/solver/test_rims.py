@@ -304,7 +304,7 @@ def test_a_correction_is_between_those_of_the_rim_and_linear_in_them():
 
 def test_the_ghost_is_where_the_run_takes_the_boundary():
     mesh = builders.stage()
-    of_zone = blade(mesh.zone_parts[0].mesh).items()
+    of_zone = blade(mesh.parts[0].mesh).items()
     roles = {f"{zone}:{name}": role for zone in (1, 2) for name, role in of_zone}
     some = sv.Translate("", (0.02, 0.01, 0.01)), sv.Rotate("1:blade", 2.0)
     case = case_of(roles, some, periodic="moving", periodic_type="rotational")

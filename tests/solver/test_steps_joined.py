@@ -43,15 +43,15 @@ def test_every_field_of_a_step_survives_joining(tmp_path):
             kept_layers=KeptLayers(((("BLOCK",), 0.1),), k),
             safe=SafeFraction(1.0 / k, cell=3),
         )
-        for k, part in enumerate(mesh.zone_parts, 1)
+        for k, part in enumerate(mesh.parts, 1)
     ]
     steps = dict(enumerate(each))
     done = Step.joined(ZoneSteps(mesh, mesh, steps, steps, each[0]))
     for field in fields(Step):
         empty = field.name not in OF_EACH_ZONE and getattr(done, field.name) is usual(field)
         assert not empty, f"{field.name} is lost where zones are joined"
-    points = mesh.zone_parts[1].points.start
-    cells = mesh.zone_parts[1].first_cell
+    points = mesh.parts[1].points.start
+    cells = mesh.parts[1].first_cell
     assert (done.index, done.total, done.part) == (each[0].index, each[0].total, 0.5)
     assert (done.node_counts, done.seconds) == ({"moving": 3}, {"solve": 3.0})
     assert done.warnings == ("zone 1: late", "zone 2: late")

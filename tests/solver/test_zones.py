@@ -154,7 +154,7 @@ def test_a_displacement_file_of_several_zones_names_them(tmp_path):
     mesh = sv.read(stage(tmp_path))
     path, vectors = tmp_path / "d.txt", {}
     rows = ["% zone:node dx dy"]
-    for number, part in enumerate(mesh.zone_parts, 1):
+    for number, part in enumerate(mesh.parts, 1):
         for k, node in enumerate(part.mesh.marker("BLOCK").nodes):
             vectors[node + part.points.start] = 0.01 * number, 0.001 * k
             rows.append(f"{number}:{node}, {0.01 * number}, {0.001 * k}")

@@ -14,7 +14,7 @@ from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.design.su2.variables import NOTHING
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.files import read
-from slideviz.mesh.model import IntArray, Marker, Mesh
+from slideviz.mesh.model import Assembly, IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
 
 PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
@@ -69,7 +69,7 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
             f"{config.source}: CONFIG_LIST has {len(config.zones)} configurations, and {mesh.name} "
             f"{mesh.zones} zones; give one for each"
         )
-    if not mesh.zone_parts:
+    if not isinstance(mesh, Assembly):
         return on_mesh(replace(config, zones=()), mesh)
     zones = tuple(_without_missing(_in_zone(each, mesh), mesh) for each in config.zones)
     still = tuple(map(_as_still, zones))
@@ -99,10 +99,10 @@ def _renamed(
 def _in_zone(config: Su2Config, mesh: Mesh) -> Su2Config:
     """Return the configuration of a zone without boundaries of others, named as in the mesh."""
     assert config.zone is not None
-    part = mesh.zone_parts[config.zone - 1]
+    part = mesh.parts[config.zone - 1]
     ours = {file: name for name, file in names_in(mesh, part).items()}
     ours |= {numbered(config.zone, file): name for file, name in ours.items()}
-    files = {name for other in mesh.zone_parts for name in other.mesh.marker_names}
+    files = {name for other in mesh.parts for name in other.mesh.marker_names}
     return _renamed(config, ours, frozenset({*files, *spellings(mesh)} - ours.keys()))
 
 
@@ -188,7 +188,7 @@ def zone_of(config: Su2Config, mesh: Mesh) -> tuple[IntArray, tuple[Marker, ...]
     points = slice(0, len(mesh.points))
     markers = slice(None)
     if config.zone is not None:
-        part = mesh.zone_parts[config.zone - 1]
+        part = mesh.parts[config.zone - 1]
         points = part.points
         markers = part.markers
     return np.arange(points.start, points.stop), mesh.markers[markers]

@@ -15,7 +15,7 @@ from slideviz.case.lines import read_text
 from slideviz.case.motions.airfoil import normals_at
 from slideviz.design.su2.config import Su2Config
 from slideviz.errors import CaseError, Note
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.topology import unit
 from slideviz.system.file_checks import require_regular_file
 
@@ -144,9 +144,9 @@ def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensi
     paths = sensitivity_files(config, mesh)
     if _is_unordered(config):
         return _unordered(paths, mesh)
-    if not mesh.zone_parts:
+    if not isinstance(mesh, Assembly):
         return _read(paths[0], mesh, moving)
-    each = [_read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.zone_parts, strict=True)]
+    each = [_read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.parts, strict=True)]
     if len({one.values.shape[1] for one in each}) > 1:
         files = " and ".join(map(str, paths))
         raise CaseError(
@@ -216,7 +216,7 @@ def sensitivity_files(config: Su2Config, mesh: Mesh) -> tuple[Path, ...]:
     if _is_unordered(config):
         names = (each.files["DV_UNORDERED_SENS_FILENAME"] for each, _ in zones)
         return tuple(dict.fromkeys(names))
-    return tuple(starmap(_restart, zones)) if mesh.zone_parts else (_restart(config),)
+    return tuple(starmap(_restart, zones)) if isinstance(mesh, Assembly) else (_restart(config),)
 
 
 def _restart(config: Su2Config, zone: str = "") -> Path:
@@ -282,7 +282,7 @@ def match(
             f"{found.path}: its points match neither {mesh.name} nor this design (they differ by "
             f"{gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
         )
-    for each in mesh.interfaces if mesh.zone_parts else ():
+    for each in mesh.interfaces if isinstance(mesh, Assembly) else ():
         # A place with one row of two nodes: the row is that of the node that moves.
         alone = np.isin(each.nodes, rows) & ~np.isin(each.partners, rows)
         alone &= np.isin(each.partners, moving) & ~np.isin(each.nodes, moving)

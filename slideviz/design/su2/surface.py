@@ -28,7 +28,7 @@ from slideviz.errors import CaseError, DeformError, Note, SlidevizError
 from slideviz.ffd.box import Box
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step, ZoneSteps
@@ -413,7 +413,7 @@ def _of_zones(config: Su2Config, mesh: Mesh) -> MovingSurface:
 
 def at_rest(case: Case, mesh: Mesh) -> Step:
     """Return the one step of a design that moves nothing: often the first of an optimiser."""
-    if mesh.zone_parts:
+    if isinstance(mesh, Assembly):
         zones = enumerate(each_zone(case, mesh))
         steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
         leader = next(iter(steps.values()))

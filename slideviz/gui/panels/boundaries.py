@@ -299,7 +299,7 @@ def _rows_of(session: Session) -> tuple[tuple[str, int], ...]:
     zones = marker_zones(mesh)
     rows: list[tuple[str, int]] = []
     for name, zone in zip(mesh.marker_names, zones, strict=True):
-        if mesh.zone_parts and (not rows or rows[-1][1] != zone):
+        if len(mesh.parts) > 1 and (not rows or rows[-1][1] != zone):
             rows.append(("", zone))
         rows.append((name, zone))
     return tuple(rows)

@@ -54,7 +54,7 @@ class SpanWalls(Panel):
         if mesh is not None:
             zone = mesh
             names = {name: name for name in mesh.marker_names}
-            for part in mesh.zone_parts if self._blade else ():
+            for part in mesh.parts if self._blade else ():
                 if {*self._blade} <= {*mesh.marker_names[part.markers]}:
                     zone = part.mesh
                     names = names_from(mesh, part)
