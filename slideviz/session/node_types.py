@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.zones import zone_cases
+from slideviz.case.zones import each_zone
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.fans import Fans, find_fans
-from slideviz.mesh.model import Assembly, IntArray, Mesh
+from slideviz.mesh.model import IntArray, Mesh
 from slideviz.session.motions import shown_case
 from slideviz.session.state import Session
+from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import NODE_TYPES, NodeType
 
 
@@ -43,7 +44,6 @@ class NodeTypes:
     """Finds the types of the boundary nodes of a mesh; those of the last case are cached."""
 
     def __init__(self) -> None:
-        self._fans: tuple[Mesh, float, Fans] | None = None
         self._types: tuple[object, TypedNodes] | None = None
 
     def clear(self) -> None:
@@ -68,51 +68,51 @@ class NodeTypes:
         return self._types[1]
 
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
-        from slideviz.solver.domain import find_classes, find_period, roles_of_copies
-
-        if isinstance(mesh, Assembly):
-            return self._of_zones(mesh, case)
-        if not mesh.markers:
-            return NOTHING
-        case, _ = roles_of_copies(case, mesh)
-        boundary = boundary_of(mesh)
-        angle = case.feature_angle_deg
-        if self._fans is None or self._fans[:2] != (mesh, angle):
-            self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
         try:
-            try:
-                _, frame, _, stands = find_period(case, mesh, boundary)
-            except MeshError:  # markers that do not match (yet) are taken as not periodic
-                alone = case.change(periodic="none", periodic_type="translational")
-                _, frame, _, stands = find_period(alone, mesh, boundary)
-            classes = find_classes(case, mesh, boundary, self._fans[2], frame, stands)
-        except SlidevizError:
-            return NOTHING  # the message is beside the Run button
-        place = {kind: index for index, kind in enumerate(NODE_TYPES)}
-        kinds = np.full(len(mesh.points), place["internal"])
-        for marker in mesh.markers:
-            if case.roles.get(marker.name) == "periodic":
-                kinds[marker.nodes] = place["periodic"]
-        kinds[classes.surface] = place["sliding_surface"]
-        kinds[classes.edge] = place["sliding_edge"]
-        kinds[classes.fixed] = place["fixed"]
-        kinds[classes.moving] = place["moving"]
-        nodes = boundary.nodes
-        return TypedNodes(nodes, kinds[nodes])
-
-    def _of_zones(self, mesh: Mesh, case: Case) -> TypedNodes:
-        try:
-            cases = zone_cases(case, mesh, False)
+            zones = list(each_zone(case, mesh))
         except SlidevizError:
             return NOTHING
-        each = [
-            (part.points.start, NodeTypes()._classified(part.mesh, one))
-            for part, one in zip(mesh.parts, cases, strict=True)
-        ]
+        each = [_types_of_zone(one, zone) for one, zone in zones]
+        first = [part.points.start for part in mesh.parts]
         return TypedNodes(
-            np.concatenate([typed.nodes + first for first, typed in each]),
-            np.concatenate([typed.kinds for _, typed in each]),
+            np.concatenate([t.nodes + start for t, start in zip(each, first, strict=True)]),
+            np.concatenate([typed.kinds for typed in each]),
         )
+
+
+@weak_cache
+def _fans(mesh: Mesh, angle_deg: float) -> Fans:
+    return find_fans(boundary_of(mesh), mesh.points, angle_deg)
+
+
+def _types_of_zone(case: Case, mesh: Mesh) -> TypedNodes:
+    from slideviz.solver.domain import find_classes, find_period, roles_of_copies
+
+    if not mesh.markers:
+        return NOTHING
+    case, _ = roles_of_copies(case, mesh)
+    boundary = boundary_of(mesh)
+    fans = _fans(mesh, case.feature_angle_deg)
+    try:
+        try:
+            _, frame, _, stands = find_period(case, mesh, boundary)
+        except MeshError:  # markers that do not match (yet) are taken as not periodic
+            alone = case.change(periodic="none", periodic_type="translational")
+            _, frame, _, stands = find_period(alone, mesh, boundary)
+        classes = find_classes(case, mesh, boundary, fans, frame, stands)
+    except SlidevizError:
+        return NOTHING  # the message is beside the Run button
+    place = {kind: index for index, kind in enumerate(NODE_TYPES)}
+    kinds = np.full(len(mesh.points), place["internal"])
+    for marker in mesh.markers:
+        if case.roles.get(marker.name) == "periodic":
+            kinds[marker.nodes] = place["periodic"]
+    kinds[classes.surface] = place["sliding_surface"]
+    kinds[classes.edge] = place["sliding_edge"]
+    kinds[classes.fixed] = place["fixed"]
+    kinds[classes.moving] = place["moving"]
+    nodes = boundary.nodes
+    return TypedNodes(nodes, kinds[nodes])
 
 
 def control_nodes(session: Session) -> TypedNodes:

@@ -11,7 +11,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDES
@@ -98,13 +98,16 @@ def fixed_beside(case: Case, mesh: Mesh, cells: IntArray) -> tuple[str, ...]:
 
 def beyond_pitch(case: Case, mesh: Mesh) -> str:
     """Return a sentence on a motion that takes a node farther than the pitch; "" for none."""
-    names = case.markers_with("periodic")
-    if not names or case.periodic == "none":
+    if case.periodic == "none" or not case.markers_with("periodic"):
         return ""
-    if isinstance(mesh, Assembly):
-        return next(
-            filter(None, (beyond_pitch(*one) for one in each_zone(by_zone(case, mesh), mesh))), ""
-        )
+    words = (_beyond_pitch_of_zone(*one) for one in each_zone(by_zone(case, mesh), mesh))
+    return next(filter(None, words), "")
+
+
+def _beyond_pitch_of_zone(case: Case, mesh: Mesh) -> str:
+    names = case.markers_with("periodic")
+    if not names:
+        return ""
     try:
         moved = displacements(case, mesh)
         pairs = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)

@@ -34,7 +34,7 @@ from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
 from slideviz.solver.remedies import MOST_NAMES
-from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
+from slideviz.solver.setup import Setup, elastic_body, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step, step_timer
 from slideviz.system.threads import Tick, equal_shares
@@ -155,8 +155,7 @@ def _case_alone(
             if pair.first in periodic and pair.second in periodic:
                 case = case.change(axis=pair.axis, origin=pair.origin)
         try:
-            alone = mesh if isinstance(mesh, Assembly) else without_halo(mesh)[0]
-            pair_up(alone, periodic, "auto", case.axis, case.origin)
+            pair_up(without_halo(mesh)[0], periodic, "auto", case.axis, case.origin)
         except MeshError as problem:
             raise MeshError(str(problem).replace(CHECK_PERIODIC, _NO_IMAGES)) from None
     return case
@@ -178,8 +177,7 @@ def mended_frame(
 ) -> Step:
     """Return the last step of a run, mended afterwards; without one, the mesh as a mended step."""
     if step is not None:
-        setup = None if isinstance(mesh, Assembly) else make_setup(case, mesh)
-        done = mended_step(case, mesh, setup, report, step)
+        done = mended_step(case, mesh, None, report, step)
     else:
         moving = dict.fromkeys(case.markers_with("moving"), "fixed")
         case = case.change(roles={**case.roles, **moving}, motions=())

@@ -20,7 +20,7 @@ from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_ends
 from slideviz.case.zones import each_zone
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.classify import MERGE_FRACTION
 from slideviz.rbf.frames import corners
@@ -245,9 +245,10 @@ def rims_key(case: Case) -> object:
 
 def are_ready(case: Case, mesh: Mesh) -> bool:
     """Return whether `on_walls` needs no time: rims are free, or were found for this mesh."""
-    if case.rims == "free" or not isinstance(mesh, Assembly):
-        return case.rims == "free" or rims_key(case) in _RIMS.get(mesh, {})
-    return all(are_ready(one, zone) for one, zone in each_zone(case, mesh))
+    return case.rims == "free" or all(
+        one.rims == "free" or rims_key(one) in _RIMS.get(zone, {})
+        for one, zone in each_zone(case, mesh)
+    )
 
 
 def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
@@ -255,14 +256,16 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
 
     They are found once for the roles of a mesh. Raises MeshError as `find_domain`.
     """
-    if isinstance(mesh, Assembly):
-        vectors = moved.vectors.copy()
-        for part, (one, zone) in zip(mesh.parts, each_zone(case, mesh), strict=True):
-            first = part.points.start
-            here = slice(*np.searchsorted(moved.nodes, [first, part.points.stop]))
-            mine = Displacements(moved.nodes[here] - first, moved.vectors[here])
-            vectors[here] = on_walls(one, zone, mine).vectors
-        return replace(moved, vectors=vectors)
+    vectors = moved.vectors.copy()
+    for part, (one, zone) in zip(mesh.parts, each_zone(case, mesh), strict=True):
+        first = part.points.start
+        here = slice(*np.searchsorted(moved.nodes, [first, part.points.stop]))
+        mine = Displacements(moved.nodes[here] - first, moved.vectors[here])
+        vectors[here] = _on_walls_of_zone(one, zone, mine).vectors
+    return replace(moved, vectors=vectors)
+
+
+def _on_walls_of_zone(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
     if case.rims == "free":
         return moved
     known = _RIMS.setdefault(mesh, {})

@@ -6,18 +6,20 @@ Steps are made in `slideviz.solver.stepping`, their number is chosen in `slidevi
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from dataclasses import field as made_by
 from functools import cached_property
+from itertools import chain
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.errors import Note
-from slideviz.mesh.margin import SafeFraction, chain
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, ZonePart, sealed
+from slideviz.mesh.margin import SafeFraction
+from slideviz.mesh.margin import chain as chained_safety
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, sealed
 from slideviz.mesh.zones import join_zones, names_from
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
@@ -168,46 +170,6 @@ class MeshRepair:
         return f"{nodes} moved by up to {self.largest_move:.3g}"
 
 
-@dataclass(frozen=True, eq=False)
-class ZoneSteps:
-    """The steps of zones, by their places in a mesh, that are joined to one of the mesh."""
-
-    mesh: Mesh  # of all zones, undeformed
-    now: Mesh  # after the steps
-    steps: Mapping[int, Step]
-    fresh: Mapping[int, Step]  # those that are no step of the round before
-    leader: Step  # the one that numbers the steps of the mesh
-
-    def each(self, name: str) -> list[tuple[ZonePart, Any]]:
-        """Return each zone with the value of a field of its step."""
-        parts = self.mesh.parts
-        return [(parts[k], getattr(step, name)) for k, step in self.steps.items()]
-
-    def values(self, name: str) -> list[Any]:
-        """Return the value of a field of each step."""
-        return [getattr(step, name) for step in self.steps.values()]
-
-    def new(self, name: str) -> list[Any]:
-        """Return the value of a field of each step of this round."""
-        return [getattr(step, name) for step in self.fresh.values()]
-
-
-Rule = Callable[[ZoneSteps, str], Any]
-"""Returns the value that a field has in the step of a mesh of several zones."""
-
-
-def _leading(zones: ZoneSteps, name: str) -> Any:
-    return getattr(zones.leader, name)
-
-
-def _sum(zones: ZoneSteps, name: str) -> int:
-    return sum(zones.values(name))
-
-
-def _largest(zones: ZoneSteps, name: str) -> float | None:
-    return max((value for value in zones.values(name) if value is not None), default=None)
-
-
 def _counted(values: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     total: Counter[str] = Counter()
     for value in values:
@@ -215,142 +177,139 @@ def _counted(values: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     return dict(total)
 
 
-def _chained(zones: ZoneSteps, name: str) -> tuple[Any, ...]:
-    return tuple(one for value in zones.new(name) for one in value)
+def _chained(values: Iterable[Iterable[Any]]) -> tuple[Any, ...]:
+    return tuple(chain.from_iterable(values))
 
 
-def _of_each_zone(_zones: ZoneSteps, _name: str) -> None:
-    """Return nothing: what belongs to a zone alone, and is used before zones are joined."""
+def _joined_layers(values: Iterable[KeptLayers]) -> KeptLayers:
+    return KeptLayers(_chained(one.walls for one in values), sum(one.nodes for one in values))
 
 
-def _worst_condition(zones: ZoneSteps, name: str) -> float:
-    return max(filter(isfinite, zones.values(name)), default=nan)
+def by(rule: Callable[[list[Any]], Any], *, new: bool = False) -> dict[str, Any]:
+    """Return the metadata of a field of a step: what joins the values that zones have, if any.
 
-
-def _warnings(zones: ZoneSteps, name: str) -> tuple[str, ...]:
-    def of_zones() -> Iterator[str]:
-        for index, step in zones.steps.items():
-            for text in getattr(step, name):
-                said = f"zone {index + 1}: {text}"
-                yield Note(said) if isinstance(text, Note) else said
-
-    return tuple(of_zones())
-
-
-def _control(zones: ZoneSteps, name: str) -> IntArray:
-    return np.concatenate([nodes + part.points.start for part, nodes in zones.each(name)])
-
-
-def _relaxed(zones: ZoneSteps, name: str) -> Relaxed | None:
-    return Relaxed.joined([one for one in zones.new(name) if one is not None])
-
-
-def _repaired(zones: ZoneSteps, name: str) -> MeshRepair | None:
-    repairs = {k: getattr(step, name) for k, step in zones.fresh.items()}
-    return MeshRepair.joined(zones.mesh, zones.now, repairs)
-
-
-def _kept_layers(zones: ZoneSteps, name: str) -> KeptLayers | None:
-    walls = []
-    nodes = 0
-    for part, kept in zones.each(name):
-        if kept is not None:
-            label = names_from(zones.mesh, part)
-            nodes += kept.nodes
-            walls += [(tuple(label[one] for one in wall), delta) for wall, delta in kept.walls]
-    return KeptLayers(tuple(walls), nodes) if walls else None
-
-
-def _first_to_fold(zones: ZoneSteps, name: str) -> SafeFraction | None:
-    safe = []
-    for index, step in zones.fresh.items():
-        one = getattr(step, name)
-        if one is not None and one.cell is not None:
-            first = zones.mesh.parts[index].first_cell
-            one = replace(one, cell=one.cell + first, zone=index + 1)
-        safe.append(one)
-    return min(filter(None, safe), key=lambda one: one.fraction, default=None)
-
-
-def by(rule: Rule) -> dict[str, Rule]:
-    """Return the metadata of a field of a step with that rule."""
-    return {"joined": rule}
+    ``new``: only those of steps that were not in the round before.
+    """
+    return {"joined": rule, "new": new}
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """The mesh after one step.
 
-    Of a mesh with several zones each is deformed alone; each field has a rule that makes its value
-    from those of the zones.
+    Of a mesh with several zones each is deformed alone; each field has a rule that joins the values
+    of the zones (`joined`).
     """
 
-    index: int = made_by(metadata=by(_leading))
-    total: int = made_by(metadata=by(_leading))
+    index: int
+    total: int
     """`index`, `total`: number of the step, from 1, and of all steps."""
-    mesh: Mesh = made_by(metadata=by(lambda zones, _: zones.now))
+    mesh: Mesh
     """The deformed mesh."""
-    control_nodes: int = made_by(metadata=by(_sum))
+    control_nodes: int = made_by(metadata=by(sum))
     """Nodes in the interpolation system of this step, or of known displacement where a method has
     no such system."""
-    max_error: float = made_by(metadata=by(_largest))
+    max_error: float = made_by(metadata=by(max))
     """Largest misfit at nodes of known or projected displacement before the correction sets them
     exactly, with data reduction that of all steps so far, in the mesh's length unit."""
-    condition: float = made_by(metadata=by(_worst_condition))
+    condition: float = made_by(
+        metadata=by(lambda values: max(filter(isfinite, values), default=nan))
+    )
     """Estimated condition number of the interpolation system; NaN where a method has none."""
-    node_counts: Mapping[str, int] = made_by(
-        metadata=by(lambda zones, name: _counted(zones.values(name)))
-    )
+    node_counts: Mapping[str, int] = made_by(metadata=by(_counted))
     """``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``."""
-    seconds: Mapping[str, float] = made_by(
-        metadata=by(lambda zones, name: _counted(zones.new(name)))
-    )
+    seconds: Mapping[str, float] = made_by(metadata=by(_counted, new=True))
     """Spent in this step, by phase; ``classify`` only in the first."""
-    warnings: tuple[str, ...] = made_by(metadata=by(_warnings))
+    warnings: tuple[str, ...] = made_by(metadata=by(_chained))
     """What the user should know of case, mesh and all steps so far."""
-    history: tuple[Cycle, ...] = made_by(default=(), metadata=by(_chained))
+    history: tuple[Cycle, ...] = made_by(default=(), metadata=by(_chained, new=True))
     """Convergence of the greedy selection in this step; empty without data reduction."""
-    tried: tuple[Trial, ...] = made_by(default=(), metadata=by(_chained))
+    tried: tuple[Trial, ...] = made_by(default=(), metadata=by(_chained, new=True))
     """The numbers of steps tried by STEPS= auto; empty but in the last step of such a run."""
     control: IntArray = made_by(
-        default_factory=lambda: np.empty(0, np.int64), metadata=by(_control)
+        default_factory=lambda: np.empty(0, np.int64), metadata=by(np.concatenate)
     )
     """(c,): the control nodes of this step; empty where a method has none."""
-    candidates: int = made_by(default=0, metadata=by(_sum))
+    candidates: int = made_by(default=0, metadata=by(sum))
     """Nodes that could have been control nodes; periodic images count as one."""
-    tolerance: float | None = made_by(default=None, metadata=by(_largest))
+    tolerance: float | None = made_by(default=None, metadata=by(max))
     """The tolerance of the data reduction, in the mesh's length unit; None where there was none."""
-    layers: float = made_by(default=0.0, metadata=by(_largest))
+    layers: float = made_by(default=0.0, metadata=by(max))
     """The tolerance that layers at moving boundaries need where it is smaller than ``tolerance``
     (`slideviz.solver.setup.LAYER`); else 0."""
-    periodic_misfit: float | None = made_by(default=None, metadata=by(_largest))
+    periodic_misfit: float | None = made_by(default=None, metadata=by(max))
     """Largest difference of the displacements of periodic images so far, in the mesh's length unit.
     It is rounding only, since more raises. None where images need not move alike."""
-    part: float = made_by(default=1.0, metadata=by(_leading))
+    part: float = 1.0
     """The part of the whole displacement that is reached after this step, 0 to 1."""
-    support_radius: float | None = made_by(default=None, metadata=by(_largest))
+    support_radius: float | None = made_by(default=None, metadata=by(max))
     """Of the radial functions, in the mesh's length unit; None where a method has none."""
-    field: Field | None = made_by(default=None, metadata=by(_of_each_zone))
+    field: Field | None = made_by(default=None, metadata=by(lambda _: None))
     """The function that displaced the nodes off the boundary in this step; kept in streamed
     runs."""
-    relaxed: Relaxed | None = made_by(default=None, metadata=by(_relaxed))
+    relaxed: Relaxed | None = made_by(default=None, metadata=by(Relaxed.joined, new=True))
     """How the step was relaxed; None where it was not."""
-    repaired: MeshRepair | None = made_by(default=None, metadata=by(_repaired))
+    repaired: MeshRepair | None = None
     """The repair after the step; None where there was none."""
-    kept_layers: KeptLayers | None = made_by(default=None, metadata=by(_kept_layers))
+    kept_layers: KeptLayers | None = made_by(default=None, metadata=by(_joined_layers))
     """The walls that carried the nodes near them along (LAYERS); None where none did."""
-    safe: SafeFraction | None = made_by(default=None, metadata=by(_first_to_fold))
+    safe: SafeFraction | None = made_by(
+        default=None,
+        metadata=by(lambda values: min(values, key=lambda one: one.fraction), new=True),
+    )
     """How far this step, straight on, may go until the first cell folds; None where it was not
     asked for."""
     check_limits: Callable[[Mesh], tuple[LimitResult, ...]] | None = made_by(
-        default=None, metadata=by(_of_each_zone)
+        default=None, metadata=by(lambda _: None)
     )
     """Returns whether a mesh meets each limit of the case; None where it has none."""
 
     @classmethod
-    def joined(cls, zones: ZoneSteps) -> Step:
-        """Return the steps of zones as one of the mesh of all."""
-        return cls(**{one.name: one.metadata["joined"](zones, one.name) for one in fields(cls)})
+    def joined(
+        cls,
+        mesh: Mesh,
+        now: Mesh,
+        steps: Mapping[int, Step],
+        new: Collection[int],
+        leader: Step,
+    ) -> Step:
+        """Return the steps of zones, by their places in a mesh, as one of that mesh.
+
+        ``mesh`` and ``now``: of all zones, undeformed and after the steps. ``new``: the zones that
+        have another step than in the round before. ``leader``: the step that numbers this one.
+        """
+        each = {k: step.of_mesh(mesh, k) for k, step in steps.items()}
+        repairs = {k: steps[k].repaired for k in steps if k in new}
+        values = dict[str, Any]()
+        for one in fields(cls):
+            if one.metadata:
+                some = [k for k in each if k in new or not one.metadata["new"]]
+                known = [v for k in some if (v := getattr(each[k], one.name)) is not None]
+                values[one.name] = one.metadata["joined"](known) if known else None
+        return replace(leader, mesh=now, repaired=MeshRepair.joined(mesh, now, repairs), **values)
+
+    def of_mesh(self, mesh: Mesh, zone: int) -> Step:
+        """Return the step of a zone, by its place, with the numbers and names of a mesh of all."""
+        part = mesh.parts[zone]
+        safe = self.safe
+        if safe is not None and safe.cell is not None:
+            safe = replace(safe, cell=safe.cell + part.first_cell, zone=zone + 1)
+        layers = self.kept_layers
+        if layers is not None:
+            label = names_from(mesh, part)
+            walls = [(tuple(map(label.__getitem__, wall)), size) for wall, size in layers.walls]
+            layers = replace(layers, walls=tuple(walls))
+        warnings = (
+            (Note if isinstance(text, Note) else str)(f"zone {zone + 1}: {text}")
+            for text in self.warnings
+        )
+        return replace(
+            self,
+            control=self.control + part.points.start,
+            safe=safe,
+            kept_layers=layers,
+            warnings=tuple(warnings),
+        )
 
     @cached_property
     def limits(self) -> tuple[LimitResult, ...]:
@@ -387,4 +346,4 @@ class RunResult:
 def safe_fraction_of(steps: Iterable[Step]) -> SafeFraction | None:
     """Return how far the run of some steps may go; None if that was not asked for."""
     known = [(step.part, step.safe) for step in steps if step.safe is not None]
-    return chain(known) if known else None
+    return chained_safety(known) if known else None

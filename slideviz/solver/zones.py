@@ -23,7 +23,7 @@ from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterf
 from slideviz.mesh.zones import names_in, with_zones
 from slideviz.solver.prescribed import check_motion
 from slideviz.solver.rims import on_walls
-from slideviz.solver.steps import Progress, Step, ZoneSteps
+from slideviz.solver.steps import Progress, Step
 from slideviz.terms import Role
 
 Report = Callable[[Progress], None]
@@ -234,11 +234,11 @@ def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
     before: dict[int, Step] = {}
     for leader in longest:
         steps = {k: step for k, some in runs.items() for step in some if step.part <= leader.part}
-        fresh = {k: step for k, step in steps.items() if before.get(k) is not step}
+        new = {k for k, step in steps.items() if before.get(k) is not step}
         now = motion.after(steps)
         # Before the last step, nodes that follow sliding ones are on a straight way to them.
         last = leader is longest[-1]
         torn = torn_interfaces(mesh, now.points, motion.names) if last else ()
-        step = Step.joined(ZoneSteps(mesh, now, steps, fresh, leader))
+        step = Step.joined(mesh, now, steps, new, leader)
         yield replace(step, warnings=(*motion.warnings, *step.warnings, *torn))
         before = steps

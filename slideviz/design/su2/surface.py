@@ -31,7 +31,7 @@ from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.solver.setup import make_setup
-from slideviz.solver.steps import Step, ZoneSteps
+from slideviz.solver.steps import Step
 
 Attempt = TypeVar("Attempt")
 
@@ -416,8 +416,7 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
     if isinstance(mesh, Assembly):
         zones = enumerate(each_zone(case, mesh))
         steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
-        leader = next(iter(steps.values()))
-        step = Step.joined(ZoneSteps(mesh, mesh, steps, steps, leader))
+        step = Step.joined(mesh, mesh, steps, steps, next(iter(steps.values())))
         return replace(step, warnings=(*case.warnings, *step.warnings))
     setup = make_setup(case, mesh)
     return Step(
