@@ -163,10 +163,9 @@ class Output:
                 target.place(file.read(HEAD))
             return
         written = 0
-        moved = [
-            replace(z, points=PointTable(z.file.of(target.file), z.place), base=z.points)
-            for z in self.zones
-        ]
+        # One object, whose lock keeps threads from reading the points of two zones at once.
+        there = self.zones[0].file.of(target.file)
+        moved = [replace(z, points=PointTable(there, z.place), base=z.points) for z in self.zones]
         if self._input.texts:
             blocks = patched_text(self._input.texts, moved, boxes)
         else:

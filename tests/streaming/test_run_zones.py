@@ -136,3 +136,18 @@ def test_a_text_becomes_binary_and_back(tmp_path):
         moved = sv.read(tmp_path / target)
         assert np.array_equal(bits(moved.points), bits(points))
         assert moved.marker_names == sv.read(path).marker_names
+
+
+def test_zones_are_read_through_one_lock(tmp_path, monkeypatch):
+    """Threads write the zones of a text; a file has one place at which it is read."""
+    files = []
+    patched = output.patched_text
+
+    def spied(texts, moved, boxes):
+        files.extend(zone.points.file for zone in moved)
+        return patched(texts, moved, boxes)
+
+    monkeypatch.setattr(output, "patched_text", spied)
+    stream(both().change(mesh_file=rows(tmp_path)), tmp_path / "out.su2")
+    assert len(files) == 2
+    assert files[0] is files[1]
