@@ -97,9 +97,10 @@ def deform(
     case = with_marker_names(case, mesh)
     check_limits = partial(rated_limits, case, mesh)
     if isinstance(mesh, Assembly):
-        from slideviz.solver.zones import deform_zones
+        from slideviz.solver.zones import joined_steps, zone_runs
 
-        for step in deform_zones(case, mesh, partial(deform, certify=certify), report):
+        run = partial(deform, certify=certify)
+        for step in joined_steps(*zone_runs(case, mesh, run, report)):
             yield replace(step, check_limits=check_limits)
         return
     timer = step_timer(report, 1, max(1, case.steps))

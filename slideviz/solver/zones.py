@@ -11,7 +11,7 @@ from slideviz.case.check import require_valid
 from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motions.file import Prescribed
-from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.case.zones import zone_cases
 from slideviz.errors import SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,
@@ -189,19 +189,11 @@ Runs = dict[int, list[Step]]
 """The steps of zones, by their place in the mesh, in the order in which they were deformed."""
 
 
-def deform_zones(case: Case, mesh: Assembly, run: Run, report: Report) -> Iterator[Step]:
-    """Yield the steps of a mesh of all zones, each of which ``run`` deforms alone.
-
-    Where zones have different numbers of steps (STEPS= auto), the steps are those of the zone with
-    the most, and the others have come as far as their latest step. Raises CaseError if the case
-    does not fit the mesh.
-    """
-    case = with_marker_names(case, mesh)
-    yield from joined_steps(*zone_runs(case, mesh, run, report))
-
-
 def zone_runs(case: Case, mesh: Assembly, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
-    """Return the motion of interfaces, and the steps of those zones that move."""
+    """Return the motion of interfaces, and the steps of those zones that move, each by ``run``.
+
+    Raises CaseError if the case does not fit the mesh.
+    """
     require_valid(case, mesh)
     motion = InterfaceMotion(case, mesh)
     runs = Runs()
@@ -228,7 +220,11 @@ def zone_runs(case: Case, mesh: Assembly, run: Run, report: Report) -> tuple[Int
 
 
 def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
-    """Yield the steps of zones as those of the mesh of all."""
+    """Yield the steps of zones as those of the mesh of all.
+
+    Where zones have different numbers of steps (STEPS= auto), the steps are those of the zone with
+    the most, and the others have come as far as their latest step.
+    """
     mesh = motion.mesh
     longest = max(runs.values(), key=len)
     before: dict[int, Step] = {}
