@@ -52,7 +52,7 @@ _SHORT = 60  # largest length of a value that a message shows
 
 
 class _Misfit(NamedTuple):
-    """A value, its place, as ``vector[1]``, and the type that it is not of."""
+    """A value, its place, e.g. ``vector[1]``, and the type that it should have."""
 
     place: str
     value: object
@@ -168,7 +168,7 @@ def _misfit(value: object, hint: Any, place: str) -> _Misfit | None:
 
 
 def _fits(value: Any, hint: Any, kind: Any, inner: tuple[Any, ...]) -> bool:
-    """Return whether a value is of a type that is no union, whatever is in it."""
+    """Return whether a value is of a type that is not a union, whatever is in it."""
     if hint is ArrayLike or kind is np.ndarray:
         return _is_numeric(value, whole=kind is np.ndarray and "int" in str(inner[1]))
     if kind is Literal:

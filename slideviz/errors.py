@@ -70,7 +70,7 @@ class Note(str):
 
 
 def printable(path: str | Path) -> str:
-    """Return a path as text for a message; bytes that are no UTF-8 become escape sequences."""
+    """Return a path as text for a message; bytes that are not UTF-8 become escape sequences."""
     return str(path).encode("utf-8", "backslashreplace").decode()
 
 
@@ -85,7 +85,7 @@ def shown(text: str) -> str:
 
 
 def not_one_of(value: object, known: Iterable[str]) -> str:
-    """Return the message that a value is none of the known ones, and which is most similar."""
+    """Return the message that a value is not one of the known ones, with the most similar one."""
     words = list(known)
     quoted = shown(value) if isinstance(value, str) else repr(value)
     return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"

@@ -204,7 +204,7 @@ STIFFNESS_TYPES: dict[StiffnessType, Term] = {
 }
 """Which cells of an elastic body are stiff: how Young's modulus is found."""
 NOT_WALLS = ("far", "freestream", "inflow", "inlet", "outflow", "outlet", "exit", "sym")
-"""Words in names of fixed boundaries that are no walls, for the distance to these."""
+"""Words in names of fixed boundaries that are not walls, for the distance to these."""
 
 
 @dataclass(frozen=True)
@@ -261,8 +261,8 @@ DataReduction = Literal["AUTO", "NO", "YES"]
 DATA_REDUCTIONS: dict[DataReduction, Term] = {
     "AUTO": Term(
         "automatic",
-        "All boundary nodes if there are up to a few thousand. If there are more, as many as are "
-        "needed to follow the motion to a thousandth of it.",
+        "All boundary nodes if there are up to a few thousand; else as many as follow the motion "
+        "to a thousandth of it.",
     ),
     "NO": Term(
         "off", "All boundary nodes are control nodes: exact, for up to a few thousand nodes."
@@ -283,8 +283,8 @@ RELAXES: dict[Relax, Term] = {
 
 Rims = Literal["free", "slide"]
 RIMS: dict[Rims, Term] = {
-    "free": Term("go with the motion", "They may leave the wall, which a run then warns of."),
-    "slide": Term("stay on walls", "They are put back on the wall, and what is beside follows."),
+    "free": Term("go with the motion", "They may leave the wall; the run then warns."),
+    "slide": Term("stay on walls", "They are put back on the wall, and neighbouring nodes follow."),
 }
 """What nodes of moving boundaries do that are also on walls."""
 
@@ -292,7 +292,7 @@ Repair = Literal["auto", "no", "yes"]
 REPAIRS: dict[Repair, Term] = {
     "auto": Term("automatic", "Mended where cells are bad."),
     "no": Term("off", "Cells stay as the method leaves them."),
-    "yes": Term("on", "Mended where cells are bad, as automatic."),
+    "yes": Term("on", "Mended where cells are bad, like automatic."),
 }
 """Whether inverted and poor cells are mended."""
 
@@ -306,7 +306,7 @@ REPAIR_TARGETS: dict[RepairTarget, Term] = {
 Layers = Literal["auto", "no", "keep"]
 LAYERS: dict[Layers, Term] = {
     "auto": Term("automatic", "Walls with boundary layers carry these along; other walls do not."),
-    "no": Term("off", "Boundary layers follow as all other nodes."),
+    "no": Term("off", "Boundary layers follow like all other nodes."),
     "keep": Term("at all walls", "All moving and fixed boundaries carry nodes near them along."),
 }
 """Whether nodes near walls go with the walls' own displacement and rotation."""
@@ -324,13 +324,13 @@ PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
 PERIODIC_MODES: dict[PeriodicMode, Term] = {
     "none": Term(
         "none",
-        "Periodic boundaries are treated as sliding ones; distances are not periodic.",
+        "Periodic boundaries are treated as sliding boundaries; distances are not periodic.",
         standalone="not periodic",
     ),
     "periodic": Term(
         "periodic distance",
-        "Periodic boundaries are treated as sliding ones, and distances are periodic: a motion "
-        "near one side also acts near the other side.",
+        "Periodic boundaries are treated as sliding boundaries, and distances are periodic: a "
+        "motion near one side also acts near the other side.",
     ),
     "fixed": Term(
         "periodic, fixed vertices",
@@ -439,9 +439,11 @@ FARTHEST = 10.0  # largest safe fraction of a motion that is looked for
 METRICS: dict[Metric, MetricTerm] = {
     "size-skew": MetricTerm("size-skew", "Knupp's: √size · skew. 1 is best."),
     "size": MetricTerm(
-        "size", "The cell's size over the undeformed one's, or its inverse if larger than 1."
+        "size", "The cell's size over its undeformed size, or the inverse if larger than 1."
     ),
-    "skew": MetricTerm("skew", "How near its corners are to those of the ideal cell. 1 is best."),
+    "skew": MetricTerm(
+        "skew", "How near its corners are to the corners of the ideal cell. 1 is best."
+    ),
     "orthogonality": MetricTerm(
         "orthogonality (SU2)",
         "Of the edges at a node and the faces of its control volume, as SU2 prints it. 90 is best.",
@@ -661,8 +663,8 @@ SHOWN: dict[Shown, ShownTerm] = {
     ),
     "repaired": ShownTerm(
         "Repaired cells",
-        "Draw the cells that repair mended as they were, as a ghost, and the nodes that it moved, "
-        "as dots.",
+        "Draw mended cells as they were before repair (ghost), and the nodes that repair moved "
+        "(dots).",
         standalone="Repaired cells as they were",
         shortcut="M",
         in_bar=False,
@@ -678,7 +680,8 @@ SHOWN: dict[Shown, ShownTerm] = {
     "support": ShownTerm(
         "Support radius",
         "Draw how far the radial functions of the moving boundaries reach with the present "
-        "settings: a circle or sphere around each of them. A comparison shows those of each run.",
+        "settings: a circle or sphere around each of them. A comparison shows the circles of each "
+        "run.",
         shortcut="D",
         in_bar=False,
     ),

@@ -63,18 +63,18 @@ def test_a_format_that_is_none_is_told(square, capsys):
     assert run(["run", "square.cfg", "--set", "MESH_FORMAT=CGNS"]) == 1
     assert "'CGNS' is not one of SU2 | SU2B" in capsys.readouterr().err
     assert run(["run", "square.cfg", "--set", "MESH_FORMAT=SU2B"]) == 1
-    assert "mesh.su2: byte 0: this is no SU2 binary mesh" in capsys.readouterr().err
+    assert "mesh.su2: byte 0: this is not an SU2 binary mesh" in capsys.readouterr().err
 
 
 def test_what_a_binary_mesh_loses_is_said_before_the_work(square, capsys):
     with Path("mesh.su2").open("a") as file:
         file.write(FFD)
-    words = "will not have its FFD boxes of mesh.su2; write a .su2 file"
+    words = "lacks the FFD boxes of mesh.su2; write a .su2 file"
     for call in (["convert", "mesh.su2", "out.su2b"], ["run", "square.cfg", "-o", "out.su2b"]):
         assert run(call) == 0
         assert f"slideviz: warning: out.su2b {words}" in capsys.readouterr().err
     mesh = sv.read("mesh.su2")
-    assert left_out(Path("a.su2b"), mesh) == "a.su2b does not hold its FFD boxes."
+    assert left_out(Path("a.su2b"), mesh) == "a.su2b does not hold the FFD boxes."
     assert left_out(Path("a.su2"), mesh) == left_out(Path("a.su2b"), sv.read("out.su2b")) == ""
 
 
@@ -88,7 +88,7 @@ def test_zones_that_a_run_does_not_write_are_told(tmp_path, monkeypatch, capsys)
     )
     for name in ("out.su2", "out.vtu"):
         assert run(["run", "a.cfg", "-q", "-o", name]) == 0
-        words = f"{name} will not have its other zones of two.su2b; write a .su2b file to keep them"
+        words = f"{name} lacks the other zones of two.su2b; write a .su2b file to keep them"
         assert words in capsys.readouterr().err
     assert run(["run", "a.cfg", "-q", "-o", "out.su2b"]) == 0
     assert "zone" not in capsys.readouterr().err
@@ -101,7 +101,7 @@ def test_convert_tells_what_every_zone_loses(tmp_path, monkeypatch, capsys):
     with Path("two.su2").open("a") as file:
         file.write(FFD)
     assert run(["convert", "two.su2", "again.su2b"]) == 0
-    assert "will not have its FFD boxes of two.su2; write" in capsys.readouterr().err
+    assert "lacks the FFD boxes of two.su2; write" in capsys.readouterr().err
 
 
 def test_a_halo_is_refused_before_the_work(square, capsys):
@@ -124,10 +124,10 @@ def test_convert_has_all_zones_or_one(tmp_path, monkeypatch, capsys):
     assert Path("again.su2b").read_bytes() == packed([TWO_D, TWO_D])
     assert run(["convert", "two.su2", "second.su2b", "--zone", "2"]) == 0
     assert Path("second.su2b").read_bytes() == packed([TWO_D])
-    said = "will not have its other zones of two.su2; leave out --zone to keep them"
+    said = "lacks the other zones of two.su2; leave out --zone to keep them"
     assert said in capsys.readouterr().err
     assert run(["convert", "two.su2", "second.su2", "--zone", "2"]) == 0
-    assert "second.su2 will have zone 2 alone" in capsys.readouterr().err
+    assert "second.su2 gets only the mesh of zone 2" in capsys.readouterr().err
     assert run(["convert", "two.su2b", "second.vtu", "--zone", "2"]) == 0
     assert len(sv.read("second.vtu").points) == 5
     assert "leave out --zone and write a .su2b file to keep them" in capsys.readouterr().err
@@ -144,19 +144,16 @@ HALO = "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
     ("more", "lost"),
     [
         ("", ""),
-        (FFD, "its FFD boxes"),
-        ("NPERIODIC= 0\nANGLE= 1\n", "its other sections (NPERIODIC, ANGLE)"),
-        (FFD + HALO, "its halo (SEND_RECEIVE; its cells are as any others now) and its FFD boxes"),
+        (FFD, "the FFD boxes"),
+        ("NPERIODIC= 0\nANGLE= 1\n", "the other sections (NPERIODIC, ANGLE)"),
+        (FFD + HALO, "the halo (SEND_RECEIVE; its cells are ordinary cells now) and the FFD boxes"),
     ],
 )
 def test_convert_and_run_say_exactly_what_a_vtu_file_loses(square, capsys, more, lost):
     text = Path("mesh.su2").read_text() + more
     Path("mesh.su2").write_text(text.replace("NMARK= 5", f"NMARK= {5 + text.count('SEND_TO')}"))
     assert run(["convert", "mesh.su2", "out.vtu"]) == 0
-    told = (
-        f"slideviz: warning: out.vtu will not have {lost} of mesh.su2; write a .su2 file to keep "
-        "them\n"
-    )
+    told = f"slideviz: warning: out.vtu lacks {lost} of mesh.su2; write a .su2 file to keep them\n"
     assert capsys.readouterr().err == (told if lost else "")
     assert run(["run", "square.cfg", "-q", "--steps", "1", "-o", "out.vtu"]) == 0
     assert (told in capsys.readouterr().err) is bool(lost)
@@ -166,7 +163,7 @@ def test_convert_says_once_that_other_zones_are_lost(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     Path("two.su2b").write_bytes(packed([TWO_D, TWO_D]))
     assert run(["convert", "two.su2b", "second.vtu", "--zone", "2"]) == 0
-    assert capsys.readouterr().err.count("its other zones") == 1
+    assert capsys.readouterr().err.count("the other zones") == 1
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtkhdf"])

@@ -265,10 +265,10 @@ def test_a_node_out_of_place_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("SEND_TO= -1", "SEND_TO= -2", "of another partition"),
+        ("SEND_TO= -1", "SEND_TO= -2", "belong to another partition"),
         ("SEND_TO= -1\n1 0 1\n", "SEND_TO= -1\n1 9 1\n", "a node receives twice"),
-        ("SEND_TO= -1\n1 0 1\n", "SEND_TO= -1\n1 99999 1\n", "are no `1 node transform`"),
-        ("SEND_TO= -1\n1 0 1\n", "SEND_TO= -1\n1 0\n", "are no `1 node transform`"),
+        ("SEND_TO= -1\n1 0 1\n", "SEND_TO= -1\n1 99999 1\n", "are not `1 node transform`"),
+        ("SEND_TO= -1\n1 0 1\n", "SEND_TO= -1\n1 0\n", "are not `1 node transform`"),
     ],
 )
 def test_markers_that_tie_nothing_are_told_and_kept(tmp_path, old, new, words):

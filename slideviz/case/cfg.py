@@ -20,7 +20,7 @@ from slideviz.errors import CaseError, nearest, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
-_FEW = 3  # most lines that are no key of a file that has none, but may still be a case file
+_FEW = 3  # most lines without a key that a file may have and still be a case file
 _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
 

@@ -197,7 +197,7 @@ def parse_rows(
 
 
 def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArray:
-    """Return the numbers in the lines, (m, 1 + d); CaseError if a line is no row of numbers."""
+    """Return the numbers in the lines, (m, 1 + d); CaseError if a line is not a row of numbers."""
     if not any(line.strip() for line in lines):
         raise CaseError(f"{path}: the file lists no node; expected lines {columns.heading(dim)}")
     try:

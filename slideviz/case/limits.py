@@ -312,7 +312,7 @@ def quality(
     ------
     MeshError
         The mesh has no cells or unusable ones, coordinates too large, or the reference is another
-        mesh. With ``derivative`` also: a point is no number, or the reference has cells without a
+        mesh. With ``derivative`` also: a point is not finite, or the reference has cells without a
         positive volume.
     CaseError
         The metric is unknown, the exponent below 1, or a limit is wrong, or compares with the

@@ -55,7 +55,7 @@ def film_kind(file: Path) -> str:
     """Return the kind of a film by its name: ".mp4", ".gif", or ".png" for numbered pictures.
 
     ".png" is that of a folder, or of a name with one number such as ``step_%03d.png``. Raises
-    SlidevizError if the name is none of these.
+    SlidevizError if the name is not one of these.
     """
     suffix = file.suffix.lower()
     if file.is_dir() or not (suffix or file.exists()):

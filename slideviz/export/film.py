@@ -289,7 +289,7 @@ def require_pair_width(size: tuple[int, int]) -> None:
     if width < _NARROWEST:
         least = size[0] + 2 * (_NARROWEST - width)
         raise SlidevizError(
-            f"{size[0]}x{size[1]} pixels are too narrow for two runs beside each other; take "
+            f"{size[0]}x{size[1]} pixels are too narrow for two runs side by side; take "
             f"{least + least % 2} or more in width, or less in height"
         )
 

@@ -206,7 +206,7 @@ def section(
     """
     require_picture_name(Path(path))
     if (at is None) == (span is None):
-        raise CaseError("give either a section or a span, as in section(path, mesh, span=0.5)")
+        raise CaseError("give either a section or a span, e.g. section(path, mesh, span=0.5)")
     if at is None:
         base = reference or mesh
         walls = find_walls(base, case, find_periods(base, case), between)

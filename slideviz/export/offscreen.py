@@ -157,4 +157,4 @@ def display_fault() -> str:
     ]
     if not named:
         return "neither DISPLAY nor WAYLAND_DISPLAY is set"
-    return f"{' and '.join(named)}: no server answers there, or it does not let you in"
+    return f"{' and '.join(named)}: no server answers there, or it refuses the connection"

@@ -56,7 +56,9 @@ def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Pat
 def require_vector(session: Session, file: Path) -> None:
     """Raise SlidevizError if a session cannot be drawn as SVG or PDF, or not in this file."""
     if file.suffix.lower() not in SUFFIXES:
-        raise SlidevizError(f"{file}: drawn as lines are {', '.join(SUFFIXES)}; end the name so")
+        raise SlidevizError(
+            f"{file}: drawn as lines are {', '.join(SUFFIXES)}; end the name with one of these"
+        )
     mesh = session.mesh
     if mesh is None or mesh.dim != 2:
         raise SlidevizError(f"{file}: only pictures of 2D meshes can be SVG or PDF; take PNG")

@@ -244,8 +244,8 @@ def convert(
     if warn is not None:
         if alone and mesh.origin.ending == row.ending:
             warn(
-                f"{target} will have zone {mesh.zone} alone, and of {mesh.name} nothing but that "
-                "mesh: leave out --zone to keep FFD boxes and the rest"
+                f"{target} gets only the mesh of zone {mesh.zone} of {mesh.name}; leave out --zone "
+                "to keep FFD boxes and other zones"
             )
         warn(warning_of_losses(target, mesh, alone=alone))
     if row.quality and cell_data is None:
@@ -300,7 +300,7 @@ def _read(path: Path, zone: int | None, tick: Tick, file_format: FileFormat | No
         row = format_of(path, file_format)
         if not row.zones and zone not in (None, 1):
             raise path_error(
-                path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
+                path, f"there is no zone {zone}; only SU2 files have zones, so leave it out"
             )
         if not row.reader:
             raise path_error(

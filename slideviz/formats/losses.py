@@ -17,8 +17,8 @@ from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.terms import FileFormat
 
-OTHER_ZONES = "its other zones"  # what a file of one zone loses
-DIVISION = "its division into zones"  # what a file without zones loses of a mesh of all
+OTHER_ZONES = "the other zones"  # what a file of one zone loses
+DIVISION = "the division into zones"  # what a file without zones loses of a mesh of all
 
 
 def left_out(path: Path, mesh: Mesh) -> str:
@@ -58,7 +58,7 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
             texts = (document.raw[a:b] for a, b in document.unknown)
             keys += [text.partition(b"=")[0].strip().decode() for text in texts]
             has_halo = has_halo or bool(document.sends)
-    halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
+    halo = (f"the halo ({SEND_RECEIVE}; its cells are ordinary cells now)",) if has_halo else ()
     lost = lost_of_text(keys, mesh.zones)
     return *halo, *(
         DIVISION if isinstance(mesh, Assembly) and one == OTHER_ZONES else one for one in lost
@@ -73,8 +73,8 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
     unique = dict.fromkeys(key.upper() for key in keys)
     others = ", ".join(key for key in unique if not is_ffd(key.encode()))
     lost = {
-        "its FFD boxes": any(is_ffd(key.encode()) for key in unique),
-        f"its other sections ({others})": bool(others),
+        "the FFD boxes": any(is_ffd(key.encode()) for key in unique),
+        f"the other sections ({others})": bool(others),
         OTHER_ZONES: zones > 1,
     }
     return tuple(words for words, is_lost in lost.items() if is_lost)
@@ -106,7 +106,7 @@ def sentence_of_lost(
     if alone:
         is_enough = format_for(output).zones and list(lost) == [OTHER_ZONES]
         remedy = "leave out --zone" if is_enough else f"leave out --zone and {remedy}"
-    return f"{output} will not have {join_words(lost)} of {name}; {remedy} to keep them"
+    return f"{output} lacks {join_words(lost)} of {name}; {remedy} to keep them"
 
 
 def warning_of_losses(

@@ -85,7 +85,7 @@ class MeshFormat:
     series: str = ""
     """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
     detects: str = ""  # returns whether a file is of this format, by its content: ``detects(path)``
-    term: Term | None = None  # its words as a value of MESH_FORMAT; None where it is none
+    term: Term | None = None  # its words as a value of MESH_FORMAT; None if it is not a value
 
     @property
     def value(self) -> FileFormat | None:
@@ -176,7 +176,7 @@ def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
 def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """Return the format of a file to read: ``file_format``, or by its ending and its content.
 
-    Raises MeshError if the file cannot be read, or is no ordinary file.
+    Raises MeshError if the file cannot be read, or is not an ordinary file.
     """
     from slideviz.formats.source import unreadable
 
@@ -199,7 +199,7 @@ def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
 
 
 def endings(select: Callable[[MeshFormat], object]) -> list[str]:
-    """Return the endings of formats, as ``.su2``, in the order of the table."""
+    """Return the endings of formats, e.g. ``.su2``, in the order of the table."""
     return [row.ending for row in _ROWS if select(row)]
 
 
@@ -224,12 +224,12 @@ def holds_quality(path: Path) -> bool:
 
 
 def usual_ending(mesh: Mesh) -> str:
-    """Return the ending, as ``.su2``, that is proposed for saving a mesh."""
+    """Return the ending, e.g. ``.su2``, that is proposed for saving a mesh."""
     return mesh.origin.ending or ".su2"
 
 
 def readable_patterns() -> str:
-    """Return the patterns of all files that can be read, as ``*.su2 *.su2b``, for a dialog."""
+    """Return the patterns of all files that can be read, e.g. ``*.su2 *.su2b``, for a dialog."""
     import meshio
 
     readable = endings(lambda row: row.reader)

@@ -155,7 +155,7 @@ def _add_block(
 
     group = root.create_group(name)
     _typed(group, "UnstructuredGrid")
-    group.attrs["Index"] = len(root) - 2  # the assembly is no block
+    group.attrs["Index"] = len(root) - 2  # the assembly is not a block
     tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
     partitions = _partitions(cells) if len(cells) > PARTITION else [(nodes, cells)]
     group["NumberOfPoints"] = np.array([len(own) for own, _ in partitions], np.int64)

@@ -131,7 +131,7 @@ _FILE = Menu("file", "&File", entries=(
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
             lambda window: window.exports.wheel(), enabled=in_memory(has_wheel),
-            tip_now=why_not(in_memory(has_wheel), "The mesh is no passage of a wheel: two "
+            tip_now=why_not(in_memory(has_wheel), "The mesh is not a passage of a wheel: two "
                             "boundaries of its only zone must be periodic, by a whole part of a "
                             "turn.")),
     Command("save_case", "Save &case as…",

@@ -91,7 +91,7 @@ class Files(QObject):
     def open_path(self, path: Path, zone: int | None = None) -> None:
         """Ask about unsaved work, then start the job that opens a mesh or case.
 
-        What is no file at all is told without a question.
+        What is not a file at all is told without a question.
         """
         try:
             jobs.require_openable(Path(path))

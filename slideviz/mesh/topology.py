@@ -117,7 +117,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
 
     ``marker_of`` (f,) is for the message. Only sides whose nodes are all on the boundary are
     compared, so that the cost grows with the boundary, not with the volume. Raises MeshError if a
-    facet is no side of any cell.
+    facet is not a side of any cell.
     """
     on_boundary = np.zeros(len(mesh.points), bool)
     on_boundary[facets.ravel()] = True

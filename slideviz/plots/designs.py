@@ -57,7 +57,7 @@ class DesignCurve:
 def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurve]:
     """Return the result ``what`` against a column: a curve per combination of the other columns.
 
-    Failed designs are left out. Texts that are no numbers are in the order of the table.
+    Failed designs are left out. Texts that are not numbers are in the order of the table.
     """
     at = table.columns.index(column)
     place_of, words = _places(table, column)

@@ -252,7 +252,9 @@ class SectionInRun:
 def require_picture_name(file: Path) -> None:
     """Raise CaseError unless a file's suffix is one of `SUFFIXES`."""
     if file.suffix.lower() not in SUFFIXES:
-        raise CaseError(f"{file}: a section is drawn as {', '.join(SUFFIXES)}; end the name so")
+        raise CaseError(
+            f"{file}: a section is drawn as {', '.join(SUFFIXES)}; end the name with one of these"
+        )
 
 
 def section_picture(

@@ -121,7 +121,7 @@ SAMPLES: Mapping[str, SampleKind] = {
         lambda name, size, _: Sample(name, row_mesh(size), row_case()),
     ),
     "turbine-row-3d": SampleKind(
-        "3D: that vane from hub to shroud, twisted; hexahedra and prisms",
+        "3D: the vane from hub to shroud, twisted; hexahedra and prisms",
         "cells, about",
         25_000,
         lambda name, size, _: Sample(name, extruded_row(size), extruded_case()),

@@ -20,7 +20,7 @@ PixelsOf = Callable[[FloatArray], FloatArray]
 
 _MARGIN = 0.015  # margin between a patch and the frame around it, relative to the patch's diagonal
 _CHORD = np.radians(1.0)  # angle between the points of an arc, in radians
-_SIDE = 33  # points of a side that is no straight line
+_SIDE = 33  # points of a side that is not a straight line
 _STEEP = 0.3  # foreshortening of the size's direction below which the mouse cannot drag along it
 _LEAST = 1e-3
 """Least size after a drag, relative to that before; and distance from the largest size there is,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 FADED = 0.3  # opacity of a 2D mesh while sections show the cells on them
-VEIL = 0.65  # opacity of the veil over the halo cells of a 2D mesh: they are no cells of the domain
+VEIL = 0.65  # opacity of the veil over the halo cells of a 2D mesh: they are not in the domain
 GLASS = 0.15  # opacity of boundaries that enclose moving ones, while colors show roles
 SEE_THROUGH = 0.25
 """Opacity of boundaries while the marked cell is inside the mesh, beside none of them."""

@@ -206,7 +206,7 @@ class InPlane(Protocol):
         """Return whether a section of the shape can cut 2D meshes."""
 
     def describe(self, section: Section) -> str:
-        """Return the section in words; "" where it is no line or circle in 2D."""
+        """Return the section in words; "" where it is not a line or circle in 2D."""
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
         """Return the parts of the line or circle inside a box, as polylines (k, 2) each."""

@@ -232,7 +232,7 @@ class Opened:
 
 
 def require_openable(path: Path) -> None:
-    """Raise SlidevizError where a path is no ordinary file, before any question about it."""
+    """Raise SlidevizError where a path is not an ordinary file, before any question about it."""
     try:
         require_regular_file(path, MeshError)
     except (OSError, ValueError) as problem:
@@ -308,7 +308,7 @@ def _precompute(frame: StepFrame) -> None:
 
 
 def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
-    """Return the layers at boundaries; None where a boundary is no side of the cells."""
+    """Return the layers at boundaries; None where a boundary is not a side of the cells."""
     try:
         return walls(mesh, undeformed).of(names)  # of others where roles change
     except MeshError:

@@ -108,7 +108,7 @@ def _layered(frame: StepFrame | None, case: Case) -> list[dict]:
         return []
     layered = frame.walls.layered
     names = [name for name in case.walls(frame.mesh.marker_names) if name in layered]
-    # Flat cells at inflow and outflow are no boundary layers; LAYERS leaves them alone.
+    # Flat cells at inflow and outflow are not boundary layers; LAYERS leaves them alone.
     names = [name for name in names if case.roles.get(name) != "sliding"] or names
     return list(frame.walls.of(names).summary().values())
 

@@ -139,7 +139,7 @@ def leftover_message() -> str:
 
 
 def is_alive(pid: str) -> bool:
-    """Return whether a process with the number ``pid`` runs; False if it is no number."""
+    """Return whether a process with the number ``pid`` runs; False if it is not a number."""
     try:
         os.kill(int(pid), 0)
     except (ValueError, OverflowError, ProcessLookupError):

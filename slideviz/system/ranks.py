@@ -82,8 +82,8 @@ class Ranks(SerialPool):
             from mpi4py import MPI
         except ModuleNotFoundError as problem:
             raise SlidevizError(
-                f"{launched} processes were started, for which mpi4py is needed; install it with "
-                "`pip install 'slideviz[mpi]'`, and MPI, or start one process"
+                f"{launched} processes were started, which needs mpi4py; install it with `pip "
+                "install 'slideviz[mpi]'`, and MPI, or start one process"
             ) from problem
         except (ImportError, RuntimeError) as problem:
             raise SlidevizError(
@@ -243,8 +243,8 @@ class Ranks(SerialPool):
         """Return an error that can be pickled; if a file is missing, it names the rank."""
         if isinstance(problem, FileNotFoundError):
             return MeshError(
-                f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; "
-                "have mesh and results in a folder that all machines see by the same name"
+                f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; put "
+                "mesh and results into a folder that all machines see under the same name"
             )
         try:
             pickle.loads(pickle.dumps(problem))

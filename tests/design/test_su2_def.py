@@ -807,7 +807,7 @@ def test_binary_mesh_is_written_without_boxes_and_says_so(here, capsys):
     config(f"{BOXED}DV_KIND= FFD_SETTING\nMESH_OUT_FORMAT= SU2B\n".replace("out.su2", "out.su2b"))
     assert run(["def", "a.cfg"]) == 0
     assert sv.read("out.su2", file_format="su2b").points.shape == (49, 2)
-    assert "out.su2 will not have its FFD boxes" in capsys.readouterr().err
+    assert "out.su2 lacks the FFD boxes" in capsys.readouterr().err
 
 
 def test_values_of_other_keys_may_hold_any_signs(here):

@@ -305,7 +305,7 @@ def test_what_cannot_be_drawn_or_written_is_told(renderer, tmp_path, cube, monke
         renderer.write(PLAIN, tmp_path / "a.jpg")
     with pytest.raises(SlidevizError, match="folder does not exist"):
         renderer.write(PLAIN, tmp_path / "no" / "a.png")
-    with pytest.raises(SlidevizError, match="end the name so"):
+    with pytest.raises(SlidevizError, match="end the name with one of these"):
         require_vector(renderer.session, Path("a.png"))
     with pytest.raises(SlidevizError, match="only pictures of 2D meshes"):
         require_vector(session_of(cube), Path("a.svg"))
@@ -408,7 +408,7 @@ def test_formats_and_what_they_leave_out(square, cube):
     assert left_out(Path("a.vtu"), plain) == ""
     boxed = replace(plain, zones=2, origin=replace(plain.origin, ffd=b"FFD_NBOX= 1\n"))
     assert left_out(Path("a.vtu"), boxed) == (
-        "a.vtu does not hold its FFD boxes and its other zones."
+        "a.vtu does not hold the FFD boxes and the other zones."
     )
     assert left_out(Path("a.msh"), plain) == "a.msh does not hold the quality of the cells."
     assert "numbers now" in left_out(Path("a.off"), plain)

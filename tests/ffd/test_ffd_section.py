@@ -352,4 +352,4 @@ def test_binary_mesh_loses_its_boxes_and_says_so():
     from slideviz.formats.table import FORMATS
 
     box = regular_box("B", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
-    assert lost_in(FORMATS[".su2b"], with_boxes(square(), [box])) == ["its FFD boxes"]
+    assert lost_in(FORMATS[".su2b"], with_boxes(square(), [box])) == ["the FFD boxes"]

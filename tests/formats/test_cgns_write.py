@@ -218,6 +218,6 @@ def test_the_window_offers_it_for_meshes_of_cgns(passage, tmp_path):
     assert ".cgns" in formats_for(mesh)
     assert left_out(tmp_path / "a.cgns", mesh) == ""
     assert left_out(tmp_path / "a.su2", mesh) == (
-        "a.su2 does not hold other contents of the CGNS file, such as its zones and solutions."
+        "a.su2 does not hold other contents of the CGNS file, such as zones and solutions."
     )
     assert ".cgns" not in formats_for(cube(4))

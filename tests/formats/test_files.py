@@ -464,7 +464,7 @@ def test_unknown_endings(tmp_path, name):
 def test_only_su2_has_zones(tmp_path):
     path = save(tmp_path, GMSH_22, "grid.msh")
     assert len(read(path, zone=1).cells) == 3
-    with pytest.raises(MeshError, match="there is no zone 2, for only SU2 files have zones; leave"):
+    with pytest.raises(MeshError, match="there is no zone 2; only SU2 files have zones, so leave"):
         read(path, zone=2)
 
 
@@ -640,7 +640,7 @@ def test_what_meshio_cannot_write_of_a_mesh_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(meshio, "write", fails)
     with pytest.raises(
         MeshError,
-        match=r"meshio's writer of vtk fails on this mesh \(AssertionError\), which is",
+        match=r"meshio's writer of vtk fails on this mesh \(AssertionError\), but the mesh",
     ):
         write(tmp_path / "out.vtk", mesh)
 

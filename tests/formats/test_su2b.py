@@ -163,7 +163,7 @@ def test_the_content_tells_where_the_ending_does_not(tmp_path):
         assert same(read(stored(tmp_path, packed([TWO_D]), name)), made(TWO_D))
     write(tmp_path / "out.txt", made(TWO_D), file_format="su2b")
     assert (tmp_path / "out.txt").read_bytes() == packed([TWO_D])
-    with pytest.raises(MeshError, match="this is no SU2 binary mesh"):
+    with pytest.raises(MeshError, match="this is not an SU2 binary mesh"):
         read(stored(tmp_path, b"NDIME= 2\n", "mesh.su2"), file_format="su2b")
 
 
@@ -222,7 +222,7 @@ def test_all_zones_are_converted_or_the_one_that_is_asked_for(tmp_path):
     told = []
     convert(path, tmp_path / "out.vtu", warn=told.append)
     assert len(read(tmp_path / "out.vtu").cells) == 2 * len(made(THREE_D).cells)
-    assert "will not have its division into zones" in told[0]
+    assert "lacks the division into zones" in told[0]
 
 
 # Mistakes ------------------------------------------------------------------------------------
@@ -241,9 +241,9 @@ POINTS = LIST + 11 * 8
 MARKERS = POINTS + 8 + 5 * 24
 NAME = MARKERS + 4
 MISTAKES = [
-    (WHOLE[:3], "byte 0: this is no SU2 binary mesh.*not with 08 00 00"),
+    (WHOLE[:3], "byte 0: this is not an SU2 binary mesh.*not with 08 00 00"),
     (b"", "byte 0: .*not with nothing"),
-    (change(WHOLE, 0, "<i", 7), "byte 0: this is no SU2 binary mesh"),
+    (change(WHOLE, 0, "<i", 7), "byte 0: this is not an SU2 binary mesh"),
     (change(WHOLE, 4, "<i", 0), "byte 4: the number of zones is 0, but at least 1"),
     (change(WHOLE, 4, "<i", 2), "the number of zone 2 .* the file ends at byte"),
     (change(WHOLE, 8, "<i", 2), "byte 8: zone 1 has the number 2"),
@@ -279,8 +279,8 @@ MISTAKES = [
     ),
     (change(WHOLE, MARKERS, "<i", -1), "the number of markers is -1, but must not be negative"),
     (change(WHOLE, MARKERS, "<i", 10**6), "the markers .1000000 times 49 bytes. should be here"),
-    (change(WHOLE, NAME, "33s", b"\0"), "the marker name '' is empty or no printable"),
-    (change(WHOLE, NAME, "33s", b"\xff"), "is empty or no printable UTF-8"),
+    (change(WHOLE, NAME, "33s", b"\0"), "the marker name '' is empty or not printable"),
+    (change(WHOLE, NAME, "33s", b"\xff"), "is empty or not printable UTF-8"),
     (change(WHOLE, NAME, "33s", b"a" * 33), "is not ended by a zero"),
     (change(WHOLE, NAME, "33s", b"rest"), "marker rest occurs a second time"),
     (change(WHOLE, NAME, "33s", b"send_receive"), "cannot have send_receive markers .halos."),
@@ -323,7 +323,7 @@ def test_damaged_files_are_read_or_refused(tmp_path):
 
 def test_zones_that_are_not_there_are_told(tmp_path):
     path = stored(tmp_path, packed([TWO_D, THREE_D]))
-    with pytest.raises(MeshError, match="there is no zone 3, for the file has the zones 1 to 2"):
+    with pytest.raises(MeshError, match="there is no zone 3; the file has the zones 1 to 2"):
         read(path, zone=3)
     with pytest.raises(MeshError, match="there is no such file"):
         read(tmp_path / "none.su2b")

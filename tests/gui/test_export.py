@@ -154,7 +154,7 @@ def test_sizes_in_pixels_and_on_paper_are_offered_again_and_broken_ones_are_not(
         assert usual.picture_options.background == "white"
     from slideviz.export.vector import require_vector
 
-    with pytest.raises(SlidevizError, match="end the name so"):
+    with pytest.raises(SlidevizError, match="end the name with one of these"):
         require_vector(renderer.session, Path("a.png"))
 
 

@@ -61,12 +61,17 @@ FAULTS = {
     "no equals": ("NPOIN= 6\n", "NPOIN 6\n", 20, "has no line NPOIN="),
     "NDIME 1": ("NDIME= 2", "NDIME= 1", 1, "NDIME= 1 is not possible; write 2 or 3"),
     "NDIME 4": ("NDIME= 2", "NDIME= 4", 1, "NDIME= 4 is not possible"),
-    "NDIME empty": ("NDIME= 2", "NDIME=", 1, "NDIME=  is wrong: a whole number"),
-    "NDIME two": ("NDIME= 2", "NDIME= two", 1, "NDIME= two is wrong: a whole number, not negat"),
-    "NDIME twice": ("NELEM= 3", "NDIME= 2\nNELEM= 3", 2, r"a second time \(first on line 1\)"),
-    "NELEM negative": ("NELEM= 3", "NELEM= -3", 2, "NELEM= -3 is wrong: a whole number, not neg"),
-    "NELEM fraction": ("NELEM= 3", "NELEM= 3.5", 2, "NELEM= 3.5 is wrong"),
-    "NELEM endless": ("NELEM= 3", f"NELEM= {'9' * 5000}", 2, r"NELEM= 9+\.\.\. is wrong"),
+    "NDIME empty": ("NDIME= 2", "NDIME=", 1, "NDIME=  is not a count; write a whole number"),
+    "NDIME two": ("NDIME= 2", "NDIME= two", 1, "NDIME= two is not a count; write a whole number"),
+    "NDIME twice": ("NELEM= 3", "NDIME= 2\nNELEM= 3", 2, r"occurs twice \(first on line 1\)"),
+    "NELEM negative": (
+        "NELEM= 3",
+        "NELEM= -3",
+        2,
+        "NELEM= -3 is not a count; write a whole number",
+    ),
+    "NELEM fraction": ("NELEM= 3", "NELEM= 3.5", 2, "NELEM= 3.5 is not a count"),
+    "NELEM endless": ("NELEM= 3", f"NELEM= {'9' * 5000}", 2, r"NELEM= 9+\.\.\. is not a count"),
     "NELEM huge": ("NELEM= 3", "NELEM= 1000000000000", 6, "only 3 elements precede this line"),
     "NPOIN huge": ("NPOIN= 6", "NPOIN= 1000000000000", 13, "only 6 points precede this line"),
     "NELEM 0": ("NELEM= 3\n9 0 1 4 3 0\n5 1 2 5 1\n5 1 5 4 2", "NELEM= 0", 2, "NELEM= 0 leaves"),
@@ -85,17 +90,17 @@ FAULTS = {
         14,
         r"the marker name 'a\\x01b' has control characters",
     ),
-    "same name": ("TAG= lower", "TAG= upper", 18, r"marker upper stands a second time .*line 14"),
+    "same name": ("TAG= lower", "TAG= upper", 18, r"marker upper occurs twice .*line 14"),
     "no TAG": ("MARKER_TAG= lower\n", "", 14, "MARKER_ELEMS= has no MARKER_TAG= before it"),
     "no ELEMS": ("MARKER_ELEMS= 1\n3 3 4\n", "", 18, "marker upper is not followed by MARKER_ELEM"),
     "ELEMS lost": (
         "MARKER_ELEMS= 2\n",
         "",
         15,
-        "numbers stand here after MARKER_TAG= lower, where",
+        "numbers follow MARKER_TAG= lower, where",
     ),
-    "NMARK numbers": ("NMARK= 2\n", "NMARK= 2\n1 2\n", 14, "numbers stand here after NMARK= 2"),
-    "NDIME numbers": ("NDIME= 2\n", "NDIME= 2\n1 2\n", 2, "numbers stand here after NDIME= 2, whe"),
+    "NMARK numbers": ("NMARK= 2\n", "NMARK= 2\n1 2\n", 14, "numbers follow NMARK= 2"),
+    "NDIME numbers": ("NDIME= 2\n", "NDIME= 2\n1 2\n", 2, "numbers follow NDIME= 2, whe"),
     "node too large": (
         "5 1 2 5 1",
         "5 1 2 6 1",
@@ -211,10 +216,10 @@ ZONE_FAULTS = {
         "NZONE= 3 needs the lines IZON",
     ),
     "more": (f"NZONE= 1\nIZONE= 1\n{SQUARE}IZONE= 2\n{SQUARE}", 1, "but the file has 1, 2"),
-    "twice": (f"NZONE= 2\nIZONE= 1\n{SQUARE}IZONE= 1\n{SQUARE}", 23, r"second time .*on line 2\)"),
+    "twice": (f"NZONE= 2\nIZONE= 1\n{SQUARE}IZONE= 1\n{SQUARE}", 23, r"occurs twice .*on line 2\)"),
     "no NZONE": (f"IZONE= 1\n{SQUARE}IZONE= 2\n{SQUARE}", 22, "put NZONE= 2 on the first line"),
-    "no number": (f"NZONE= 2\nIZONE= a\n{SQUARE}IZONE= 2\n{SQUARE}", 2, "IZONE= a is wrong"),
-    "two meshes": (SQUARE + SQUARE, 21, r"NDIME= stands a second time \(first on line 1\)"),
+    "no number": (f"NZONE= 2\nIZONE= a\n{SQUARE}IZONE= 2\n{SQUARE}", 2, "IZONE= a is not a count"),
+    "two meshes": (SQUARE + SQUARE, 21, r"NDIME= occurs twice \(first on line 1\)"),
 }
 
 
@@ -228,9 +233,9 @@ def test_faulty_zones(tmp_path, fault):
 
 @pytest.mark.parametrize(("zone", "has"), [(0, "the zones 1 to 2"), (3, "the zones 1 to 2")])
 def test_zone_that_is_not_there(tmp_path, zone, has):
-    with pytest.raises(MeshError, match=f"there is no zone {zone}, for the file has {has}; choose"):
+    with pytest.raises(MeshError, match=f"there is no zone {zone}; the file has {has}; choose"):
         read(save(tmp_path, ZONES), zone)
-    with pytest.raises(MeshError, match="there is no zone 2, for the file has one zone"):
+    with pytest.raises(MeshError, match="there is no zone 2; the file has one zone"):
         read(save(tmp_path, SQUARE), 2)
 
 
@@ -287,7 +292,7 @@ def test_binary(tmp_path):
 
 @pytest.mark.parametrize("text", ["hello\n", "% a comment\n", "A= 1\n", "1 2 3\n", "\xff" * 99])
 def test_other_text(tmp_path, text):
-    with pytest.raises(MeshError, match="this is no SU2 mesh, for it has none of NDIME=, NELEM="):
+    with pytest.raises(MeshError, match="this is not an SU2 mesh: NDIME=, NELEM= and NPOIN= are"):
         read(save(tmp_path, text.encode("latin-1")))
 
 

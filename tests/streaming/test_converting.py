@@ -51,7 +51,7 @@ def test_a_text_becomes_the_binary_that_memory_gives(capsys, kind, zones, more):
     odd_mesh(Path("mesh.su2"), kind, zones)
     code, _, err, whole = check_alike(capsys, "mesh.su2", ".su2b", *more)
     assert code == 0
-    assert "will not have its FFD boxes" in err
+    assert "lacks the FFD boxes" in err
     assert ("leave out --zone and write a .su2 file to keep them" in err) is bool(more)
     Path("mesh.su2b").write_bytes(whole)
     assert check_alike(capsys, "mesh.su2b", ".su2")[0] == 0
@@ -63,7 +63,7 @@ def test_a_text_becomes_the_binary_that_memory_gives(capsys, kind, zones, more):
 def test_a_binary_of_any_width_and_byte_order_becomes_a_text(capsys, width, order, more):
     Path("two.su2b").write_bytes(packed([THREE_D, THREE_D], width, order))
     code, _, err, _ = check_alike(capsys, "two.su2b", ".su2", *more)
-    said = "will not have its other zones of two.su2b; leave out --zone to keep them"
+    said = "lacks the other zones of two.su2b; leave out --zone to keep them"
     assert (code, said in err) == (0, bool(more))
 
 

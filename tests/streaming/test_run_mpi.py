@@ -204,7 +204,7 @@ def test_errors_of_other_ranks_can_be_raised():
         Path("nowhere").read_bytes()
     told = here._portable(gone.value)
     assert isinstance(told, MeshError)
-    assert f"nowhere: not there for rank 3 on {os.uname().nodename}; have mesh and" in str(told)
+    assert f"nowhere: not there for rank 3 on {os.uname().nodename}; put mesh and" in str(told)
 
     class OddError(Exception):
         def __init__(self, one, two):
@@ -269,7 +269,7 @@ def test_what_several_processes_cannot_share_is_told_once(square, monkeypatch, c
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     assert run(["run", "square.cfg", "--stream"]) == 1
     said = capfd.readouterr().err
-    assert "4 processes were started, for which mpi4py is needed; install it with `pip" in said
+    assert "4 processes were started, which needs mpi4py; install it with `pip" in said
     monkeypatch.setitem(sys.modules, "mpi4py", ModuleType("mpi4py"))  # without its MPI
     assert run(["run", "square.cfg", "--stream"]) == 1
     said = capfd.readouterr().err

@@ -194,7 +194,7 @@ def test_what_a_binary_mesh_has_no_place_for_is_told(tmp_path, capsys):
         assert run([*call, *more]) in (0, 3)
         told.append([one for one in capsys.readouterr().err.splitlines() if "warning" in one])
     assert told[0] == told[1]
-    assert "will not have its FFD boxes, its other sections (UNKNOWN) and its" in told[0][0]
+    assert "lacks the FFD boxes, the other sections (UNKNOWN) and the" in told[0][0]
     text = (tmp_path / "mesh.su2").read_text().replace("x_m", "x" * 33)
     (tmp_path / "mesh.su2").write_text(text)
     for more in ([], ["--stream"]):

@@ -38,7 +38,7 @@ KINDS = {
     r"misses its own control nodes": "a system that was not solved",
     r"equations of linear elasticity were not solved": "elasticity not solved",
 }
-"""What a message has, and the kind of the refusal; all others are no refusals of such runs."""
+"""What a message has, and the kind of the refusal; all others are not refusals of such runs."""
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def around(rng: Rng) -> Made:
 
 
 def special(rng: Rng) -> Made:
-    """Return one of the meshes that are no plain grid."""
+    """Return one of the meshes that are not plain grids."""
     which = rng.choice(["wedge", "plate", "sphere", "channel"])
     if which == "wedge":
         angle = rng.uniform(20, 100)

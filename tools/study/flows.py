@@ -1,4 +1,4 @@
-"""Meshes of the contest that are no samples: airfoils by formula, and bodies in outer flows."""
+"""Meshes of the contest that are not samples: airfoils by formula, and bodies in outer flows."""
 
 from __future__ import annotations
 

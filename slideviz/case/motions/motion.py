@@ -248,7 +248,7 @@ def _is_number(value: object) -> bool:
 
 
 def without_brackets(words: list[Word]) -> list[Word]:
-    """Return the words that are no brackets."""
+    """Return the words that are not brackets."""
     return [word for word in words if not (word.is_sign("(") or word.is_sign(")"))]
 
 

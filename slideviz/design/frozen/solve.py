@@ -86,7 +86,7 @@ class MeasuredSystem:
 
         Warns with ConditionWarning if the solution is not accurate to `TRUSTED`.
         """
-        if not self._refined:  # the error of a field is no measure for a gradient
+        if not self._refined:  # the error of a field is not a measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
         weights = self(right, data, of_weights=True)
         worst = float(self.error_estimate.max(initial=0.0))

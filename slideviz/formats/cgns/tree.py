@@ -49,7 +49,7 @@ def cgns_file(path: Path) -> Iterator[Node]:
         reason = " ".join(str(problem).split())[:160] or type(problem).__name__
         raise path_error(
             path,
-            f"cannot be read as CGNS: {reason}; the file is damaged or no CGNS file: export it "
+            f"cannot be read as CGNS: {reason}; the file is damaged or not a CGNS file: export it "
             "again",
         ) from problem
 
@@ -72,7 +72,7 @@ class Node:
 
     @property
     def label(self) -> str:
-        """Return its kind, as ``Zone_t``; "" if it has none."""
+        """Return its kind, e.g. ``Zone_t``; "" if it has none."""
         return _words(self.group.attrs.get("label", b""))
 
     def fault(self, message: str) -> MeshError:
@@ -127,7 +127,7 @@ class Node:
     def text(self) -> str:
         """Return its value as text, without the spaces and zero bytes at its end.
 
-        Raises MeshError if the value is no text, or there is none.
+        Raises MeshError if the value is not a text, or there is none.
         """
         data = self.value()
         if data.dtype.kind not in "iuS":

@@ -367,7 +367,7 @@ def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> C
     """Return the faces of a structured zone in the range of indices ``corners`` (2, d), from 1.
 
     ``where`` is the GridLocation of the indices. Empty for a range of vertices that is a line or a
-    point; MeshError if it is no face.
+    point; MeshError if it is not a face.
     """
     low, high = corners
     flat = np.flatnonzero(low == high)
@@ -382,8 +382,8 @@ def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> C
         return Cells.from_blocks([])  # a line or a point, as of a degenerate boundary
     if len(flat) != 1:
         raise node.fault(
-            f"goes from {tuple(low.tolist())} to {tuple(high.tolist())}, which is no "
-            f"{'face' if zone.dim == 3 else 'edge'} of the zone; export the mesh again"
+            f"goes from {tuple(low.tolist())} to {tuple(high.tolist())}, which is not "
+            f"{'a face' if zone.dim == 3 else 'an edge'} of the zone; export the mesh again"
         )
     axis = int(flat[0])
     zone.nodes_at(node, corners)

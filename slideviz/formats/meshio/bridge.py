@@ -264,8 +264,8 @@ def require_own_folder(path: Path) -> None:
             if found.parent != Path(os.path.realpath(path.parent)):
                 raise path_error(
                     one,
-                    f"names a file of another folder, {printable(name)!r}, which is not read; "
-                    "put it beside this one, or export the mesh as one file",
+                    f"names a file of another folder, {printable(name)!r}, which is not read; put "
+                    "it into the same folder, or export the mesh as one file",
                 )
             if found.is_file() and found not in seen:
                 waiting.append(found)

@@ -138,8 +138,8 @@ def _fault(path: Path, name: str, problem: MeshError) -> MeshError:
     said = str(problem.__cause__) or type(problem.__cause__).__name__
     return path_error(
         path,
-        f"cannot be written: meshio's writer of {name} fails on this mesh ({said[:80]}), which is "
-        "no fault of the mesh; use another format, such as .vtu",
+        f"cannot be written: meshio's writer of {name} fails on this mesh ({said[:80]}), but the "
+        "mesh is valid; use another format, such as .vtu",
     )
 
 

@@ -2,7 +2,7 @@
 
 The result is that of Python's `float`. Method: product with a power of five of 128 bits (D. Lemire,
 Number Parsing at a Gigabyte per Second, 2021). Where that does not decide (one number in billions),
-and for words that are no plain decimal numbers, no result is returned: the caller uses Python.
+and for words that are not plain decimal numbers, no result is returned: the caller uses Python.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def ends(code):  # type: ignore[no-untyped-def]
 def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
     """Write the bits of the number that begins at ``text[at]`` to ``bits[k]``; return its end.
 
-    The result is -1, and nothing is written, if it is no plain number or `nearest_bits` is
+    The result is -1, and nothing is written, if it is not a plain number or `nearest_bits` is
     undecided.
     ``text`` (b,) uint8: the text; its last byte is a line break.
     ``at``: index of the first byte of the number.

@@ -77,13 +77,13 @@ def find_bounds(
 ) -> tuple[Bounds, ...]:
     """Return the lines of the zones of a file: of all, or of the one of a number, from 1.
 
-    Raises MeshError if this is no SU2 mesh, there is no such zone, or the zones are not numbered 1,
-    2, and so on.
+    Raises MeshError if this is not an SU2 mesh, there is no such zone, or the zones are not
+    numbered 1, 2, and so on.
     """
     if not any(section.key in KNOWN for section in sections):
         raise MeshError(
-            f"{lines.name}: this is no SU2 mesh, for it has none of NDIME=, NELEM= and NPOIN=; "
-            "choose the mesh file, or give the file the ending of its format"
+            f"{lines.name}: this is not an SU2 mesh: NDIME=, NELEM= and NPOIN= are missing; choose "
+            "the mesh file, or give the file the ending of its format"
         )
     heads = _zone_heads(lines, sections)
     zones = max(len(heads), 1)
@@ -96,7 +96,7 @@ def find_bounds(
 
 
 def chosen_zones(name: str, number: int | None, zones: int) -> range:
-    """Return the numbers of a file's zones, or ``number`` alone; MeshError if it is none of them.
+    """Return the numbers of a file's zones, or ``number`` alone; MeshError if there is none.
 
     ``name`` is that of the file, for the message.
     """
@@ -105,7 +105,7 @@ def chosen_zones(name: str, number: int | None, zones: int) -> range:
     if not 1 <= number <= zones:
         has = "one zone" if zones == 1 else f"the zones 1 to {zones}"
         raise MeshError(
-            f"{name}: there is no zone {number}, for the file has {has}; choose one of these"
+            f"{name}: there is no zone {number}; the file has {has}; choose one of these"
         )
     return range(number, number + 1)
 
@@ -136,8 +136,8 @@ def _zone_heads(lines: Lines, sections: list[KeywordBlock]) -> dict[int, Keyword
         if number in heads:
             raise lines.error(
                 section.line,
-                f"IZONE= {number} stands a second time (first on line {heads[number].line + 1}); "
-                "number the zones one by one",
+                f"IZONE= {number} occurs twice (first on line {heads[number].line + 1}); number "
+                "the zones one by one",
             )
         heads[number] = section
     if not totals:
@@ -171,12 +171,12 @@ def misspelt(sections: list[KeywordBlock], key: str) -> str:
 
 
 def count_of(lines: Lines, section: KeywordBlock) -> int:
-    """Return the number after the keyword, ignoring further words; MeshError if it is no count."""
+    """Return the count after the keyword, ignoring further words; MeshError if it is wrong."""
     word = (section.value.split() or [b""])[0]
     if not _COUNT.fullmatch(word):
         raise lines.error(
             section.line,
-            f"{section.key}= {show(word)} is wrong: a whole number, not negative, is needed",
+            f"{section.key}= {show(word)} is not a count; write a whole number from 0",
         )
     return int(word)
 
@@ -193,7 +193,7 @@ class Piece:
 
     begin: int
     end: int
-    """`begin`, `end`: its bytes, whole lines; those that are no rows are blank, comments or
+    """`begin`, `end`: its bytes, whole lines; those that are not rows are blank, comments or
     text."""
     line: int  # number of its first line in the file
     row: int

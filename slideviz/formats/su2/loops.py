@@ -1,8 +1,8 @@
 """Compiled loops over the text of SU2 files, which find lines, read numbers and write rows.
 
 They read plain rows only. A row with anything else (a sign before a node, a wrong type, a word that
-is no number, a number that is not finite) is *left*: only listed, for `su2.numbers` to read it in
-Python.
+is not a number, a number that is not finite) is *left*: only listed, so that `su2.numbers` reads it
+in Python.
 
 ``text`` is an array of bytes, (b,) uint8, that ends with a line break; ``at`` is an index into it.
 """
@@ -185,7 +185,7 @@ def _next_word(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _type_of(text, at):  # type: ignore[no-untyped-def]
-    """Return the number that a row begins with: 0 without digits, 256 if it is no type."""
+    """Return the number that a row begins with: 0 without digits, 256 if it is not a type."""
     at += text[at] == 43
     value = np.int64(0)
     while 48 <= text[at] <= 57:
@@ -287,7 +287,7 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     """Read the rows of elements (type, nodes, perhaps an index, ignored) into types and nodes.
 
     Returns the number of rows (-1 if more than m; if it is not m, the file was changed), and of
-    rows left. ``text`` (b,) uint8: whole lines; those that are no rows are skipped.
+    rows left. ``text`` (b,) uint8: whole lines; those that are not rows are skipped.
     ``dim``, ``n_points``: dimension that elements must have; number that nodes must be below.
     ``types`` (m,) uint8, ``nodes`` (k,) int64: receive types and nodes.
     ``odd`` (m, 3) int64: receives for each row left its number, the first byte of its line, and the
@@ -336,7 +336,7 @@ def _ends_row(text, at):  # type: ignore[no-untyped-def]
 def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def]
     """Read the rows of points (coordinates, perhaps one or two indices) into ``points``.
 
-    Returns as `cell_block`. ``text`` (b,) uint8: whole lines; those that are no rows are skipped.
+    Returns as `cell_block`. ``text`` (b,) uint8: whole lines; those that are not rows are skipped.
     ``first``: number of the first row among all points.
     ``points`` (m, d) uint64: receives the bits of the coordinates.
     ``extra`` (2,) int64: updated by the rows that are not left: ``[0]`` becomes the largest count

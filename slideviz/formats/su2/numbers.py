@@ -93,7 +93,7 @@ def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines
 def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> tuple[int, IntArray]:
     """Return type and nodes of the element on a row; ``index`` is the number of its line.
 
-    Raises MeshError if it has a wrong type, dimension or nodes, or a word that is no whole number.
+    Raises MeshError if it has a wrong type, dimension or nodes, or a word that is not an integer.
     """
     numbers = _numbers(lines, index, row, np.int64)
     words = row.split()
@@ -149,7 +149,7 @@ def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
 
 
 def _parse(text: bytes, kind: type) -> NDArray | None:
-    """Return the numbers (w,) of a text, correctly rounded, or None if a word is none."""
+    """Return the numbers (w,) of a text, correctly rounded, or None if a word is not a number."""
     # NumPy takes a lone sign for 0, or joins it to the next word.
     if kind is np.int64 and (b"-" in text or b"+" in text) and _LONE_SIGN.search(text):
         return None

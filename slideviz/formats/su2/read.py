@@ -33,7 +33,9 @@ def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
     receives = [one for one in zone.sends if one.domain == b"-1"]
     tables = [_table(lines, part, len(mesh.points)) for part in (sends, receives)]
     if any(t is None for t in tables) or len(zone.sends) != len(sends) + len(receives):
-        return None, (_unused("their rows are no `1 node transform`, or of another partition"),)
+        return None, (
+            _unused("their rows are not `1 node transform`, or they belong to another partition"),
+        )
     donors, receivers = map(np.asarray, tables)
     if len(donors) != len(receivers):
         return None, (_unused(f"{len(donors)} nodes send and {len(receivers)} receive"),)
@@ -44,8 +46,8 @@ def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
 
 def _unused(why: str) -> str:
     return (
-        f"the SEND_RECEIVE markers tie no halo to its donors ({why}); they are kept, but the nodes "
-        "are treated like all others, so make the halo anew"
+        f"the SEND_RECEIVE markers are inconsistent ({why}); they are kept, but the halo is "
+        "ignored: rebuild it"
     )
 
 
@@ -108,8 +110,8 @@ def _best(
         worst = int(np.argmax(far))
         return motion, (
             f"{wrong} of {len(far)} halo nodes are not where {name} puts them (node "
-            f"{receivers[worst]} is {far[worst]:.3g} off); they follow their donors from where "
-            "they are, so make the halo anew if the solver needs it exact"
+            f"{receivers[worst]} is {far[worst]:.3g} off); they follow their donors from there; "
+            "rebuild the halo if the solver needs it exact"
         )
     if motion is fitted:
         what = "does not fit its halo" if tries else "is missing"

@@ -145,8 +145,8 @@ class _Walk:
         if rows:
             raise self.lines.error(
                 self.lines.row(rows, 0),
-                f"numbers stand here after {section.key}= {show(section.value)}, where none "
-                "belong; remove the line or restore the keyword before it",
+                f"numbers follow {section.key}= {show(section.value)}, where none belong; remove "
+                "the line or restore the keyword before it",
             )
 
     def _counted(self, section: KeywordBlock, what: str) -> Rows:
@@ -195,8 +195,8 @@ class _Walk:
         if len(matches) > 1:
             raise self.lines.error(
                 matches[1].line,
-                f"{key}= stands a second time (first on line {matches[0].line + 1}); remove one, "
-                "or number the zones with NZONE= and IZONE=",
+                f"{key}= occurs twice (first on line {matches[0].line + 1}); remove one, or number "
+                "the zones with NZONE= and IZONE=",
             )
         return matches[0]
 
@@ -279,8 +279,8 @@ class _Walk:
             if marker.name in seen:
                 raise self.lines.error(
                     marker.line,
-                    f"marker {marker.name} stands a second time (first on line "
-                    f"{seen[marker.name] + 1}); rename or merge them",
+                    f"marker {marker.name} occurs twice (first on line {seen[marker.name] + 1}); "
+                    "rename or merge them",
                 )
             seen[marker.name] = marker.line
         count = count_of(self.lines, head)

@@ -27,7 +27,7 @@ from slideviz.formats.su2.lines import chosen_zones
 NAME_BYTES = 33  # bytes of the name of a marker, padded with zeros
 SEND_RECEIVE = "SEND_RECEIVE"
 """Name of the markers of a halo (in `su2.text`, too), which this format cannot have."""
-_INT = 4  # bytes of the integers that are no counts: numbers of zones and markers, dimension
+_INT = 4  # bytes of the integers that are not counts: numbers of zones and markers, dimension
 MAGIC = {
     np.array(width, f"{order}i4").tobytes(): (width, order) for width in (4, 8) for order in "<>"
 }
@@ -84,7 +84,7 @@ class BinaryFile:
         if head[:_INT] not in MAGIC:
             raise self.error(
                 0,
-                f"this is no SU2 binary mesh, which begins with 4 or 8 in four bytes, not with "
+                "this is not an SU2 binary mesh, which begins with 4 or 8 in four bytes, not with "
                 f"{head[:_INT].hex(' ') or 'nothing'}; give the file the ending of its format",
             )
         self.width, sign = MAGIC[head[:_INT]]
@@ -229,7 +229,7 @@ def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
     except UnicodeDecodeError:
         name = ""
     if not name or not end or not name.isprintable():
-        what = "is not ended by a zero" if not end else "is empty or no printable UTF-8 text"
+        what = "is not ended by a zero" if not end else "is empty or not printable UTF-8 text"
         raise source.error(
             at,
             f"the marker name {text.decode('utf-8', 'backslashreplace')!r} {what}; {NAME_BYTES} "

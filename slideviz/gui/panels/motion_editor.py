@@ -351,7 +351,7 @@ class MotionEditor(QWidget):
     def _radial(self, motion: Motion) -> tuple[float, float, float] | None:
         """Return the radial direction through the centroid of a rotation's target.
 
-        None if the motion is no rotation, or the mesh is 2D or does not repeat about an axis.
+        None if the motion is not a rotation, or the mesh is 2D or does not repeat about an axis.
         """
         turns = "centroid" in motion.stays_at and hasattr(motion, "axis")
         if self.machine is None or self._dim == 2 or not turns:
