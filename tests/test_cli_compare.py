@@ -101,8 +101,9 @@ def test_data_reduction_leaves_its_convergence(square, tmp_path, capsys):
         (["--methods", "ps,pz"], "--methods: 'pz' is not one of none, ps, ds, idw, elastic"),
         (["--periodic", "sometimes"], "--periodic: 'sometimes' is not one of none, periodic"),
         (["--methods", ","], "--methods names none of none, ps"),
-        (["--steps", "1,0"], "--steps: '0' is not a number of steps"),
-        (["--steps", "-2"], "--steps: '-2' is not a number of steps"),
+        (["--steps", "1,0"], "--steps: 0 is too small; expected a whole number from 1 to 9999, or"),
+        (["--steps", "-2"], "--steps: -2 is too small; expected a whole number from 1 to 9999"),
+        (["--steps", "1,10000"], "--steps: 10000 is too large; expected a whole number from 1"),
         (["--steps", " "], "--steps names no number"),
     ],
 )

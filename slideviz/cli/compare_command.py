@@ -114,8 +114,8 @@ def _say(arguments: argparse.Namespace, text: str) -> None:
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
     """Return the combinations that the arguments ask for; CaseError if an item is not valid."""
+    from slideviz.case.keys import KEYS
     from slideviz.study.combinations import (
-        AUTO,
         COMPARED_METHODS,
         combinations,
         wanted_methods,
@@ -142,9 +142,10 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
     if arguments.steps is not None:
         steps = []
         for item in _items(arguments.steps):
-            if item != "auto" and not (item.isdecimal() and int(item) > 0):
-                raise CaseError(f"--steps: {item!r} is not a number of steps, 1 or more, or auto")
-            steps.append(AUTO if item == "auto" else int(item))
+            try:
+                steps.append(KEYS["STEPS"].kind.read(item))
+            except CaseError as problem:
+                raise CaseError(f"--steps: {problem}") from None
         if not steps:
             raise CaseError("--steps names no number; give some, such as 1,5,20")
     return combinations(methods, [mode for mode in PERIODIC_MODES if mode in modes], steps)
