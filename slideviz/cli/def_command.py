@@ -140,7 +140,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     report = run_report(
         case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded, walls=layers
     )
-    advice = advice_for(case, steps[-1].layers, mesh, measured, report["limits"])
+    advice = advice_for(case, steps[-1], mesh, measured, report["limits"])
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": surface.displacer.inside,

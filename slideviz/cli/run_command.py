@@ -142,7 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
             "after": metrics_report(_metrics_of(arguments, done.steps[-1].mesh, found, done.mesh)),
         }
     in_memory = None if streamed else done.mesh
-    advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
+    advice = advice_for(case, done.steps[-1], in_memory, found, report["limits"])
     files = {"mesh": output, CELLS: qualities}
     return report_outcome(arguments, report, files, found, before, folded, advice=advice)
 

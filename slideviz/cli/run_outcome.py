@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.solver.steps import Step
     from slideviz.terms import Quantity
 
 CELLS = "quality of each cell"  # what the summary calls the file of qualities
@@ -179,14 +180,14 @@ def _trial_words(trial: Mapping[str, Any]) -> str:
 
 def advice_for(
     case: Case,
-    layers: float,
+    step: Step | None,
     mesh: Mesh | None = None,
     found: Quality | None = None,
     limits: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """Return what may help against inverted cells or missed limits: remedies, with keys.
 
-    ``layers`` is that of the last ``Step``, ``limits`` those of the report. Without a mesh in
+    ``step`` is the last one, ``limits`` are those of the report. Without a mesh in
     memory, with its quality ``found`` after the run, neither the pitch nor boundaries beside the
     cells are named.
     """
@@ -207,7 +208,7 @@ def advice_for(
         beside = fixed_beside(case, mesh, cells)
         pitch = beyond_pitch(case, mesh)
     folded = found is None or found.inverted > 0
-    every = [remedy.keys for remedy in remedies(case, beside, pitch, layers, folded)]
+    every = [remedy.keys for remedy in remedies(case, beside, pitch, step, folded)]
     if found is not None and not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
         if case.relax == "no":

@@ -143,8 +143,7 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     if run.last is not None:
         beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
     pitch = beyond_pitch(run.case, mesh)
-    layers = run.last_step.layers if run.last_step is not None else 0.0
-    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, layers))
+    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, run.last_step))
     words = (_last_valid_words(run), f"{pitch}." if pitch else "", f"What may help: {helps}.")
     return " ".join(filter(None, words))
 

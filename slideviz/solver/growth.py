@@ -18,6 +18,7 @@ from slideviz.case.motion import ROUNDING
 from slideviz.case.spans import span_ends
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
+from slideviz.solver.remedies import KEEPS_RIMS
 from slideviz.solver.setup import Setup
 from slideviz.system.threads import in_parts
 
@@ -214,7 +215,7 @@ def _off_walls(setup: Setup, mesh: Mesh, points: FloatArray) -> Iterator[_OffWal
         k = int(np.argmax(off))
         if off[k] > least and off[k] > least + wall.bulge:
             names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
-            remedy = "; RIMS= SLIDE keeps such nodes on it"
+            remedy = f"; {KEEPS_RIMS}"
             if rims.bodies is not None:
                 remedy = ", to which it cannot be brought back; move it less"
             yield _OffWall(

@@ -14,8 +14,10 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
+from slideviz.solver.steps import Step
 from slideviz.terms import SLIDES
 
+KEEPS_RIMS = "RIMS= SLIDE keeps such nodes on it"  # the end of a warning of nodes that left a wall
 MOST_NAMES = 2  # most boundaries that a remedy names; of more it has the number
 
 
@@ -31,7 +33,7 @@ def remedies(
     case: Case,
     beside: Sequence[str] = (),
     pitch: str = "",
-    layers: float = 0.0,
+    step: Step | None = None,
     folded: bool = True,
 ) -> tuple[Remedy, ...]:
     """Return the remedies that a case has not tried yet, the most promising first.
@@ -39,7 +41,7 @@ def remedies(
     ``case``: the case of the run.
     ``beside``: fixed boundaries with nodes of inverted cells, from `fixed_beside`.
     ``pitch``: sentence from `beyond_pitch`.
-    ``layers``: of the ``Step`` with inverted cells.
+    ``step``: the one with inverted cells, if it is known.
     ``folded``: whether there are inverted cells: repair is a remedy for these.
     """
     found = []
@@ -48,15 +50,17 @@ def remedies(
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if case.layers != "no" and case.layer_thickness:
         found.append(Remedy("LAYER_THICKNESS= AUTO", "an automatic thickness of the layers"))
-    if layers:
+    if step and any(text.endswith(KEEPS_RIMS) for text in step.warnings):
+        found.append(Remedy("RIMS= SLIDE", "“stay on walls” for nodes on walls"))
+    if step and step.layers:
         given = case.reduction or Reduction()
         yes = "DATA_REDUCTION= YES with " if given.auto else ""
         no = " instead of DATA_RED_RELATIVE" if given.relative and not given.auto else ""
         why = "half of the smallest distance between moving and sliding nodes"
         found.append(
             Remedy(
-                f"{yes}DATA_RED_TOLERANCE= {layers:.2g}{no}, {why}",
-                f"a data reduction with the tolerance {layers:.2g}, {why}",
+                f"{yes}DATA_RED_TOLERANCE= {step.layers:.2g}{no}, {why}",
+                f"a data reduction with the tolerance {step.layers:.2g}, {why}",
             )
         )
     if pitch:

@@ -77,7 +77,7 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
     text = remedy_for(Run(1, case), mesh)
     assert all(word in text for word in words)
     assert not any(word in text for word in not_words)
-    assert advice_for(case, 0.0).count(";") == text.count(";")
+    assert advice_for(case, None).count(";") == text.count(";")
 
 
 def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
@@ -103,7 +103,7 @@ def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_name
     assert text.startswith("Step 1 of 2 is the last without any. What may help: the role “slid")
     assert "“sliding” for outflow beside these cells, and a sliding method; more steps" in text
     assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; more" in (
-        advice_for(of_fixed.case, 0.0, mesh, bad)
+        advice_for(of_fixed.case, None, mesh, bad)
     )
     without = replace(of_fixed, frames=frames[1:])
     assert remedy_for(without, mesh).startswith("What may help: ")

@@ -13,9 +13,12 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.case.motion import displacements
 from slideviz.cli import run
+from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.zones import join_zones
 from slideviz.rbf.rims import Bodies, side_weights
 from slideviz.session.motions import Ghosts
+from slideviz.session.run_messages import remedy_for
+from slideviz.session.state import Run, StepFrame
 from slideviz.solver.growth import wall_warnings
 from slideviz.solver.setup import make_setup
 from slideviz.streaming.run import stream
@@ -225,6 +228,18 @@ def test_boundaries_that_nothing_slides_on_are_no_walls():
     assert setup.rims is None
     internal = case.change(roles=roles | {"z_m": "internal"})
     assert [wall.names for wall in make_setup(internal, mesh).rims.walls] == [("z_m",)]
+
+
+@pytest.mark.parametrize("rims", ["free", "slide"])
+def test_rims_that_left_their_wall_are_a_remedy_of_folded_cells(rims):
+    mesh = builders.cube(4, block=False)
+    case = case_of(box(mesh), [sv.Rotate("x_m", 40.0, (0.0, 0.0, 0.0))], rims=rims)
+    step = last(case, mesh)
+    assert any("has left" in text for text in step.warnings) == (rims == "free")
+    found = sv.quality(step.mesh, mesh)
+    assert ("RIMS= SLIDE" in advice_for(case, step)) == (rims == "free")
+    done = Run(1, case, (StepFrame(step.mesh, found, step),), "done")
+    assert ("“stay on walls”" in remedy_for(done, mesh)) == (rims == "free")
 
 
 def test_a_rim_that_cannot_be_brought_back_has_another_remedy():

@@ -102,10 +102,10 @@ def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch
     state = quality(bad.mesh, mesh)
     assert state.inverted > 0
     keys = "what may help: DATA_RED_TOLERANCE= 5e-07, half of the smallest distance"
-    assert advice_for(loose, bad.layers, mesh, state).startswith(keys)
+    assert advice_for(loose, bad, mesh, state).startswith(keys)
     relative = loose.change(reduction=Reduction(relative=1e-4))
     keys = "DATA_RED_TOLERANCE= 5e-07 instead of DATA_RED_RELATIVE, half of"
-    assert keys in advice_for(relative, 5e-7)
+    assert keys in advice_for(relative, bad)
     shown = remedy_for(Run(1, loose, (StepFrame(bad.mesh, state, bad),), "done"), mesh)
     assert "What may help: a data reduction with the tolerance 5e-07, half of" in shown
 
@@ -117,7 +117,7 @@ def test_layers_that_it_cannot_follow_are_told(monkeypatch):
     (said,) = [text for text in found.warnings if "is too thin for" in text]
     assert said.startswith("the layer between moving and sliding nodes (1e-06) is too thin for")
     assert said.endswith("use DATA_REDUCTION= NO, or YES with DATA_RED_TOLERANCE= 5e-07")
-    assert "YES with DATA_RED_TOLERANCE= 5e-07" in advice_for(case, found.layers)
+    assert "YES with DATA_RED_TOLERANCE= 5e-07" in advice_for(case, found)
 
 
 def test_a_fixed_wall_beside_layers_changes_no_tolerance(monkeypatch):
