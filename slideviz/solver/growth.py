@@ -19,6 +19,7 @@ from slideviz.case.spans import span_ends
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
 from slideviz.solver.remedies import KEEPS_RIMS
+from slideviz.solver.rims import find_rims
 from slideviz.solver.setup import Setup
 from slideviz.system.threads import in_parts
 
@@ -175,11 +176,11 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
 def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> list[str]:
     """Return warnings that nodes left a wall that they should be on.
 
-    These are nodes of moving boundaries that they share with sliding or internal ones; and, where
-    blades move over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
+    These are nodes of moving boundaries that they share with other ones; and, where blades move
+    over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
     """
     farthest: dict[tuple[str, str], _OffWall] = {}
-    for off in (*_off_span(setup, case, mesh, points), *_off_walls(setup, mesh, points)):
+    for off in (*_off_span(setup, case, mesh, points), *_off_walls(setup, case, mesh, points)):
         # A wall with edges has several pieces, and is told of once.
         known = farthest.setdefault((off.boundary, off.wall), off)
         if off.distance > known.distance:
@@ -203,24 +204,25 @@ class _OffWall:
     why: str  # the rest of the sentence, with the remedy
 
 
-def _off_walls(setup: Setup, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
+def _off_walls(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
     """Yield for each wall with a rim the node of that which is farthest off."""
-    rims = setup.rims
-    if rims is None:
-        return
-    least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
-    for wall in rims.walls:
-        nodes = rims.nodes[rims.rim[wall.rows]]
-        off = rims.off(wall, points[nodes])
-        k = int(np.argmax(off))
-        if off[k] > least and off[k] > least + wall.bulge:
-            names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
-            remedy = f"; {KEEPS_RIMS}"
-            if rims.bodies is not None:
-                remedy = ", to which it cannot be brought back; move it less"
-            yield _OffWall(
-                int(nodes[k]), " and ".join(names), " and ".join(wall.names), float(off[k]), remedy
-            )
+    remedy = f"; {KEEPS_RIMS}"
+    if case.rims == "slide":
+        remedy = ", to which it cannot be brought back; move it less"
+    fixed = find_rims(case.change(rims="free"), mesh, setup, ("fixed",))
+    of_fixed = ", which is fixed; let that boundary slide, with RIMS= SLIDE, or move it less"
+    for rims, why in ((setup.rims, remedy), (fixed, of_fixed)):
+        if rims is None:
+            continue
+        least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
+        for wall in rims.walls:
+            nodes = rims.nodes[rims.rim[wall.rows]]
+            off = rims.off(wall, points[nodes])
+            k = int(np.argmax(off))
+            if off[k] > least and off[k] > least + wall.bulge:
+                names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
+                who = " and ".join(names)
+                yield _OffWall(int(nodes[k]), who, " and ".join(wall.names), float(off[k]), why)
 
 
 def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:

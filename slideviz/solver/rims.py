@@ -37,18 +37,20 @@ FLAT = 1e-12  # part of the largest coordinate by which the nodes of a flat wall
 _RIMS: WeakKeyDictionary[Mesh, dict[object, Rims | None]] = WeakKeyDictionary()
 
 
-def find_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
+def find_rims(
+    case: Case, mesh: Mesh, domain: Domain, wall_roles: tuple[Role, ...] = WALLS
+) -> Rims | None:
     """Return the rims of a case; None where no moving boundary shares nodes with a wall.
 
-    Those that move over the span alone are not among them on hub and shroud: they stay on these by
-    their motion.
+    Walls have one of ``wall_roles``. Nodes that move over the span alone are not among the rims on
+    hub and shroud: they stay on these by their motion.
     """
     boundary = domain.boundary
     moving = domain.classes.moving
     roles = np.array([domain.roles.get(name, "fixed") for name in boundary.names], object)
     is_moving = np.zeros(len(mesh.points), bool)
     is_moving[moving] = True
-    facets = np.isin(roles[boundary.marker].astype(str), WALLS)
+    facets = np.isin(roles[boundary.marker].astype(str), wall_roles)
     facets &= is_moving[boundary.facets].any(axis=1)
     facet, column = np.nonzero(facets[:, None] & is_moving[boundary.facets])
     node = boundary.facets[facet, column]

@@ -231,6 +231,22 @@ def test_boundaries_that_nothing_slides_on_are_no_walls():
 
 
 @pytest.mark.parametrize("rims", ["free", "slide"])
+@pytest.mark.parametrize("steps", [1, 2])
+def test_a_fixed_wall_that_its_rim_leaves_is_told_of(rims, steps):
+    """Along the wall the rim may go; its nodes go with the motion, whatever RIMS says."""
+    mesh = builders.cube(4, block=False)
+    roles = {"x_m": "moving", "y_m": "fixed", "z_m": "sliding"}
+    nodes = np.intersect1d(mesh.marker("x_m").nodes, mesh.marker("y_m").nodes)
+    for y, walls in ((0.0, []), (0.1, [("y_m", "0.1"), ("y_p", "0.1")])):
+        motion = sv.Translate("x_m", (0.05, y, 0.0))
+        step = last(case_of(roles, [motion], rims=rims, steps=steps), mesh)
+        assert re.findall(LEFT + "?", "".join(step.warnings)) == walls
+        assert ("fixed; let that boundary slide" in "".join(step.warnings)) == bool(walls)
+        moved = step.mesh.points[nodes] - mesh.points[nodes]
+        np.testing.assert_allclose(moved, np.tile([0.05, y, 0.0], (len(nodes), 1)), atol=1e-15)
+
+
+@pytest.mark.parametrize("rims", ["free", "slide"])
 def test_rims_that_left_their_wall_are_a_remedy_of_folded_cells(rims):
     mesh = builders.cube(4, block=False)
     case = case_of(box(mesh), [sv.Rotate("x_m", 40.0, (0.0, 0.0, 0.0))], rims=rims)
@@ -390,10 +406,11 @@ def test_symmetry_planes_of_su2_stay_planes(tmp_path, monkeypatch, capsys):
     )
     assert run(["def", "a.cfg"]) == 0
     said = capsys.readouterr().err
-    assert re.findall(LEFT, said) == [("y_m", "0.02")]
+    assert re.findall(LEFT, said) == [("y_m", "0.02"), ("y_p", "0.02")]
     assert "of z_m at" in said
     assert run(["def", "a.cfg", "--set", "RIMS=SLIDE"]) == 0
-    assert "has left" not in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert re.findall(LEFT, said) == [("y_p", "0.02")]  # y_p is fixed: nobody gave it another role
     assert off_planes(mesh, sv.read("out.su2").points, "z_m")["y_m"] == 0.0
 
 
