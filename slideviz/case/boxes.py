@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from slideviz.ffd.box import (
 from slideviz.ffd.deformation import parametric
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import Mesh
+from slideviz.system.weak_cache import WeakCache, weak_cache
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -29,10 +29,7 @@ OFF = 1e-6
 """Largest distance between a node and the point that the mesh file's parametric coordinates give
 for it, over the size of the box, that gets no warning."""
 
-_EMBEDDED: WeakKeyDictionary[Mesh, dict[tuple[Box, str], tuple[Embedding, float]]] = (
-    WeakKeyDictionary()
-)
-_DEFINED: WeakKeyDictionary[Mesh, dict[object, dict[str, Box]]] = WeakKeyDictionary()
+_DEFINED = WeakCache()
 
 
 def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
@@ -55,14 +52,14 @@ def box_definition(case: Case) -> tuple[object, ...]:
 
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
     """Return the undeformed boxes of FFD_DEFINITION by name; CaseError if values make no box."""
-    key = box_definition(case)
-    cache = _DEFINED.setdefault(mesh, {})
-    if key not in cache:
-        cache[key] = {
+
+    def boxes() -> dict[str, Box]:
+        return {
             name: _defined(case, mesh.dim, name, corners, degrees)
             for (name, corners), degrees in zip(case.ffd_boxes, case.ffd_degrees, strict=False)
         }
-    return cache[key]
+
+    return _DEFINED.of(mesh, box_definition(case), boxes)
 
 
 def _defined(
@@ -101,33 +98,31 @@ def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
     return f"{mesh.name} has no FFD box {name!r}{why}"
 
 
-def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
+@weak_cache
+def embedding(mesh: Mesh, box: Box, marker: str) -> tuple[Embedding, float]:
     """Return the nodes of a marker in a box, embedded there, and how far off they are at most.
 
     Their parametric coordinates are read from the mesh file, where it has some for this marker;
     else they are computed. How far off: the distance of a node from the point of its parametric
     coordinates, over the size of the box. Both are found once for each mesh.
     """
-    cache = _EMBEDDED.setdefault(mesh, {})
-    if (box, marker) not in cache:
-        on = mesh.marker(marker).nodes
-        if marker in box.embedded:
-            nodes, uvw = box.embedded[marker]
-            inside = np.isin(nodes, on)
-        else:
-            nodes = on
-            uvw, inside = parametric(box, mesh.points[on])
-        embedded = box.embed(nodes[inside], uvw[inside])
-        size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
-        there = box.system.points_of(embedded.sums(box.q))[:, : mesh.dim]
-        gap = np.abs(there - mesh.points[embedded.nodes]) / size
-        cache[box, marker] = embedded, float(gap.max(initial=0.0))
-    return cache[box, marker]
+    on = mesh.marker(marker).nodes
+    if marker in box.embedded:
+        nodes, uvw = box.embedded[marker]
+        inside = np.isin(nodes, on)
+    else:
+        nodes = on
+        uvw, inside = parametric(box, mesh.points[on])
+    embedded = box.embed(nodes[inside], uvw[inside])
+    size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
+    there = box.system.points_of(embedded.sums(box.q))[:, : mesh.dim]
+    gap = np.abs(there - mesh.points[embedded.nodes]) / size
+    return embedded, float(gap.max(initial=0.0))
 
 
 def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     """Return a warning where the nodes of a marker in a box are off (`embedding`); else []."""
-    _, off = embedding(box, mesh, marker)
+    _, off = embedding(mesh, box, marker)
     sentence = (
         f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
         f"the mesh, by up to {off:.1g} of the box; if the mesh was moved without it, define the "

@@ -7,7 +7,7 @@ by spaces, tabs, commas or semicolons; ``%``, ``#`` and ``$`` start comments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -60,13 +60,6 @@ class Displacements:
     def at(self, nodes: IntArray) -> FloatArray:
         """Return the displacements (m, d) of ``nodes`` (m,), which must be among ``self.nodes``."""
         return self.vectors[np.searchsorted(self.nodes, nodes)]
-
-
-def mean_of(several: Sequence[Displacements]) -> Displacements:
-    """Return the mean of displacements of the same nodes; the warnings of the first ones."""
-    if len(several) == 1:
-        return several[0]
-    return replace(several[0], vectors=np.mean([each.vectors for each in several], axis=0))
 
 
 def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:

@@ -9,7 +9,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from math import isfinite
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZonePart
 from slideviz.mesh.zones import names_from, names_in, require_one_zone, with_zones, zones_of
+from slideviz.system.weak_cache import WeakCache
 
 _LETTERS = "IJK"
 _FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
@@ -298,22 +298,22 @@ class _Reader:
         return _error(self.mesh, line, f"FFD box {self.name!r}: {why}")
 
 
-_BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakKeyDictionary()
-"""The boxes that were read, by mesh."""
+_BOXES = WeakCache()
 
 
 def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
     """Return a mesh's boxes, in the order of its file, in a coordinate system; or MeshError."""
-    cache = _BOXES.setdefault(mesh, {})
-    if system not in cache and isinstance(mesh, Assembly):
-        cache[system] = tuple(
+
+    def boxes() -> tuple[Box, ...]:
+        if not isinstance(mesh, Assembly):
+            return read_boxes(mesh, _lines(mesh), system)
+        return tuple(
             _in_whole(mesh, part, box)
             for part, zone in zip(mesh.parts, zones_of(mesh), strict=True)
             for box in boxes_of(zone, system)
         )
-    if system not in cache:
-        cache[system] = read_boxes(mesh, _lines(mesh), system)
-    return cache[system]
+
+    return _BOXES.of(mesh, system, boxes)
 
 
 def _in_whole(mesh: Mesh, part: ZonePart, box: Box) -> Box:

@@ -22,12 +22,13 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import path_margins
-from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Marker, Mesh, sealed
+from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, checked_reference, quality
 from slideviz.mesh.topology import vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm, field_of
 
 if TYPE_CHECKING:
@@ -36,8 +37,7 @@ if TYPE_CHECKING:
 _CACHE: WeakKeyDictionary[Mesh, dict[object, FloatArray]] = WeakKeyDictionary()
 """Values of metrics computed last, by mesh, metric and signs."""
 _LOCK = Lock()  # guards `_CACHE`: the window computes in several threads
-_OUTER: WeakKeyDictionary[Cells, tuple[tuple[Marker, ...], list[IntArray]]] = WeakKeyDictionary()
-"""Results of `_outer_facets`, with the markers they belong to."""
+_OUTER = WeakCache()
 _CACHED = 1 << 26  # most numbers in the cache, besides those of the mesh used last
 
 
@@ -325,7 +325,7 @@ def _boundary_areas(mesh: Mesh) -> FloatArray:
     """
     limits = np.empty((len(mesh.points), 2))
     limits[:] = np.inf, 0.0
-    for facets in _outer_facets(mesh):
+    for facets in _OUTER.of(mesh.cells, mesh.markers, lambda: _outer_facets(mesh)):
         nodes, normals = vertex_normals(mesh.points, facets)
         areas = np.linalg.norm(normals, axis=1)
         limits[nodes, 0] = np.minimum(limits[nodes, 0], areas)
@@ -334,27 +334,21 @@ def _boundary_areas(mesh: Mesh) -> FloatArray:
 
 
 def _outer_facets(mesh: Mesh) -> list[IntArray]:
-    """Return the facets (f, 2 or 4) of each marker that only one cell has; cached for its cells."""
-    known = _OUTER.get(mesh.cells)
-    if known is None or known[0] is not mesh.markers:
-        boundary = boundary_of(mesh)
-        sides = sides_of(mesh.cells)
-        inner = np.zeros(len(boundary.facets), bool)
-        types = mesh.cells.types[boundary.owner]
-        first = sides.first[boundary.owner]
-        begin = mesh.cells.offsets[boundary.owner]
-        for k in range(SIDE_NODES.shape[1]):
-            some = np.flatnonzero(k < SIDES[types])
-            local = SIDE_NODES[types[some], k]
-            nodes = mesh.cells.connectivity[begin[some, None] + local]
-            facets = boundary.facets[some, None, :]
-            same = ((nodes[:, :, None] == facets).any(axis=2) | (local < 0)).all(axis=1)
-            inner[some] |= same & (sides.neighbour[first[some] + k] >= 0)
-        each = [
-            boundary.facets[(boundary.marker == at) & ~inner] for at in range(len(boundary.names))
-        ]
-        known = _OUTER[mesh.cells] = mesh.markers, each
-    return known[1]
+    """Return the facets (f, 2 or 4) of each marker that only one cell has."""
+    boundary = boundary_of(mesh)
+    sides = sides_of(mesh.cells)
+    inner = np.zeros(len(boundary.facets), bool)
+    types = mesh.cells.types[boundary.owner]
+    first = sides.first[boundary.owner]
+    begin = mesh.cells.offsets[boundary.owner]
+    for k in range(SIDE_NODES.shape[1]):
+        some = np.flatnonzero(k < SIDES[types])
+        local = SIDE_NODES[types[some], k]
+        nodes = mesh.cells.connectivity[begin[some, None] + local]
+        facets = boundary.facets[some, None, :]
+        same = ((nodes[:, :, None] == facets).any(axis=2) | (local < 0)).all(axis=1)
+        inner[some] |= same & (sides.neighbour[first[some] + k] >= 0)
+    return [boundary.facets[(boundary.marker == at) & ~inner] for at in range(len(boundary.names))]
 
 
 _FAMILIES: dict[Metric, Callable[[Mesh, NDArray[np.int8]], Made]] = {

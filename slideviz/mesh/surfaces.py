@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.nearest import row_groups
+from slideviz.system.weak_cache import WeakCache
 
 LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
 CUBES = 120
@@ -107,17 +107,15 @@ class Enclosing:
     inner: frozenset[str]
 
 
-_FOUND: WeakKeyDictionary[Mesh, dict[tuple[str, ...], Enclosing]] = WeakKeyDictionary()
-"""Results of `enclosing_of`, by names of boundaries."""
+_ENCLOSING = WeakCache()
 
 
 def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:
     """Return what boundaries of a mesh enclose; cached by their names as long as the mesh lives."""
     names = tuple(one.name for one in surfaces)
-    cache = _FOUND.setdefault(mesh, {})
-    if names not in cache:
-        cache[names] = Enclosing(is_closed(surfaces), enclosed(surfaces, mesh.points))
-    return cache[names]
+    return _ENCLOSING.of(
+        mesh, names, lambda: Enclosing(is_closed(surfaces), enclosed(surfaces, mesh.points))
+    )
 
 
 def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:

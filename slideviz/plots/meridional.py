@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.machine.span import SpanField
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT, Style, style_axes
 from slideviz.sections.span import SpanChannel, SpanWalls
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ class MeridionalBins:
         return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(self.shape)
 
 
-_BINS: WeakKeyDictionary[SpanField, MeridionalBins] = WeakKeyDictionary()
-"""Results of `meridional_bins`."""
+_BINS = WeakCache()
 
 
 def meridional_bins(mesh: Mesh, walls: SpanWalls) -> tuple[MeridionalBins, ...]:
@@ -62,15 +61,14 @@ def meridional_bins(mesh: Mesh, walls: SpanWalls) -> tuple[MeridionalBins, ...]:
     Along the passage bins are equal parts of the length from first to last node at each span.
     Cached as long as the span lives.
     """
-    zones = zones_of(mesh)
-    for one in walls.channels:
-        if one.field not in _BINS:
-            cells = mesh.parts[one.zone].cells
-            _BINS[one.field] = _zone_bins(zones[one.zone], one, cells)
-    return tuple(_BINS[one.field] for one in walls.channels)
+    return tuple(
+        _BINS.of(one.field, None, partial(_zone_bins, mesh, one)) for one in walls.channels
+    )
 
 
-def _zone_bins(mesh: Mesh, walls: SpanChannel, part: slice) -> MeridionalBins:
+def _zone_bins(whole: Mesh, walls: SpanChannel) -> MeridionalBins:
+    part = whole.parts[walls.zone].cells
+    mesh = zones_of(whole)[walls.zone]
     curves = walls.curves
     cells = mesh.cells
     plane = curves.plane(curves.field.meridional(mesh.points[cells.nodes]))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.case.motion_words import deformation
-from slideviz.design.gap import Gap, gaps
+from slideviz.design.gap import gaps
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE
 from slideviz.plots.gap import Measured
@@ -28,6 +28,7 @@ from slideviz.session.changes import show_frame
 from slideviz.session.passages import find_periods
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
+from slideviz.system.weak_cache import WeakCache, weak_cache
 from slideviz.terms import (
     METRICS,
     QUANTITIES,
@@ -94,50 +95,45 @@ def greedy_run(session: Session) -> GreedyRun | None:
     )
 
 
-class Profiles:
-    """A cache of profiles of the quality along the span, kept as long as their frames exist."""
+_PROFILES = WeakCache()
 
-    def __init__(self) -> None:
-        self._made: WeakKeyDictionary[StepFrame, dict[object, Profile]] = WeakKeyDictionary()
 
-    def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
-        """Return the profiles of the shown step, other runs' last steps, and the undeformed mesh.
+def profiles(session: Session, coordinate: Coordinate) -> list[Profile]:
+    """Return profiles of the shown step, other runs' last steps, and the undeformed mesh; cached.
 
-        Raises SlidevizError if the mesh has no extent along the coordinate.
-        """
-        profiles = []
-        shown = session.frame
-        run_shown = session.run_shown
-        if shown is not None and run_shown is not None and shown is not session.first:
-            profiles.append(self._one(session, shown, coordinate, run_shown))
-        others = [run for run in session.runs if run is not run_shown]
-        profiles += [
-            self._one(session, r.last, coordinate, r) for r in others if r.last is not None
-        ]
-        if session.first is not None:
-            profiles.append(self._one(session, session.first, coordinate, None))
-        return profiles
+    Raises SlidevizError if the mesh has no extent along the coordinate.
+    """
+    shown = session.frame
+    run_shown = session.run_shown
+    asked: list[tuple[StepFrame | None, Run | None]] = []
+    if run_shown is not None and shown is not session.first:
+        asked.append((shown, run_shown))
+    asked += [(run.last, run) for run in session.runs if run is not run_shown]
+    asked.append((session.first, None))
+    return [_profile(session, frame, coordinate, run) for frame, run in asked if frame is not None]
 
-    def _one(
-        self, session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
-    ) -> Profile:
-        case = session.case
+
+def _profile(
+    session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
+) -> Profile:
+    case = session.case
+    label = "undeformed" if run is None else run.label
+
+    def made() -> Profile:
         mesh = session.mesh
         assert mesh is not None
-        label = "undeformed" if run is None else run.label
-        key = coordinate, case.axis, case.origin, case.span, label
-        cache = self._made.setdefault(frame, {})
-        if key not in cache:
-            # In layers of the undeformed mesh, so that layers of cells stay together.
-            values = frame.quality.values
-            if coordinate == "span":
-                walls = walls_in(session)
-                span = walls.span(walls.field.meridional(mesh.points))
-                made = in_layers(mesh, values, span, coordinate, label=label)
-            else:
-                made = along(mesh, values, coordinate, case.axis, case.origin, label=label)
-            cache[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
-        return cache[key]
+        # In layers of the undeformed mesh, so that layers of cells stay together.
+        values = frame.quality.values
+        if coordinate == "span":
+            walls = walls_in(session)
+            span = walls.span(walls.field.meridional(mesh.points))
+            profile = in_layers(mesh, values, span, coordinate, label=label)
+        else:
+            profile = along(mesh, values, coordinate, case.axis, case.origin, label=label)
+        return replace(profile, series=UNDEFORMED if run is None else series_of(run))
+
+    key = coordinate, case.axis, case.origin, case.span, label
+    return _PROFILES.of(frame, key, made)
 
 
 def coordinates(session: Session) -> dict[Coordinate, str]:
@@ -167,8 +163,7 @@ def walls_in(session: Session) -> SpanWalls:
     return find_walls(mesh, case, find_periods(mesh, case, session.pairs))
 
 
-_GAPS: WeakKeyDictionary[StepFrame, dict[object, tuple[Gap, ...]]] = WeakKeyDictionary()
-"""Results of `gaps_of`."""
+_GAPS = WeakCache()
 
 
 def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None:
@@ -194,14 +189,12 @@ def gaps_of(session: Session) -> list[Measured]:
     for frame in dict.fromkeys((session.first, session.frame)):
         if frame is None:
             continue
-        cache = _GAPS.setdefault(frame, {})
-        if key not in cache:
-            cache[key] = gaps(case, frame.mesh, reference=session.mesh)
+        of_frame = _GAPS.of(frame, key, partial(gaps, case, frame.mesh, reference=session.mesh))
         first = frame is session.first or run is None
         label, series = (
             ("undeformed", UNDEFORMED) if first or run is None else (run.label, series_of(run))
         )
-        measured.append((label, series, cache[key]))
+        measured.append((label, series, of_frame))
     return measured
 
 
@@ -256,47 +249,26 @@ MOST_COMPARED = 4  # most runs that are compared with the shown one, so that lin
 Range = tuple[float, float]
 
 
-class FrameCounts:
-    """A cache of the frames' distributions, kept as long as their frames exist."""
+def histogram_limits(session: Session, full_range: bool) -> Range:
+    """Return the limits of a histogram's axis: round numbers around the cells' values.
 
-    def __init__(self) -> None:
-        self._kept: WeakKeyDictionary[StepFrame, dict[object, Distribution]] = WeakKeyDictionary()
-        self._spreads: WeakKeyDictionary[StepFrame, dict[ColorBy, Range | None]] = (
-            WeakKeyDictionary()
-        )
-
-    def limits(self, session: Session, full_range: bool) -> Range:
-        """Return the limits of the axis: round numbers around the cells' values.
-
-        They are the same for all steps of the shown run, so that bars can be compared during play.
-        ``full_range``: all values that are possible (of the displacement, from 0).
-        """
-        what = shown_measure(session)
-        shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
-        for frame in shown:
-            cache = self._spreads.setdefault(frame, {})
-            if what not in cache:
-                cache[what] = spread(frame, what, session.mesh)
-        spreads = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
-        low = min((e[0] for e in spreads), default=0.0)
-        high = max((e[1] for e in spreads), default=1.0)
-        if what in WALL_VALUES:
-            return rounded_out(low, high)
-        if what != "displacement":
-            # A smaller range would enlarge meaningless differences.
-            ends = whole_range(what) if full_range else (low, high)
-            low = min(low, ends[0])
-            high = max(high, ends[1]) if ends[1] < np.inf else high
-            return rounded_out(min(low, high - LEAST_SPREAD), high)
-        return rounded_out(0.0 if full_range else low, high)
-
-    def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
-        """Return the distribution of a frame's values between limits."""
-        what = shown_measure(session)
-        cache = self._kept.setdefault(frame, {})
-        if (what, limits) not in cache:
-            cache[what, limits] = distribution(frame, what, limits, session.mesh)
-        return cache[what, limits]
+    They are the same for all steps of the shown run, so that bars can be compared during play.
+    ``full_range``: all values that are possible (of the displacement, from 0).
+    """
+    what = shown_measure(session)
+    shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
+    spreads = [ends for frame in shown if (ends := spread(frame, what, session.mesh)) is not None]
+    low = min((e[0] for e in spreads), default=0.0)
+    high = max((e[1] for e in spreads), default=1.0)
+    if what in WALL_VALUES:
+        return rounded_out(low, high)
+    if what != "displacement":
+        # A smaller range would enlarge meaningless differences.
+        ends = whole_range(what) if full_range else (low, high)
+        low = min(low, ends[0])
+        high = max(high, ends[1]) if ends[1] < np.inf else high
+        return rounded_out(min(low, high - LEAST_SPREAD), high)
+    return rounded_out(0.0 if full_range else low, high)
 
 
 def whole_range(what: Quantity) -> tuple[float, float]:
@@ -305,7 +277,6 @@ def whole_range(what: Quantity) -> tuple[float, float]:
 
 
 def draw_histogram(
-    counts: FrameCounts,
     session: Session,
     figure: Figure,
     style: Style,
@@ -321,21 +292,22 @@ def draw_histogram(
     if session.frame is None:
         return
     what = shown_measure(session)
-    limits = counts.limits(session, full_range)
-    shown = counts.of(session, session.frame, limits)
+    limits = histogram_limits(session, full_range)
+    counts = partial(distribution, what=what, limits=limits, undeformed=session.mesh)
+    shown = counts(session.frame)
     run = session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     term = QUANTITIES[what]
     metric = f"{term.label} quality [-]" if what in SIZE_SKEW else term.axis
     runs, left_out = compared(session)
     outlines = [
-        Outline(other.label, counts.of(session, other.last, limits), series_of(other))
+        Outline(other.label, counts(other.last), series_of(other))
         for other in runs
         if other.last is not None
     ]
     # The undeformed mesh has no displacement.
     if session.first is not None and session.view.frame > 0 and what != "displacement":
-        outlines.append(Outline("undeformed", counts.of(session, session.first, limits), None))
+        outlines.append(Outline("undeformed", counts(session.first), None))
     axes = figure.add_subplot()
     bars = Bars(label, shown, _colors(session, shown))
     draw_distribution(axes, bars, outlines, metric, log, style)
@@ -393,6 +365,7 @@ BINS = 25
 """Number of intervals: few enough that an outline's steps show its dashes in a narrow panel."""
 
 
+@weak_cache
 def distribution(
     frame: StepFrame,
     what: ColorBy,
@@ -412,6 +385,7 @@ def distribution(
     return Distribution.of(_values(frame, what, undeformed), edges)
 
 
+@weak_cache
 def spread(
     frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:

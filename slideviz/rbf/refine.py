@@ -16,8 +16,7 @@ so that refinement with them adds noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import field as made_by
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -25,6 +24,9 @@ from slideviz.mesh.model import FloatArray
 from slideviz.rbf.double_double import DoubleFactor, Residuals, supports
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
+from slideviz.system.weak_cache import WeakCache
+
+_FACTORS = WeakCache()  # of systems, with twice the digits
 
 TRUSTED = 1e-5
 """Largest error of a field between control nodes, as a part of the largest displacement. Above it
@@ -82,7 +84,6 @@ class System:
     place: tuple[FloatArray, FloatArray | None]
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     factor: Factor  # without the rows that the pivot guard left out
-    _cache: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:
         """Return test data (n, 3): a sine wave along each axis, over the extent of the nodes.
@@ -107,7 +108,7 @@ class System:
         if normals is not None:
             met = np.einsum("rd,rd->r", met, normals)[:, None]
         with enough_threads(2.0 * len(right) ** 2):
-            return self._field(self._full_factor().solve(right - met))
+            return self._field(self._full_factor.solve(right - met))
 
     def refined(
         self,
@@ -129,7 +130,7 @@ class System:
         """
         weights = start.copy()
         low = np.zeros_like(start)
-        residuals = self._residuals()
+        residuals = self._residuals
         size = np.where(largest > 0.0, largest, 1.0)
         error_estimate = np.full(len(size), np.inf)
         first: FloatArray | None = None
@@ -184,8 +185,8 @@ class System:
         if (factor := self._double_factor(tick)) is not None:
             exact = factor.solve(lacking)
             return exact, self._field(exact)
-        full_factor = self._full_factor()
-        residuals = self._residuals()
+        full_factor = self._full_factor
+        residuals = self._residuals
         r = lacking.copy()
         total = np.zeros_like(r)
         z = full_factor.solve(r)
@@ -217,38 +218,33 @@ class System:
 
     def _field(self, weights: FloatArray) -> FloatArray:
         """Return the largest component (m,) of the field of weights (n, m) at `check_points`."""
-        features, normals = self.place
-        if "checks" not in self._cache:
-            points = check_points(features)
-            self._cache["checks"] = matrix(self.basis, (points, None), (features, None))
-        checks: FloatArray = self._cache["checks"]
+        normals = self.place[1]
         along = [weights] if normals is None else [weights * n[:, None] for n in normals.T]
-        found = [np.abs(checks @ each).max(axis=0, initial=0.0) for each in along]
+        found = [np.abs(self._checks @ each).max(axis=0, initial=0.0) for each in along]
         return np.asarray(np.max(found, axis=0))
 
+    @cached_property
+    def _checks(self) -> FloatArray:
+        """The matrix that evaluates a field at `check_points`."""
+        features = self.place[0]
+        return matrix(self.basis, (check_points(features), None), (features, None))
+
+    @cached_property
     def _full_factor(self) -> Factor:
-        """Return a factor of all rows; for those that were left out it is not exact (`SHIFT`)."""
+        """A factor of all rows; for those that were left out it is not exact (`SHIFT`)."""
         if not len(self.factor.dropped):
             return self.factor
-        if "whole" not in self._cache:
-            self._cache["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
-        full_factor: Factor = self._cache["whole"]
-        return full_factor
+        return with_dropped_rows(self.basis, self.place, self.factor)
 
     def _double_factor(self, tick: Tick) -> DoubleFactor | None:
         """Return the factor with twice the digits; None of a large or a singular system."""
-        if "double" not in self._cache:
-            small = self.place[0].shape[1] <= DENSE and supports(self.basis)
-            found = DoubleFactor.of(self._residuals(), tick) if small else None
-            self._cache["double"] = found
-        factor: DoubleFactor | None = self._cache["double"]
-        return factor
+        small = self.place[0].shape[1] <= DENSE and supports(self.basis)
+        make = partial(DoubleFactor.of, self._residuals, tick)
+        return _FACTORS.of(self, None, make) if small else None
 
+    @cached_property
     def _residuals(self) -> Residuals:
-        if "residuals" not in self._cache:
-            self._cache["residuals"] = Residuals(self.basis, self.place)
-        residuals: Residuals = self._cache["residuals"]
-        return residuals
+        return Residuals(self.basis, self.place)
 
 
 def with_dropped_rows(

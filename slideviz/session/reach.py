@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.mesh.quality import quality
 from slideviz.session.motion_scale import factor_of
 from slideviz.session.state import Run, Session, StepFrame, result_settings
+from slideviz.system.weak_cache import WeakCache
 
 SAMPLES = 17  # fractions at which the curve is computed, besides steps
 FARTHEST_SHOWN = 3.0  # largest fraction of the curve
@@ -28,8 +28,7 @@ class Reach:
     safe: SafeFraction
 
 
-_REACHES: WeakKeyDictionary[StepFrame, Reach] = WeakKeyDictionary()
-"""Results of `reach_of`, by the last frame."""
+_REACHES = WeakCache()
 
 
 def reach_run(session: Session) -> Run | None:
@@ -44,17 +43,17 @@ def reach_of(session: Session) -> Reach:
     assert run is not None
     assert run.safe is not None
     assert run.last is not None
-    known = _REACHES.get(run.last)
-    if known is not None:
-        return known
-    frames = session.frames
+    safe = run.safe
+    return _REACHES.of(run.last, None, lambda: _reach(session.frames, run, safe))
+
+
+def _reach(frames: Sequence[StepFrame], run: Run, safe: SafeFraction) -> Reach:
     parts = [0.0, *(frame.step.part for frame in run.frames if frame.step is not None)]
-    end = float(np.clip(1.15 * run.safe.fraction, 1.0, FARTHEST_SHOWN))
-    limit = min(run.safe.fraction, end)
+    end = float(np.clip(1.15 * safe.fraction, 1.0, FARTHEST_SHOWN))
+    limit = min(safe.fraction, end)
     fractions = np.unique([*parts, *np.linspace(0.0, end, SAMPLES), limit])
     lowest = [_lowest(frames, parts, float(at)) for at in fractions]
-    found = _REACHES[run.last] = Reach(fractions, np.array(lowest), run.safe)
-    return found
+    return Reach(fractions, np.array(lowest), safe)
 
 
 def _lowest(frames: Sequence[StepFrame], parts: Sequence[float], at: float) -> float:

@@ -22,6 +22,7 @@ from slideviz.mesh.walls import Walls, walls
 from slideviz.solver.steps import safe_fraction_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
+from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import METRICS, SIZE_SKEW, WALL_VALUES, ColorBy, field_of
 
 if TYPE_CHECKING:
@@ -122,13 +123,11 @@ class StepFrame:
         values = values[np.isfinite(values)]
         return (float(values.min()), float(values.max())) if len(values) else None
 
+    @weak_cache
     def largest(self, what: ColorBy, undeformed: Mesh) -> float:
         """Return the largest finite value of a quantity in all cells, 0 where there is none."""
-        known = _LARGEST.setdefault(self, {})
-        if what not in known:
-            values = self.values(what, undeformed)
-            known[what] = float(values[np.isfinite(values)].max(initial=0.0))
-        return known[what]
+        values = self.values(what, undeformed)
+        return float(values[np.isfinite(values)].max(initial=0.0))
 
     def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
@@ -146,8 +145,6 @@ class StepFrame:
         return float(np.sqrt(max(lengths)))
 
 
-_LARGEST: WeakKeyDictionary[StepFrame, dict[ColorBy, float]] = WeakKeyDictionary()
-"""Results of `StepFrame.largest`."""
 _AT_WALLS: WeakKeyDictionary[StepFrame, dict[str, FloatArray]] = WeakKeyDictionary()
 """The number of walls that was asked for last, in the cells of frames."""
 

@@ -30,6 +30,7 @@ from slideviz.session.saving import bound_sections
 from slideviz.session.state import Session
 from slideviz.streaming.source import CellBlock, FileSource, cut_cells
 from slideviz.system.threads import Tick, in_parts
+from slideviz.system.weak_cache import WeakCache
 
 GROUP = 4096  # number of cells of a group
 MOST = 1 << 18  # most cells that are read at a time
@@ -68,7 +69,7 @@ class Groups:
         return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
 
 
-_GROUPS: WeakKeyDictionary[Mesh, Groups] = WeakKeyDictionary()
+_GROUPS = WeakCache()
 _SLABS: WeakKeyDictionary[Mesh, dict[Section, StepFrame]] = WeakKeyDictionary()
 
 
@@ -102,14 +103,12 @@ def read_slab(
     assert skin.source is not None
     with ExitStack() as stack:
         source = FileSource.open(stack, (skin.source, skin.zone), moved=frame.file or skin.source)
-        groups = _GROUPS.get(skin)
-        if groups is None:
 
-            def tick(part: float) -> None:
-                going_on()
-                report(0.8 * part)
+        def tick(part: float) -> None:
+            going_on()
+            report(0.8 * part)
 
-            groups = _GROUPS[skin] = Groups.of(source, tick)
+        groups = _GROUPS.of(skin, None, lambda: Groups.of(source, tick))
 
         def blocks() -> Iterator[CellBlock]:
             met = groups.met_by(section)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from slideviz.rbf.frames import corners
 from slideviz.rbf.projection import across_period, as_simplices, surface_labels, surface_rim
 from slideviz.rbf.rims import Bodies, CurvedWall, FlatWall, Rims, RimWall, side_weights
 from slideviz.solver.domain import Domain, find_domain
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import Role
 
 WALLS: tuple[Role, ...] = ("sliding", "internal")  # roles of boundaries that rims are on
@@ -34,7 +34,7 @@ APART: tuple[Role, ...] = ("moving", "periodic")  # roles of those into which no
 
 FLAT = 1e-12  # part of the largest coordinate by which the nodes of a flat wall may be off a plane
 
-_RIMS: WeakKeyDictionary[Mesh, dict[object, Rims | None]] = WeakKeyDictionary()
+_RIMS = WeakCache()
 
 
 def find_rims(
@@ -248,8 +248,7 @@ def rims_key(case: Case) -> object:
 def are_ready(case: Case, mesh: Mesh) -> bool:
     """Return whether `on_walls` needs no time: rims are free, or were found for this mesh."""
     return case.rims == "free" or all(
-        one.rims == "free" or rims_key(one) in _RIMS.get(zone, {})
-        for one, zone in each_zone(case, mesh)
+        one.rims == "free" or _RIMS.has(zone, rims_key(one)) for one, zone in each_zone(case, mesh)
     )
 
 
@@ -270,14 +269,14 @@ def on_walls(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
 def _on_walls_of_zone(case: Case, mesh: Mesh, moved: Displacements) -> Displacements:
     if case.rims == "free":
         return moved
-    known = _RIMS.setdefault(mesh, {})
-    key = rims_key(case)
-    if key not in known:
+
+    def prepared() -> Rims | None:
         rims = find_rims(case, mesh, find_domain(case, mesh))
         if rims is not None and rims.bodies is not None:
             rims.bodies.prepare()  # takes time: not in the thread that draws ghosts
-        known[key] = rims
-    return displaced_on(known[key], mesh, moved)
+        return rims
+
+    return displaced_on(_RIMS.of(mesh, rims_key(case), prepared), mesh, moved)
 
 
 def displaced_on(rims: Rims | None, mesh: Mesh, moved: Displacements) -> Displacements:

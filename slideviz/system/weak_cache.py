@@ -11,20 +11,38 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def weak_cache(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function to keep its results as long as the first argument lives.
+class WeakCache:
+    """Results by what they were computed from, as long as it lives, and a further key.
 
-    The other arguments are hashed. Neither they nor the result may keep the first one alive: it
-    would never be freed.
+    Neither the key nor the result may keep that alive: it would never be freed.
     """
-    results: WeakKeyDictionary[Any, dict[tuple[Any, ...], R]] = WeakKeyDictionary()
+
+    def __init__(self) -> None:
+        self._results: WeakKeyDictionary[Any, dict[object, Any]] = WeakKeyDictionary()
+
+    def has(self, source: object, key: object) -> bool:
+        """Return whether there is a result."""
+        return key in self._results.get(source, {})
+
+    def of(self, source: object, key: object, make: Callable[[], R]) -> R:
+        """Return the result, made only the first time."""
+        results = self._results.setdefault(source, {})
+        if key not in results:
+            results[key] = make()
+        made: R = results[key]
+        return made
+
+
+def weak_cache(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a function to keep its results in a `WeakCache`, by the first argument.
+
+    The other arguments are hashed.
+    """
+    cache = WeakCache()
 
     @wraps(function)
     def cached(*args: P.args, **kwargs: P.kwargs) -> R:
-        of_first = results.setdefault(args[0], {})
         key = (*args[1:], *kwargs.items())
-        if key not in of_first:
-            of_first[key] = function(*args, **kwargs)
-        return of_first[key]
+        return cache.of(args[0], key, lambda: function(*args, **kwargs))
 
     return cached

@@ -185,7 +185,7 @@ def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbo
     def refuse(*_):
         raise SlidevizError("the mesh has no extent along r; choose another")
 
-    monkeypatch.setattr(curves.curves.Profiles, "of", refuse)
+    monkeypatch.setattr(curves.curves, "profiles", refuse)
     with qtbot.waitSignal(full.canvas.drawn):
         choose(full, "span")
     texts = [text.get_text() for text in full.canvas.figure.texts]

@@ -10,6 +10,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.panels.histogram import HistogramPanel
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.plots.session_plots import distribution
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
@@ -142,8 +143,8 @@ def test_counts_are_made_once_for_a_frame_and_can_be_linear(full, qtbot, monkeyp
     from slideviz.plots import session_plots
 
     asked = []
-    real = session_plots.distribution
-    monkeypatch.setattr(session_plots, "distribution", lambda *v: asked.append(v[0]) or real(*v))
+    real = session_plots._values
+    monkeypatch.setattr(session_plots, "_values", lambda *v: asked.append(v[0]) or real(*v))
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.change(changes.show_frame, 1)
     assert asked == [full.store.session.frame]
@@ -233,7 +234,8 @@ def test_of_many_states_the_newest_is_drawn_last(full, qtbot):
     qtbot.waitUntil(lambda: not full.canvas.busy)
     assert sorted(labels(full)) == ["run 1", "undeformed"]
     bars = [bar.get_height() for bar in bars_of(full)]
-    wanted = full.drawing().args[0].of(full.store.session, full.store.session.first, (0.0, 1.0))
+    session = full.store.session
+    wanted = distribution(session.first, "size-skew", (0.0, 1.0), session.mesh)
     assert bars == list(np.maximum(wanted.counts - 0.5, 0.0))
 
 

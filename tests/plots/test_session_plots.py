@@ -48,7 +48,7 @@ def test_a_run_has_one_look_in_every_plot_and_never_that_of_the_undeformed_mesh(
     assert len(set(looks)) == 8
     assert session_plots.UNDEFORMED not in looks
     steps = {run.label: run.series for run in session_plots.step_runs(two_runs)}
-    span = {p.label: p.series for p in session_plots.Profiles().of(two_runs, "x")}
+    span = {p.label: p.series for p in session_plots.profiles(two_runs, "x")}
     assert span == {**steps, "undeformed": session_plots.UNDEFORMED}
 
 
@@ -76,7 +76,7 @@ def test_without_data_reduction_there_is_no_convergence(two_runs):
 
 def test_the_span_has_the_shown_step_the_others_last_and_the_undeformed_mesh(two_runs):
     session = changes.show_frame(two_runs, 2)
-    found = session_plots.Profiles().of(session, "y")
+    found = session_plots.profiles(session, "y")
     assert [profile.label for profile in found] == ["run 2", "run 1", "undeformed"]
     frames = (session.frame, session.runs[0].last, session.first)
     for profile, frame in zip(found, frames, strict=True):
@@ -86,24 +86,22 @@ def test_the_span_has_the_shown_step_the_others_last_and_the_undeformed_mesh(two
 
 
 def test_the_radius_is_that_about_the_axis_of_the_case(session):
-    profiles = session_plots.Profiles()
     for origin in ((0.0, 0.0, 0.0), (4.0, 4.0, 0.0)):
         moved = changes.set_case(session, origin=origin)
-        (found,) = profiles.of(moved, "r")
+        (found,) = session_plots.profiles(moved, "r")
         wanted = along(session.mesh, session.first.quality.values, "r", origin=origin)
         assert found.edges.tolist() == wanted.edges.tolist()
         assert found.count.tolist() == wanted.count.tolist()
 
 
 def test_a_profile_is_made_once_as_long_as_its_frame_is_there(two_runs):
-    profiles = session_plots.Profiles()
-    first, again = (profiles.of(two_runs, "x") for _ in range(2))
+    first, again = (session_plots.profiles(two_runs, "x") for _ in range(2))
     assert all(a is b for a, b in zip(first, again, strict=True))
 
 
 def test_a_mesh_without_extent_that_way_is_refused(two_runs):
     with pytest.raises(SlidevizError, match="no length"):
-        session_plots.Profiles().of(two_runs, "z")
+        session_plots.profiles(two_runs, "z")
 
 
 def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube):

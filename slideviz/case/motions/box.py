@@ -445,7 +445,7 @@ def _moved(
     warnings = []
     any_inside = False
     for name in on:
-        inside, _ = embedding(box, mesh, name)
+        inside, _ = embedding(mesh, box, name)
         any_inside |= bool(len(inside.nodes))
         shift = inside.sums(change)
         if box.system.kind != "CARTESIAN":

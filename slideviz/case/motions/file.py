@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,13 @@ from slideviz.case.values import path_text
 from slideviz.case.words import Word
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
 
-_READ: WeakKeyDictionary[Mesh, dict[object, Displacements]] = WeakKeyDictionary()
+_READ = WeakCache()
 
 
 @dataclass(frozen=True)
@@ -91,20 +92,16 @@ class FromFile(Motion):
 
     def _displacements(self, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
         """Return what the file lists for markers and their nodes; read again if it has changed."""
-        known = _READ.setdefault(mesh, {})
-        try:
-            state = self.path.stat()
-            key = self.path, tuple(moved), state.st_mtime_ns, state.st_size
-        except OSError:
-            key = None
-        if key is not None and key in known:
-            return known[key]
         nodes = np.unique(np.concatenate([*moved.values(), np.empty(0, np.int64)]))
         names = " or ".join(repr(name) for name in named(self.marker))
         of = f"marker {names}" if names else "a moving marker"
-        read = read_displacements(self.path, mesh, nodes, of)
-        known[key] = read
-        return read
+        read = partial(read_displacements, self.path, mesh, nodes, of)
+        try:
+            state = self.path.stat()
+        except OSError:
+            return read()
+        key = self.path, tuple(moved), state.st_mtime_ns, state.st_size
+        return _READ.of(mesh, key, read)
 
     @property
     def is_case_file(self) -> bool:

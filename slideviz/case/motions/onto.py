@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -31,6 +30,7 @@ from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
 from slideviz.rbf.projection import as_simplices, simplex_vectors, surface_rim
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import Term
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ NEAR = 1.24  # largest ratio of sizes over such a factor; 25.4 and 39.37 stay ap
 MOST_AWAY = 0.05  # largest part of the nodes whose normals may not face the target
 
 Key = tuple[object, ...]
-_LAID: WeakKeyDictionary[Mesh, dict[Key, Displacements | CaseError]] = WeakKeyDictionary()
+_LAID = WeakCache()
 _one_at_a_time = Lock()
 
 
@@ -149,14 +149,15 @@ def laid_displacements(
     from it.
     """
     names, key = _key(motion, case, markers)
+
+    def lay() -> Displacements | CaseError:
+        try:
+            return _lay(motion, case, mesh, names)
+        except CaseError as problem:
+            return problem
+
     with _one_at_a_time:
-        known = _LAID.setdefault(mesh, {})
-        if key not in known:
-            try:
-                known[key] = _lay(motion, case, mesh, names)
-            except CaseError as problem:
-                known[key] = problem
-        result = known[key]
+        result = _LAID.of(mesh, key, lay)
     if isinstance(result, CaseError):
         raise CaseError(str(result))
     return result
@@ -166,7 +167,7 @@ def is_laid(case: Case, mesh: Mesh) -> bool:
     """Return whether the displacements of all motions onto surfaces are computed: it takes time."""
     moving = case.markers_with("moving")
     keys = (_key(motion, case, moving) for motion in case.motions if isinstance(motion, Onto))
-    return all(key in _LAID.get(mesh, {}) for names, key in keys if names)
+    return all(_LAID.has(mesh, key) for names, key in keys if names)
 
 
 def _key(motion: Onto, case: Case, markers: Iterable[str]) -> tuple[tuple[str, ...], Key]:

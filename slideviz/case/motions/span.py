@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -30,12 +29,13 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
+from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import SPAN_KINDS, SpanKind, Term
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
 
-_SECTIONS: WeakKeyDictionary[Mesh, dict[object, BladeSections]] = WeakKeyDictionary()
+_SECTIONS = WeakCache()
 
 
 @dataclass(frozen=True)
@@ -270,9 +270,8 @@ def _blade(
         )
     field = span_field(case, mesh)
     nodes = np.unique(np.concatenate([on[name] for name in names]))
-    cache = _SECTIONS.setdefault(mesh, {})  # not by the field, which sections keep alive
-    key = field, tuple(names), point
-    if key not in cache:
+
+    def sections() -> BladeSections:
         boundary = boundary_of(mesh)
         some = boundary.facets[np.isin(boundary.marker, [boundary.names.index(n) for n in names])]
         quads = some[some[:, 2] != some[:, 3]]
@@ -280,14 +279,17 @@ def _blade(
         stack = None if point is None else np.array(point)
         try:
             turns = _turns(case, mesh, nodes[triangles])[nodes]
-            cache[key] = BladeSections(field, mesh.points[nodes], triangles, stack, turns)
+            return BladeSections(field, mesh.points[nodes], triangles, stack, turns)
         except MeshError as problem:
             raise CaseError(f"motion {places[0] + 1}: {', '.join(names)}: {problem}") from problem
+
+    # Not by the field, which sections keep alive.
+    made = _SECTIONS.of(mesh, (field, tuple(names), point), sections)
     reached = [
         np.isin(nodes, np.concatenate([on[name] for name in names if applies_to(motion, name)]))
         for motion in motions
     ]
-    return Blade(nodes, cache[key], tuple(places), tuple(motions), tuple(reached))
+    return Blade(nodes, made, tuple(places), tuple(motions), tuple(reached))
 
 
 def _turns(case: Case, mesh: Mesh, triangles: IntArray) -> FloatArray:

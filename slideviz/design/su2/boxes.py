@@ -368,7 +368,7 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     raise_all((*problems_of_markers(config, mesh), *contradictions))
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
-        on = {name: embedding(box, mesh, name)[0] for name in config.markers}
+        on = {name: embedding(mesh, box, name)[0] for name in config.markers}
         listed = {name: (found.nodes, found.uvw) for name, found in on.items() if len(found.nodes)}
         boxes.append(replace(box, embedded=listed))
     if not boxes:
@@ -412,7 +412,7 @@ def _embeddings(
 
     As in SU2, nodes inside stay where the box lists nodes of other boundaries only.
     """
-    on = {marker: embedding(box, mesh, marker) for marker in markers}
+    on = {marker: embedding(mesh, box, marker) for marker in markers}
     listed = [marker for marker in markers if marker in box.embedded]
     if not box.embedded:
         return on, []

@@ -105,7 +105,6 @@ class CurvesPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._profiles = curves.Profiles()
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
@@ -211,7 +210,7 @@ class CurvesPanel(Panel):
             return partial(draw_or_say, partial(draw_measured, session))
         coordinate = self.coordinate.currentData()
         what = self.what.currentData()
-        find = partial(self._profiles.of, session, coordinate)
+        find = partial(curves.profiles, session, coordinate)
         return partial(draw_or_say, partial(draw_span, find, coordinate, what, whole))
 
     def show_kind(self, kind: str) -> None:

@@ -17,7 +17,6 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_plots import (
-    FrameCounts,
     draw_histogram,
     first_value,
     shown_measure,
@@ -129,7 +128,6 @@ class HistogramPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._counts = FrameCounts()
         self._pending_range: Range | None = None
         self._described_frame: StepFrame | None = None
         self.canvas = BrushCanvas(self.drawing)
@@ -178,7 +176,6 @@ class HistogramPanel(Panel):
         if not self._timer.isActive():
             self.canvas.show_band(session.view.threshold)
         if session.frame is None:
-            self._counts = FrameCounts()
             self.range_text.hide()
             self.area.show_text(
                 "Open a mesh first. Then this panel shows how many cells have which quality."
@@ -238,7 +235,7 @@ class HistogramPanel(Panel):
     def drawing(self) -> Draw:
         log = self.log.isChecked()
         whole = self.whole.isChecked()
-        return partial(draw_histogram, self._counts, self.store.session, log=log, full_range=whole)
+        return partial(draw_histogram, self.store.session, log=log, full_range=whole)
 
     # What the user does ----------------------------------------------------------------
     def _range_dragged(self, band: Range | None) -> None:
