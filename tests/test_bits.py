@@ -10,6 +10,7 @@ import pytest
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Scale
 from slideviz.mesh.topology import find_boundary
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests import builders
 from tools.laws.meshes import renumbered
@@ -40,7 +41,7 @@ def test_frame_motion_and_normals_keep_every_bit(kind, seed):
         origin=tuple(origin),
     )
     other, order = renumbered(mesh, rng)
-    one, two = make_setup(case, mesh), make_setup(case, other)
+    one, two = make_setup(prepare(case, mesh)), make_setup(prepare(case, other))
     features = [setup.frame.features(setup.coords) for setup in (one, two)]
     assert features[0][:, order].tobytes() == features[1].tobytes()
     asked = np.zeros((2, *mesh.points.shape))

@@ -129,7 +129,7 @@ def test_what_fails_later_has_a_line_and_the_reason_once(square, tmp_path, capsy
     out = tmp_path / "out"
     argv = ["compare", str(square), "--methods", "ps", "--periodic", "none", "--steps", "1,2"]
 
-    def through(case, mesh):
+    def through(prepared):
         raise DeformError("the motion puts BLOCK through RIGHT")
 
     monkeypatch.setattr("slideviz.study.combinations.make_setup", through)

@@ -15,6 +15,7 @@ from slideviz.errors import Cancelled, CaseError, DeformError, MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve
 from slideviz.solver import deform as solver
+from slideviz.solver.prepare import prepare
 from slideviz.terms import SLIDING
 from tests import builders
 from tests.slow import one_of_each_fast
@@ -125,7 +126,7 @@ def test_a_plan_made_before_gives_the_same_mesh(steps, monkeypatch):
     made = sample("square", 10, "motion")
     case, mesh = made.case.change(steps=steps), made.mesh
     *_, alone = sv.deform(case, mesh)
-    setup = make_setup(case.change(steps=7), mesh)
+    setup = make_setup(prepare(case.change(steps=7), mesh))
     monkeypatch.setattr(solver, "make_setup", None)
     *_, shared = sv.deform(case, mesh, setup=setup)
     assert np.array_equal(shared.mesh.points, alone.mesh.points)

@@ -26,6 +26,7 @@ from slideviz.session.node_types import NodeTypes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.solver import stepping
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.terms import NODE_TYPES
 from tests import builders
@@ -159,7 +160,7 @@ def test_a_node_is_fixed_where_its_image_is(one, method, periodic):
     assert len(at_rest) == 2
     np.testing.assert_array_equal(step.mesh.points[at_rest], mesh.points[at_rest])
     assert step.node_counts["moving"] == 7
-    counted = make_setup(case, mesh).classes
+    counted = make_setup(prepare(case, mesh)).classes
     assert set(at_rest) <= set(counted.fixed)
 
 
@@ -278,7 +279,7 @@ def test_images_that_moved_differently_are_an_error_with_nodes_and_numbers():
         periodic="moving",
         sliding="ps",
     )
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     node = int(mesh.marker("y_p").nodes[-1])
     wrong = setup.target.copy()
     wrong[setup.known == node, 1] += 1e-9
@@ -298,7 +299,7 @@ def test_inverted_cells_are_the_message_where_images_moved_differently_as_well()
         periodic="moving",
         sliding="ps",
     )
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     wrong = setup.target.copy()
     wrong[setup.known == mesh.marker("y_p").nodes[-1], 0] += 1.0
     step = next(sv.deform(case, mesh, setup=replace(setup, target=wrong)))
@@ -371,7 +372,9 @@ def test_the_report_has_the_misfit(tmp_path, periodic, capsys):
 def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
     mesh = builders.square(6)
     zeros = np.zeros((len(mesh.points), 2))
-    setup = make_setup(Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),)), mesh)
+    setup = make_setup(
+        prepare(Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),)), mesh)
+    )
     for error, note in ((1e-12, True), (1e-3, False)):
         solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
         (warning,) = stepping._dropped_warning(setup, solution, 1, 2, mesh)
@@ -393,7 +396,7 @@ def test_the_view_has_the_same_types_as_a_run():
     types = NodeTypes()
     found = types.of(changes.set_view(session, points="types"))
     fixed = found.nodes[found.kinds == list(NODE_TYPES).index("fixed")]
-    np.testing.assert_array_equal(fixed, make_setup(case, mesh).classes.fixed)
+    np.testing.assert_array_equal(fixed, make_setup(prepare(case, mesh)).classes.fixed)
     # Markers that do not match are told beside the Run button; the types are there all the same.
     points = mesh.points.copy()
     points[mesh.marker("y_p").nodes[2], 0] += 0.03

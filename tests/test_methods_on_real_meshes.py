@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests import test_real_meshes as real
 
@@ -30,6 +31,6 @@ def test_boundaries_are_kept_and_images_move_alike(name, method, periodic):
     mesh, case = real.make_case(name, sliding, periodic)
     case = case.change(method=method, reduction=None)
     known = ("halo copies", "no longer fits")
-    found = make_setup(case, mesh).warnings
+    found = make_setup(prepare(case, mesh)).warnings
     assert all(any(words in text for words in known) for text in found)
     real.check(mesh, case, real.load(real.CASES[name][0])[1])

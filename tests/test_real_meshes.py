@@ -19,6 +19,7 @@ from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import corners
 from slideviz.rbf.reduction import Reduction
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "meshes" / "su2"
@@ -155,7 +156,7 @@ def check(mesh, case, before):
     *_, last = sv.deform(case, mesh)
     points = last.mesh.points
     assert np.all(np.isfinite(points))
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     goal = setup.frame.points(setup.coords[setup.known] + setup.target)
     np.testing.assert_allclose(points[setup.known], goal, rtol=0, atol=1e-12 * mesh.extent)
     off_boundary(setup, points, mesh)

@@ -15,6 +15,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.samples.table import write_sample
+from slideviz.solver.prepare import prepare
 
 REFERENCE = """
 square_25_severe none none 2 0.0558838 0.637004
@@ -228,7 +229,7 @@ def test_node_counts_of_the_dense_square(thesis, method, expected):
 def node_counts(mesh, case):
     from slideviz.solver.setup import make_setup
 
-    return make_setup(case, mesh).classes.counts()
+    return make_setup(prepare(case, mesh)).classes.counts()
 
 
 @pytest.mark.parametrize("name", ["hexahedron", "cylindrical"])

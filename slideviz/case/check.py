@@ -85,11 +85,6 @@ def _method_problems(case: Case) -> Iterator[str]:
             )
 
 
-def require_valid(case: Case, mesh: Mesh) -> None:
-    """Raise CaseError with a line for each problem where the case does not fit the mesh."""
-    raise_all(check_case(case, mesh))
-
-
 def raise_all(problems: tuple[str, ...]) -> None:
     """Raise a CaseError with a line for each problem, if there are any; equal ones count once."""
     if problems:

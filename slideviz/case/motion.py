@@ -115,6 +115,11 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     """
     # Motions of markers that do not move are ignored here; `check_case` reports them.
     raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))
+    return moving_nodes(case, mesh)
+
+
+def moving_nodes(case: Case, mesh: Mesh) -> Displacements:
+    """Return the `displacements` of a case that fits the mesh; only files are still read."""
     names = case.markers_with("moving")
     on = {name: mesh.marker(name).nodes for name in names}
     placed = required_displacements(case, mesh, on)

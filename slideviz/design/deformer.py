@@ -9,13 +9,11 @@ from functools import partial, reduce
 import numpy as np
 
 from slideviz.argument_types import check_types
-from slideviz.case import motion
-from slideviz.case.check import require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case
+from slideviz.case.motion import moving_nodes
 from slideviz.case.motions.rigid import Translate
-from slideviz.case.zones import with_marker_names
 from slideviz.design.checks import (
     Checks,
     facets_of,
@@ -40,6 +38,7 @@ from slideviz.rbf.loops import to_points
 from slideviz.rbf.tape import Array, Tape, Variable, value
 from slideviz.solver.deform import Progress
 from slideviz.solver.growth import wall_warnings
+from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import make_setup
 
@@ -168,8 +167,9 @@ class Deformer:
         case, left_out = without_repair(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
-        case = with_marker_names(case, mesh)
-        asked = motion.displacements(case, mesh)
+        prepared = prepare(case, mesh)
+        case = prepared.case
+        asked = moving_nodes(case, mesh)
         self.mesh = mesh
         self.case = case
         self.nodes = asked.nodes
@@ -183,15 +183,13 @@ class Deformer:
         """About case and mesh, zones that no longer fit at the reference, and systems that are
         solved with twice the digits (a note)."""
         if isinstance(mesh, Assembly):
-            require_valid(case, mesh)
-            case = motion.by_zone(case, mesh)
             make = partial(Deformer, progress=report)
-            self._zones = zone_designs(case, mesh, asked.nodes, references, make)
+            self._zones = zone_designs(prepared, mesh, asked.nodes, references, make)
             points = self.deform(references[0])
             left_out = *left_out, *disjoint_interfaces(mesh, case.interfaces)
             said = [f"zone {z.number}: {text}" for z in self._zones for text in z.deformer.warnings]
             torn = torn_interfaces(mesh, points, case.interfaces)
-            self.warnings = (*case.warnings, *left_out, *said, *torn)
+            self.warnings = (*prepared.alone.warnings, *left_out, *said, *torn)
             return
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
@@ -201,7 +199,7 @@ class Deformer:
             widest = references[far, np.arange(len(asked.nodes))]
             together = Displacements(asked.nodes, widest, asked.warnings)
             held = case.change(support_radius=support_radius(case, mesh, together))
-        setup = make_setup(held, mesh, displaced(most, mesh))
+        setup = make_setup(Prepared(held, mesh), displaced(most, mesh))
         if setup.reduction is not None and not sizes.any():
             raise DeformError(
                 "all displacements are zero, so control nodes cannot be chosen; give "

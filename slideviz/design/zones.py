@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.rbf.tape import Array, put, take, value
+from slideviz.solver.prepare import Prepared
 from slideviz.solver.zones import InterfaceMotion
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def over_zones(zones: Sequence[ZoneDesign], start: FloatArray, design: Array, wo
 
 
 def zone_designs(
-    case: Case,
+    prepared: Prepared,
     mesh: Assembly,
     nodes: IntArray,
     references: FloatArray,
@@ -76,7 +77,7 @@ def zone_designs(
     ``nodes`` (m,): the nodes of the design. ``references`` (k, m, d): the designs to choose control
     nodes for. ``make`` returns a deformer for a zone, its case and its designs.
     """
-    motion = InterfaceMotion(case, mesh)
+    motion = InterfaceMotion(prepared, mesh)
     designs = list[ZoneDesign]()
     shared = np.concatenate([nodes[:0], *(each.nodes for each in motion.interfaces)])
     shift = np.zeros((len(references), *mesh.points.shape))

@@ -15,13 +15,13 @@ import numpy as np
 from slideviz.argument_types import check_types
 from slideviz.case.limits import rated_limits
 from slideviz.case.model import Case
-from slideviz.case.zones import with_marker_names
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import Assembly, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.tape import value
+from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
@@ -94,19 +94,33 @@ def deform(
     1 [0.   1.28 2.5 ]
     """
     report = progress or (lambda _: None)
-    case = with_marker_names(case, mesh)
-    check_limits = partial(rated_limits, case, mesh)
+    prepared = prepare(case, mesh)
+    check_limits = partial(rated_limits, prepared.case, mesh)
     if isinstance(mesh, Assembly):
-        from slideviz.solver.zones import joined_steps, zone_runs
+        from slideviz.solver.zones import InterfaceMotion, joined_steps, zone_runs
 
-        run = partial(deform, certify=certify)
-        for step in joined_steps(*zone_runs(case, mesh, run, report)):
-            yield replace(step, check_limits=check_limits)
-        return
+        motion = InterfaceMotion(prepared, mesh)
+        runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)
+        steps = joined_steps(motion, runs)
+    else:
+        steps = _steps_of_zone(prepared, report, setup, certify=certify)
+    for step in steps:
+        yield replace(step, check_limits=check_limits)
+
+
+def _steps_of_zone(
+    prepared: Prepared,
+    report: Callable[[Progress], None],
+    setup: Setup | None = None,
+    *,
+    certify: bool,
+) -> Iterator[Step]:
+    case = prepared.case
+    mesh = prepared.mesh
     timer = step_timer(report, 1, max(1, case.steps))
     if setup is None:
         with timer.phase("classify"):
-            setup = make_setup(case, mesh)
+            setup = make_setup(prepared)
     require_memory(setup, case)
     mend = None
     if case.repair != "no" and mesh.part is None:
@@ -118,8 +132,7 @@ def deform(
     done = 0.0
     for step in all_steps(stepping):
         ends = mend is not None and step.index == step.total and step.repaired is None
-        last = _mended(stepping, step, before, done) if ends else step
-        yield replace(last, check_limits=check_limits)
+        yield _mended(stepping, step, before, done) if ends else step
         before = step.mesh
         done = step.part
 

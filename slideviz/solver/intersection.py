@@ -9,7 +9,7 @@ from math import ceil, floor, pi
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
+from slideviz.case.motion import moving_nodes
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
@@ -157,7 +157,7 @@ def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[
 def _turned(case: Case, mesh: Mesh, part: float) -> FloatArray:
     """Return the displacements (k, d) of the motions, with a part of all turns."""
     motions = tuple(motion.turned(part) for motion in case.motions)
-    return displacements(case.change(motions=motions), mesh).vectors
+    return moving_nodes(case.change(motions=motions), mesh).vectors
 
 
 def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:

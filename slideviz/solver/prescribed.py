@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import ROUNDING, displacements, same
+from slideviz.case.motion import ROUNDING, moving_nodes, same
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.fans import components
 from slideviz.mesh.halo import without_halo
@@ -115,7 +115,7 @@ def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str |
 
 def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     """Return the `motion_messages` of a case of one zone before it runs."""
-    moved = on_walls(case, mesh, displaced(displacements(case, mesh), mesh))
+    moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
     return motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
 
 
@@ -135,7 +135,7 @@ def prescribe(
     ``rims``: those that are kept on their walls after each step; checks are made with them there.
     """
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
-    moved = moved or displaced(displacements(case, mesh), mesh)
+    moved = moved or displaced(moving_nodes(case, mesh), mesh)
     classes = domain.classes
     frame = domain.frame
     case = case.change(roles=domain.roles)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.check import file_before_motions, idle_settings, require_valid
+from slideviz.case.check import file_before_motions, idle_settings
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.span import moves_over_span
@@ -34,6 +34,7 @@ from slideviz.rbf.rims import Keep, Rims
 from slideviz.rbf.tape import Array, multiply, put, take
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.layers import layer_zone, thickness_warnings
+from slideviz.solver.prepare import Prepared
 from slideviz.solver.prescribed import (
     BoundaryConditions,
     fitted_radius,
@@ -249,18 +250,18 @@ class Setup(Domain):
         slid[copy[both]] = moved
 
 
-def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Setup:
+def make_setup(prepared: Prepared, moved: Displacements | None = None) -> Setup:
     """Return the setup of a deformation: all that stays the same over its steps.
 
-    Raises CaseError if the case does not fit the mesh, and MeshError if periodic markers do not
-    match, a marker element is not a side of a cell, or a coordinate is not finite, or too large to
-    compute with, and DeformError if no node is moving or fixed, or periodic images are asked to
-    move differently.
+    Raises MeshError if periodic markers do not match, a marker element is not a side of a cell, or
+    a coordinate is not finite, or too large to compute with, and DeformError if no node is moving
+    or fixed, or periodic images are asked to move differently.
     ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
     motions.
     """
+    case = prepared.case
+    mesh = prepared.mesh
     require_one_zone(mesh, "a setup")
-    require_valid(case, mesh)
     domain = find_domain(case, mesh)
     rims = find_rims(case, mesh, domain)
     return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved, rims), rims)

@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from slideviz.case.check import require_valid
 from slideviz.case.model import Case
-from slideviz.case.motion import by_zone, displacements
+from slideviz.case.motion import moving_nodes
 from slideviz.case.motions.file import Prescribed
-from slideviz.case.zones import zone_cases
 from slideviz.errors import SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,
@@ -21,13 +19,14 @@ from slideviz.mesh.interfaces import (
 )
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterface, sealed
 from slideviz.mesh.zones import names_in, with_zones
+from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.prescribed import check_motion
 from slideviz.solver.rims import on_walls
 from slideviz.solver.steps import Progress, Step
 from slideviz.terms import Role
 
 Report = Callable[[Progress], None]
-Run = Callable[[Case, Mesh, Report], Iterator[Step]]
+Run = Callable[[Prepared, Report], Iterator[Step]]
 """Deforms one zone."""
 FOLLOWING = ("fixed", "sliding", "internal")  # roles of boundaries that follow another zone's
 
@@ -40,29 +39,28 @@ class InterfaceMotion:
     A boundary that follows gets the role moving.
     """
 
-    def __init__(self, case: Case, mesh: Assembly) -> None:
+    def __init__(self, prepared: Prepared, mesh: Assembly) -> None:
+        case = prepared.case
         self.mesh = mesh
         self.roles = case.roles
         self.names = case.interfaces  # those of MARKER_ZONE_INTERFACE
         self.interfaces = named_interfaces(mesh, case.interfaces)
-        alone = by_zone(case, mesh)
-        self.cases = list(zone_cases(alone, mesh))
+        self._alone = prepared.zones
+        self.cases = [zone.case for zone in self._alone]
         """The case of each zone."""
-        self.warnings = *alone.warnings, *disjoint_interfaces(mesh, case.interfaces)
+        self.warnings = *prepared.alone.warnings, *disjoint_interfaces(mesh, case.interfaces)
         """Those of the case, of files of several zones, and on pairs that do not coincide."""
         self.led = np.zeros(len(mesh.points), bool)
         """(n,) bool: the nodes that follow others."""
         self.leader = np.arange(len(mesh.points))
         """(n,): the node that each of them follows."""
         self._vectors = np.zeros_like(mesh.points)
-        self._alone = tuple(self.cases)
         self._names: list[set[str]] = [set() for _ in self.cases]
         self._zone = {n: k for k, part in enumerate(mesh.parts) for n in names_in(mesh, part)}
         asked = [each for each in self.interfaces if self.roles.get(each.marker) == "moving"]
         for index in self.moving(range(len(self.cases))):
-            alone = self._alone[index]
-            zone = mesh.parts[index].mesh
-            moved = on_walls(alone, zone, displacements(alone, zone))
+            zone = self._alone[index]
+            moved = on_walls(zone.case, zone.mesh, moving_nodes(zone.case, zone.mesh))
             shift = np.zeros_like(mesh.points)
             shift[mesh.parts[index].points][moved.nodes] = moved.vectors
             self._lead(index, shift, asked, range(len(self.cases)))
@@ -77,7 +75,7 @@ class InterfaceMotion:
         Where rims are kept on walls (RIMS= SLIDE), those that others lead by moving count, too.
         """
         leading = {("fixed", "sliding")}
-        if any(case.rims == "slide" for case in self._alone):
+        if any(zone.case.rims == "slide" for zone in self._alone):
             leading |= {(role, "moving") for role in FOLLOWING}
 
         def led(index: int) -> int:
@@ -139,7 +137,7 @@ class InterfaceMotion:
         self._vectors[nodes] = shift[leaders]
         index = each.zone - 1
         part = self.mesh.parts[index]
-        alone = self._alone[index]
+        alone = self._alone[index].case
         self._names[index] |= {names_in(self.mesh, part)[each.other]}
         here = np.flatnonzero(self.led[part.points])
         vectors = self._vectors[part.points][here]
@@ -147,6 +145,12 @@ class InterfaceMotion:
         roles: dict[str, Role] = {**alone.roles, **dict.fromkeys(names, "moving")}
         motions = *alone.motions, Prescribed(here, vectors, names)
         self.cases[index] = alone.change(roles=roles, motions=motions)
+
+    def prepared(self, index: int) -> Prepared:
+        """Return a zone with its case, checked again if it follows others."""
+        zone = self._alone[index]
+        case = self.cases[index]
+        return zone if case is zone.case else prepare(case, zone.mesh)
 
     def after(self, steps: Mapping[int, Step]) -> Assembly:
         """Return the mesh of all zones after steps of some, in which interfaces fit to the bit.
@@ -175,7 +179,7 @@ def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     """
     if not isinstance(mesh, Assembly):
         return check_motion(case, mesh)
-    motion = InterfaceMotion(case, mesh)
+    motion = InterfaceMotion(Prepared(case, mesh), mesh)
     folded = None
     for index, _ in motion.leaders_first():
         problem, overlap = check_motion(motion.cases[index], mesh.parts[index].mesh)
@@ -189,13 +193,9 @@ Runs = dict[int, list[Step]]
 """The steps of zones, by their place in the mesh, in the order in which they were deformed."""
 
 
-def zone_runs(case: Case, mesh: Assembly, run: Run, report: Report) -> tuple[InterfaceMotion, Runs]:
-    """Return the motion of interfaces, and the steps of those zones that move, each by ``run``.
-
-    Raises CaseError if the case does not fit the mesh.
-    """
-    require_valid(case, mesh)
-    motion = InterfaceMotion(case, mesh)
+def zone_runs(motion: InterfaceMotion, run: Run, report: Report) -> Runs:
+    """Return the steps of those zones that move, each by ``run``."""
+    mesh = motion.mesh
     runs = Runs()
     for index, ahead in motion.leaders_first():
         done = len(runs)
@@ -210,13 +210,13 @@ def zone_runs(case: Case, mesh: Assembly, run: Run, report: Report) -> tuple[Int
             report(replace(now, step=step, total=total, zone=zone))
 
         try:
-            runs[index] = list(run(motion.cases[index], part.mesh, zone_report))
+            runs[index] = list(run(motion.prepared(index), zone_report))
         except SlidevizError as problem:
             problem.args = (f"zone {index + 1}: {problem}",)
             raise
         shift = runs[index][-1].mesh.points - part.mesh.points
         motion.slid(index, shift, np.flatnonzero(shift.any(axis=1)), ahead)
-    return motion, runs
+    return runs
 
 
 def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:

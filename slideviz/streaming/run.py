@@ -19,7 +19,6 @@ import numpy as np
 
 from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
-from slideviz.case.zones import with_marker_names
 from slideviz.errors import CaseError, NodeError
 from slideviz.mesh.model import Assembly, IntArray, Mesh
 from slideviz.mesh.quality import Quality
@@ -27,6 +26,7 @@ from slideviz.mesh.zones import zones_of
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
+from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step, step_timer
@@ -220,14 +220,15 @@ class _ZoneRuns:
 
     def deform_all(self, case: Case, read: Callable[[], Mesh]) -> None:
         """Deform all zones of the skin that ``read`` returns, and write all their points."""
-        skin = read()
+        prepared = prepare(case, read())
+        skin = prepared.mesh
         if not isinstance(skin, Assembly):
-            steps = self._deform(case, skin, self._remaining)
-            del skin  # the cells are let go of on the way
+            steps = self._deform(prepared, self._remaining)
+            del skin, prepared  # the cells are let go of on the way
             deque(steps, 0)
             return
-        motion, _ = zone_runs(with_marker_names(case, skin), skin, self._deform, self._remaining)
-        self._joined = motion
+        self._joined = motion = InterfaceMotion(prepared, skin)
+        zone_runs(motion, self._deform, self._remaining)
         last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
         for zone, after in enumerate(zones_of(motion.after(last))):
             if zone not in last:
@@ -251,24 +252,26 @@ class _ZoneRuns:
             )
             self._measured.pop(zone, None)
 
-    def _deform(self, case: Case, skin: Mesh, report: ReportProgress) -> Iterator[Step]:
+    def _deform(self, prepared: Prepared, report: ReportProgress) -> Iterator[Step]:
         """Yield the steps of a zone, whose points are in the file then, mended if asked for.
 
         With STEPS= auto, trials write all points of the zone to rate them.
         """
+        case = prepared.case
+        skin = prepared.mesh
         assert skin.part is not None
         zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
-        case = with_marker_names(case, skin)
         timer = step_timer(report, 1, max(1, case.steps))
         give_back()
         with _naming_file_nodes(skin.part.points):
             with timer.phase("classify"):
-                setup = make_setup(case, skin)
+                setup = make_setup(prepared)
             require_memory(setup, case)
             # Let go of what is not needed any more: cells and joints, after the steps the tracks.
             whole = skin if case.repair != "no" else None
             full = setup if whole else None
             skin = without_cells(skin)
+            del prepared
             pairs = np.empty((0, 2), np.int64)
             boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
             setup = replace(setup, boundary=boundary)

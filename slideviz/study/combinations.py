@@ -28,6 +28,7 @@ from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
 from slideviz.session.jit_warmup import warm_up
 from slideviz.solver.deform import deform
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.steps import Progress, Step
 from slideviz.system import csv_table
@@ -330,7 +331,8 @@ def compare(
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
     clock = _Clock()
     with clock:
-        setup = None if isinstance(mesh, Assembly) else make_setup(combination.applied(case), mesh)
+        prepared = prepare(combination.applied(case), mesh)
+        setup = None if isinstance(mesh, Assembly) else make_setup(prepared)
     return _Shared(combination, setup, clock.seconds, clock.processor)
 
 

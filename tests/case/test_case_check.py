@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.check import check_case, contradictions, require_valid
+from slideviz.case.check import check_case, contradictions
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
+from slideviz.solver.prepare import prepare
 
 UP = Translate("UPPER", (0.0, 0.1))
 
@@ -36,7 +37,7 @@ def good(**values) -> Case:
 )
 def test_good_cases(square, case):
     assert check_case(case, square) == ()
-    require_valid(case, square)
+    prepare(case, square)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +150,7 @@ def test_good_cases(square, case):
 def test_one_problem(square, case, words):
     assert check_case(case, square) == (words,)
     with pytest.raises(CaseError) as caught:
-        require_valid(case, square)
+        prepare(case, square)
     assert str(caught.value) == words
 
 
@@ -181,7 +182,7 @@ def test_all_problems_at_once(square):
     case = Case(roles={"A": "fixed", "LEFT": "periodic"}, periodic="moving")
     assert len(check_case(case, square)) == 4
     with pytest.raises(CaseError) as caught:
-        require_valid(case, square)
+        prepare(case, square)
     assert str(caught.value).splitlines() == list(check_case(case, square))
 
 

@@ -11,6 +11,7 @@ from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem
 from slideviz.solver import deform as solver
 from slideviz.solver.deform import _systems
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, far_field, sphere_in_box
 
@@ -92,7 +93,7 @@ def test_a_far_field_out_of_reach_is_in_no_system_and_keeps_its_bits(sliding, ke
     assert last.mesh.points[far].tobytes() == mesh.points[far].tobytes()
     assert (last.mesh.points[~outside] != mesh.points[~outside]).any(axis=1).mean() > 0.9
     # The memory that a run may take is that of the body's system; a deformer keeps all rows.
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     assert max(_systems(setup, case, lasting=False)) == len(body)
     monkeypatch.setattr(solver, "free_memory", lambda: 30.0 * len(body) ** 2)
     with pytest.raises(DeformError, match="GB are free"):

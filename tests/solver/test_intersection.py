@@ -16,6 +16,7 @@ from slideviz.session.jobs import find_intersection
 from slideviz.solver import intersection
 from slideviz.solver.intersection import folding_message, jump_message
 from slideviz.solver.intersection import intersection_message as message
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, cube, make_mesh, passage, sector, sphere_in_box
 from tools.laws.cases import random_run
@@ -338,7 +339,7 @@ def test_a_run_warns_of_a_body_that_goes_through_itself():
     case = case.change(motions=(moved,), steps=1)
     assert any(
         text.startswith("sphere goes through itself near (") and text.endswith("move it less")
-        for text in make_setup(case, mesh).warnings
+        for text in make_setup(prepare(case, mesh)).warnings
     )
     less = case.change(motions=(Prescribed(nodes, 0.1 * vectors),))
-    assert not make_setup(less, mesh).warnings
+    assert not make_setup(prepare(less, mesh)).warnings

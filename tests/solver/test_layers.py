@@ -20,6 +20,7 @@ from slideviz.samples.table import sample
 from slideviz.session import jobs
 from slideviz.session.run_messages import warnings_of
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver.prepare import prepare
 from slideviz.solver.remedies import remedies
 from slideviz.solver.setup import make_setup
 from tests import builders
@@ -109,7 +110,7 @@ def test_first_heights_that_differ_along_the_wall_stay(motion):
 def test_a_wall_that_only_turns_takes_its_zone_along_exactly():
     mesh = around(ellipse, 40, 80)
     case, last = deformed(mesh, Rotate("w", 25.0, (0.3, 0.1)), steps=2)
-    zone = make_setup(case, mesh).zone
+    zone = make_setup(prepare(case, mesh)).zone
     c, s = np.cos(np.radians(25)), np.sin(np.radians(25))
     turned = (mesh.points - [0.3, 0.1]) @ np.array([[c, s], [-s, c]]) + [0.3, 0.1]
     whole = zone.nodes[zone.share[:, 0] == 1.0]
@@ -176,7 +177,7 @@ def test_a_zone_thicker_than_a_channel_is_told(thickness, told):
     case = Case(
         roles=roles, motions=motions, sliding="ps", layers="keep", layer_thickness=thickness
     )
-    said = [text for text in make_setup(case, mesh).warnings if "LAYER_THICKNESS" in text]
+    said = [text for text in make_setup(prepare(case, mesh)).warnings if "LAYER_THICKNESS" in text]
     assert len(said) == 2 * told  # of both walls
     if told:
         assert "0.021 is more than the distance from y_m to the next wall, 0.02:" in said[0]
@@ -189,7 +190,7 @@ def test_a_zone_thicker_than_a_channel_is_told(thickness, told):
 def test_a_zone_thinner_than_the_first_layer_is_told(thickness, words):
     mesh = around(ellipse, 40, 80)
     case, _ = deformed(mesh, MOTIONS["bent"], layer_thickness=thickness)
-    said = [text for text in make_setup(case, mesh).warnings if "LAYER_THICKNESS" in text]
+    said = [text for text in make_setup(prepare(case, mesh)).warnings if "LAYER_THICKNESS" in text]
     assert len(said) == bool(words)
     assert words in "".join(said)
 
@@ -198,7 +199,9 @@ def test_a_zone_thinner_than_the_first_layer_is_told(thickness, words):
 def test_a_zone_without_nodes_is_told(thickness, told, tmp_path):
     mesh = around(ellipse, 12, 80, first=0.05)
     case, _ = deformed(mesh, MOTIONS["bent"], layers="keep", layer_thickness=thickness)
-    said = [text for text in make_setup(case, mesh).warnings if "LAYERS= KEEP has no" in text]
+    said = [
+        text for text in make_setup(prepare(case, mesh)).warnings if "LAYERS= KEEP has no" in text
+    ]
     assert len(said) == told
 
 
@@ -207,27 +210,33 @@ def test_the_next_wall_may_be_the_periodic_image():
     for thickness in (0.2, 2.0):
         pitch = row.mesh.extent * thickness
         case = row.case.change(layers="keep", layer_thickness=pitch)
-        said = [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICKNESS" in text]
+        said = [
+            text
+            for text in make_setup(prepare(case, row.mesh)).warnings
+            if "LAYER_THICKNESS" in text
+        ]
         assert [text.partition("from ")[2].partition(" to")[0] for text in said] == ["BLADE"]
     case = row.case.change(layers="keep", layer_thickness=1e-2 * row.mesh.extent)
-    assert not [text for text in make_setup(case, row.mesh).warnings if "LAYER_THICK" in text]
+    assert not [
+        text for text in make_setup(prepare(case, row.mesh)).warnings if "LAYER_THICK" in text
+    ]
 
 
 def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
     mesh = around(ellipse, 12, 80, first=0.05)
     case, last = deformed(mesh, MOTIONS["bent"])
-    assert make_setup(case, mesh).zone is None
+    assert make_setup(prepare(case, mesh)).zone is None
     assert last.kept_layers is None
     case, last = deformed(mesh, MOTIONS["bent"], layers="keep", layer_thickness=0.1)
-    assert last.kept_layers.nodes == len(make_setup(case, mesh).zone.nodes) > 0
+    assert last.kept_layers.nodes == len(make_setup(prepare(case, mesh)).zone.nodes) > 0
 
 
 def test_periodic_images_are_carried_alike():
     """A vane whose zone reaches the periodic side: `deform` refuses images that differ."""
     row = sample("turbine-row", 5000)
     case = row.case.change(motions=(Rotate("BLADE", 8.0),), layers="keep", layer_thickness=0.01)
-    zone = make_setup(case, row.mesh).zone
-    setup = make_setup(case, row.mesh)
+    zone = make_setup(prepare(case, row.mesh)).zone
+    setup = make_setup(prepare(case, row.mesh))
     assert np.isin(setup.images[:, 0], zone.nodes).sum() > 5
     *_, last = sv.deform(case, row.mesh)
     assert last.periodic_misfit < 1e-15
@@ -302,7 +311,7 @@ def test_in_3d_with_nodes_that_slide_on_hub_and_shroud(motion):
         layers="auto",
         steps=2,
     )
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     assert len(setup.zone.sliding) >= 48
     *_, last = sv.deform(case, mesh)
     walls = sv.walls(last.mesh, mesh).summary()["wall"]

@@ -20,6 +20,7 @@ from slideviz.session.motions import Ghosts
 from slideviz.session.run_messages import remedy_for
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.growth import wall_warnings
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.streaming.run import stream
 from tests import builders
@@ -141,7 +142,7 @@ def test_rims_are_on_a_hub_after_each_step(angles, some):
     origin, end = turn(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), angles)
     about = {"axis": tuple((end - origin).tolist()), "origin": tuple(origin.tolist())}
     case = case_of(blade(mesh), some, periodic="moving", steps=2, **about)
-    frame = make_setup(case, mesh).frame
+    frame = make_setup(prepare(case, mesh)).frame
     for step in sv.deform(case, mesh):
         for wall, radius in (("hub", 0.5), ("shroud", 1.0)):
             rim = np.intersect1d(mesh.marker(wall).nodes, mesh.marker("blade").nodes)
@@ -224,10 +225,10 @@ def test_boundaries_that_nothing_slides_on_are_no_walls():
     mesh = builders.cube(4, block=False)
     roles = {"x_m": "moving"} | dict.fromkeys(("y_m", "y_p"), "periodic")
     case = case_of(roles, [sv.Translate("x_m", (0.0, 0.0, 0.1))], periodic="moving")
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     assert setup.rims is None
     internal = case.change(roles=roles | {"z_m": "internal"})
-    assert [wall.names for wall in make_setup(internal, mesh).rims.walls] == [("z_m",)]
+    assert [wall.names for wall in make_setup(prepare(internal, mesh)).rims.walls] == [("z_m",)]
 
 
 @pytest.mark.parametrize("rims", ["free", "slide"])
@@ -261,7 +262,7 @@ def test_rims_that_left_their_wall_are_a_remedy_of_folded_cells(rims):
 def test_a_rim_that_cannot_be_brought_back_has_another_remedy():
     mesh = builders.cube(4, block=False)
     case = case_of(box(mesh), [sv.Translate("x_m", (0.0, 0.1, 0.1))])
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     after = mesh.points + np.array([0.0, 0.1, 0.0])
     (text, *_) = wall_warnings(setup, case, mesh, after)
     assert text.endswith(", to which it cannot be brought back; move it less")
@@ -419,7 +420,7 @@ def test_a_wall_with_edges_is_told_of_once():
     roles = blade(mesh) | {"per1": "fixed", "per2": "fixed"}  # so that facets of the hub are flat
     case = case_of(roles, [sv.Translate("blade", (0.02, 0.01, 0.0))], rims="free")
     case = case.change(feature_angle_deg=1.0)
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     step = last(case, mesh)
     told = re.findall(LEFT, "\n".join(step.warnings))
     names = [wall for wall, _ in told]

@@ -7,6 +7,7 @@ import slideviz as sv
 from slideviz.case.keys import KEYS
 from slideviz.case.motion import displacements
 from slideviz.errors import ArgumentError
+from slideviz.solver.prepare import prepare
 from slideviz.solver.prescribed import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies
 from slideviz.solver.setup import make_setup
 from tests.builders import far_field
@@ -15,7 +16,7 @@ from tests.builders import far_field
 def radius(mesh, *motions, **values):
     """Return the support radius of a case where the given motions move their markers."""
     roles = {name: "moving" for motion in motions for name in (motion.marker,)}
-    return make_setup(sv.Case(roles=roles, motions=motions, **values), mesh).basis.radius
+    return make_setup(prepare(sv.Case(roles=roles, motions=motions, **values), mesh)).basis.radius
 
 
 def test_a_small_body_has_a_radius_of_fifteen_times_its_size():
@@ -45,14 +46,14 @@ def test_only_bodies_that_are_displaced_count():
         roles={"body": "moving", "other": "moving"},
         motions=(sv.Translate("body", (0.1, 0.0)), sv.Translate("other", (0.0, 0.0))),
     )
-    setup = make_setup(both, mesh)
+    setup = make_setup(prepare(both, mesh))
     body = np.ptp(mesh.points[mesh.marker("body").nodes], axis=0).max()
     assert setup.basis.radius == BODIES * body
     still = both.change(motions=(sv.Translate(("body", "other"), (0.0, 0.0)),))
     boxes = moving_bodies(still, mesh, displacements(still, mesh))
     other = np.ptp(mesh.points[mesh.marker("other").nodes], axis=0).max()
     assert len(boxes) == 2
-    assert make_setup(still, mesh).basis.radius == BODIES * max(body, other)
+    assert make_setup(prepare(still, mesh)).basis.radius == BODIES * max(body, other)
 
 
 def test_one_marker_of_two_bodies_is_two_bodies():

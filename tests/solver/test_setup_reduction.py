@@ -12,6 +12,7 @@ from slideviz.session.run_messages import remedy_for
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver import setup
 from slideviz.solver.deform import Step
+from slideviz.solver.prepare import prepare
 from slideviz.streaming.run import stream
 from tests import builders
 
@@ -37,9 +38,9 @@ def test_up_to_its_limit_it_is_the_exact_method_to_the_bit(passage):
 def test_the_limit_counts_periodic_images_once(passage, monkeypatch):
     count = _last(passage.case.change(steps=1), passage.mesh).candidates
     monkeypatch.setattr(setup, "EXACT_NODES", count)
-    assert setup.make_setup(passage.case, passage.mesh).reduction is None
+    assert setup.make_setup(prepare(passage.case, passage.mesh)).reduction is None
     monkeypatch.setattr(setup, "EXACT_NODES", count - 1)
-    assert setup.make_setup(passage.case, passage.mesh).reduction is not None
+    assert setup.make_setup(prepare(passage.case, passage.mesh)).reduction is not None
 
 
 def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeypatch):
@@ -47,7 +48,7 @@ def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeyp
     exact = _last(case.change(reduction=None), mesh)
     monkeypatch.setattr(setup, "EXACT_NODES", 10)
     found = _last(case, mesh)
-    prepared = setup.make_setup(case, mesh)
+    prepared = setup.make_setup(prepare(case, mesh))
     largest = np.linalg.norm(prepared.target, axis=1).max()
     assert found.tolerance == pytest.approx(1e-3 * largest)
     assert found.max_error <= found.tolerance
@@ -123,7 +124,7 @@ def test_layers_that_it_cannot_follow_are_told(monkeypatch):
 def test_a_fixed_wall_beside_layers_changes_no_tolerance(monkeypatch):
     mesh, case = _layers(monkeypatch)
     roles = case.roles | {"hub": "fixed", "shroud": "fixed"}
-    assert setup.make_setup(case.change(roles=roles), mesh).reduction.tolerance > 9e-5
+    assert setup.make_setup(prepare(case.change(roles=roles), mesh)).reduction.tolerance > 9e-5
 
 
 def test_a_streamed_run_stays_below_half_of_the_first_layer_too(tmp_path, monkeypatch):

@@ -140,9 +140,9 @@ def test_methods_really_differ(square):
 def test_the_plan_is_made_once_for_all_numbers_of_steps(square, monkeypatch):
     made = []
 
-    def counted(case, mesh):
-        made.append((case.sliding, case.periodic))
-        return make_setup(case, mesh)
+    def counted(prepared):
+        made.append((prepared.case.sliding, prepared.case.periodic))
+        return make_setup(prepared)
 
     make_setup = comparing.make_setup
     monkeypatch.setattr(comparing, "make_setup", counted)

@@ -30,6 +30,7 @@ from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
+from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step
 
@@ -418,7 +419,7 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
         steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
         step = Step.joined(mesh, mesh, steps, steps, next(iter(steps.values())))
         return replace(step, warnings=(*case.warnings, *step.warnings))
-    setup = make_setup(case, mesh)
+    setup = make_setup(prepare(case, mesh))
     return Step(
         index=1,
         total=1,

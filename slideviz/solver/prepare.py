@@ -1,0 +1,42 @@
+"""A case that fits its mesh: names are resolved, and every check is done once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from slideviz.case.check import check_case, raise_all
+from slideviz.case.model import Case
+from slideviz.case.motion import by_zone
+from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.mesh.model import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A case, and the mesh that it fits."""
+
+    case: Case  # with the names of the boundaries that the mesh has
+    mesh: Mesh
+
+    @cached_property
+    def alone(self) -> Case:
+        """The case in which no motion joins several zones (`by_zone`)."""
+        return by_zone(self.case, self.mesh)
+
+    @cached_property
+    def zones(self) -> tuple[Prepared, ...]:
+        """Each zone with its case; of a mesh of one zone, that."""
+        cases = zone_cases(self.alone, self.mesh)
+        each = zip(cases, self.mesh.parts, strict=True)
+        return tuple(Prepared(case, part.mesh) for case, part in each)
+
+
+def prepare(case: Case, mesh: Mesh) -> Prepared:
+    """Return a case with a mesh that it fits.
+
+    Raises CaseError with a line for each problem where it does not fit.
+    """
+    case = with_marker_names(case, mesh)
+    raise_all(check_case(case, mesh))
+    return Prepared(case, mesh)
