@@ -242,7 +242,7 @@ def test_displacement_is_colored_up_to_its_largest(folder, capsys):
         ("square.su2", ["--plane", "z=0"], "does not cut this 2D mesh; give a normal in x and y"),
         ("square.su2", ["--cylinder", "0.5,x"], "its axis is not z, so it needs a 3D mesh"),
         ("cube.su2", ["--plane", "z=0.4", "--range", "1,0"], "the first number must be"),
-        ("cube.su2", ["--plane", "z=0.4", "--copies", "wheel"], "makes no whole wheel"),
+        ("cube.su2", ["--plane", "z=0.4", "--copies", "wheel"], "do not close a wheel"),
         ("none.su2", ["--plane", "z=0.4"], "none.su2"),
     ],
 )

@@ -150,7 +150,7 @@ _EDIT = Menu("edit", "&Edit", entries=(
             title_now=lambda now: f"Undo {now.undo}".rstrip(),
             tip_now=lambda now: now.undo and f"Undo {now.undo}"),
     Command("redo", "Redo", "Redo the change that was undone.",
-            lambda w: _undo_or_redo(w, w.store.redo, w.store.can_redo, "Done again"),
+            lambda w: _undo_or_redo(w, w.store.redo, w.store.can_redo, "Redone"),
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
             title_now=lambda now: f"Redo {now.redo}".rstrip(),
             tip_now=lambda now: now.redo and f"Redo {now.redo}"),
@@ -167,7 +167,7 @@ _RUN = Menu("run", "&Run", entries=(
             button_key="Esc"),
     Command("repair", "Re&pair",
             "Mend the inverted and poor cells of the last step of the run that is shown, or of the "
-            "mesh: by moving nodes near them, never those of moving and fixed boundaries.",
+            "mesh: by moving nodes near them, never nodes of moving and fixed boundaries.",
             lambda window: window.running.repair(), ("F7",), enabled=needs_repair,
             tip_now=why_not(needs_repair, "No cell needs repair: all are proved valid, and their "
                             "quality is above the limit in the method panel.")),
@@ -181,8 +181,8 @@ _RUN = Menu("run", "&Run", entries=(
 
 _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.", (
     Command("fit_colors", "Fit to this step",
-            "Let the colors range over the values of the step that is shown, and of the other "
-            "one in a comparison.",
+            "Let the colors range over the values of the step that is shown, and of the other step "
+            "in a comparison.",
             lambda window: window.store.change(fit_colors, every=False),
             ("R",), enabled=colored_by_value,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
@@ -192,7 +192,7 @@ _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.",
             "whole film.",
             lambda window: window.store.change(fit_colors, every=True),
             ("Shift+R",), enabled=colored_by_value),
-    Command("usual_colors", "As ever", "Use the default range of the colors.",
+    Command("usual_colors", "Default range", "Use the default range of the colors.",
             lambda window: window.store.change(changes.set_view, color_range=None),
             enabled=lambda now: colored_by_value(now) and now.session.view.color_range is not None,
             title_now=lambda now: usual_range(now.session)),

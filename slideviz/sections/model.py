@@ -84,8 +84,8 @@ class Section:
             )
         if not np.linalg.norm(self.direction) > 0:
             raise CaseError(
-                f"{self.kind} section: the {terms.direction} 0, 0, 0 has no direction; give 0, 0, "
-                "1 or such"
+                f"{self.kind} section: the {terms.direction} 0, 0, 0 has no direction; write e.g. "
+                "0, 0, 1"
             )
         fault = terms.size.fault(self.size) if terms.size is not None else ""
         if fault:

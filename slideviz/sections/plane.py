@@ -115,7 +115,7 @@ class Plane(Shape):
     def miss(self, section: Section, points: FloatArray) -> str:
         normal = np.abs(section.basis[2])
         if not normal[: points.shape[1]].any():
-            return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
+            return "does not cut this 2D mesh; give a normal in x and y, e.g. y=0"
         axis = int(np.argmax(normal))
         if normal[axis] > 1.0 - 1e-12:
             ends = points[:, axis].min(), points[:, axis].max()

@@ -200,7 +200,7 @@ def walls_of(section: Section) -> SpanWalls:
     """Return the walls of a section of constant span; CaseError where none are known."""
     if section.walls is None:
         raise CaseError(
-            "a section of constant span needs hub and shroud: name them in SPAN, or by --between"
+            "a section of constant span needs hub and shroud: name them in SPAN or --between"
         )
     return section.walls
 

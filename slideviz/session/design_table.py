@@ -60,7 +60,7 @@ class DesignTable:
         numbers = list(values)
         count = len(others) * len(numbers) + there * len(self.rows)
         if count > MOST:
-            raise CaseError(f"{count:,} designs are too many; {MOST:,} are not")
+            raise CaseError(f"{count:,} designs exceed the limit of {MOST:,}")
         rows = [(*left, value, *right) for left, right in others for value in numbers]
         return DesignTable(columns, tuple(dict.fromkeys((*self.rows, *rows)) if there else rows))
 

@@ -478,7 +478,7 @@ def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
 def raise_if_cancelled(stopped: Stopped) -> None:
     """Raise Cancelled if ``stopped()`` returns True: the job was asked to stop."""
     if stopped():
-        raise Cancelled("stopped, as you asked")
+        raise Cancelled("stopped on request")
 
 
 def _tick(text: str, report: Report, stopped: Stopped) -> Callable[[float], None]:

@@ -34,7 +34,7 @@ def moves_nothing(motion: Motion) -> bool:
 
 
 def factor_of(motions: Sequence[Motion], others: Sequence[Motion]) -> float | None:
-    """Return how many times as far ``motions`` go as ``others``; None where they differ besides."""
+    """Return the common scale factor of two motion lists; None if they differ in more."""
     at_rest = scaled(motions, 0.0)
     if at_rest is None or at_rest != scaled(others, 0.0):
         return None

@@ -69,13 +69,13 @@ def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]
     """Return the transformation (4, 4) of each passage by its number; 0 is the mesh itself.
 
     ``count``: neighbours on each side, or all around; on a wheel each passage is there once at
-    most. Raises CaseError if it is negative, or the period makes no whole wheel.
+    most. Raises CaseError if it is negative, or copies do not close a wheel.
     """
     around = pair.around
     if count == "wheel" and around is None:
         raise CaseError(
-            f"{pair.first!r} and {pair.second!r} repeat by {pair.describe()}, which makes no whole "
-            "wheel; give the number of neighbours on each side"
+            f"{pair.first!r} and {pair.second!r} repeat by {pair.describe()}, so copies do not "
+            "close a wheel; give the number of neighbours on each side"
         )
     if count != "wheel" and count < 0:
         raise CaseError(f"{count} neighbouring passages; give 0 or more")

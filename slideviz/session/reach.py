@@ -70,8 +70,8 @@ def _lowest(frames: Sequence[StepFrame], parts: Sequence[float], at: float) -> f
 
 
 TYPED_TIP = (
-    "All cells are proved valid so far on that run's own path: straight in each step, beyond the "
-    "last step straight on. A new run in one step has the path of a run in one step for "
+    "All cells are proved valid up to there on that run's own path: straight in each step, beyond "
+    "the last step straight on. A new run in one step has the path of a run in one step for "
     "translations, if control nodes and support radius stay the same and no cell is repaired. "
     "Rotations and several steps lead to other paths, so run it to be sure."
 )

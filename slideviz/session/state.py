@@ -97,7 +97,7 @@ __all__ = [
 
 IN_FILE = (
     "Not available for this mesh, which stays in its file: only its boundary, its worst cells and "
-    "those of sections are in memory."
+    "the cells of sections are in memory."
 )
 """The message where something cannot be done with a mesh too large for memory."""
 

@@ -194,7 +194,7 @@ class Store:
 
     @contextmanager
     def reverting(self) -> Iterator[None]:
-        """Within, a change to what was there before the last ones of its kind undoes these."""
+        """Context in which restoring an earlier value counts as undo."""
         self._taking_back = True
         try:
             yield

@@ -472,7 +472,7 @@ def test_quality_of_the_step_that_is_shown_as_csv(ran, answers, tmp_path):
 def test_a_cancelled_table_leaves_no_file(computed, tmp_path):
     from slideviz.errors import Cancelled
 
-    with pytest.raises(Cancelled, match="as you asked"):
+    with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_quality(
             tmp_path / "q.csv", computed[0].session.first, lambda _: None, lambda: True
         )
@@ -510,7 +510,7 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
         in_dialog(look)
         act.trigger()
         driver.settle()
-    assert shown == ["the whole wheel, 9", "those in the view, 3"]
+    assert shown == ["the whole wheel, 9", "the passages in the view, 3"]
     whole, part = read(tmp_path / "wheel.su2"), read(tmp_path / "part.su2b")
     assert (len(whole.cells), len(part.cells)) == (9 * len(mesh.cells), 3 * len(mesh.cells))
     assert "per1" not in whole.marker_names
@@ -580,7 +580,7 @@ def test_cancelled_steps_keep_whole_files(steps, tmp_path):
     from slideviz.errors import Cancelled
 
     said = []
-    with pytest.raises(Cancelled, match="as you asked"):
+    with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_steps(tmp_path / "s.su2", steps, said.append, lambda: len(said) > 0)
     assert [path.name for path in tmp_path.glob("s_*")] in ([], ["s_1.su2"])
 

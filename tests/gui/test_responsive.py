@@ -99,7 +99,7 @@ def test_every_part_of_opening_asks_whether_to_stop(case_file):
     jobs.open_file(case_file, None, lambda _: None, never)
     assert never.asked > 10
     for stop_at in range(1, never.asked + 1):
-        with pytest.raises(Cancelled, match="as you asked"):
+        with pytest.raises(Cancelled, match="stopped on request"):
             jobs.open_file(case_file, None, lambda _: None, Counter(stop_at))
 
 
@@ -119,7 +119,7 @@ def test_a_stopped_save_leaves_the_old_file(case_file, tmp_path):
     target = tmp_path / "out.su2"
     target.write_text("old")
     opened = jobs.open_file(case_file, None, lambda _: None, lambda: False)
-    with pytest.raises(Cancelled, match="as you asked"):
+    with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_mesh(target, opened.session.first, False, lambda _: None, lambda: True)
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]

@@ -90,7 +90,7 @@ def test_open_begins_in_the_folder_of_the_mesh(driver, sample_folder, answers, s
 
 
 def test_a_sample_can_be_cancelled_while_it_is_made(small):
-    with pytest.raises(Cancelled, match="as you asked"):
+    with pytest.raises(Cancelled, match="stopped on request"):
         jobs.open_sample("passage", small, lambda _: None, lambda: True)
 
 

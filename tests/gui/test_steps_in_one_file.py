@@ -43,7 +43,7 @@ def test_all_steps_go_into_one_file(ran, answers, tmp_path):
 
 def test_cancelled_steps_leave_no_file(ran, tmp_path):
     said = []
-    with pytest.raises(Cancelled, match="as you asked"):
+    with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_steps(
             tmp_path / "s.vtkhdf", ran.session.frames[1:], said.append, lambda: len(said) > 0
         )

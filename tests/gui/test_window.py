@@ -1095,7 +1095,7 @@ def test_colors_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_wh
     undo.trigger()
     assert said() == "Undone: mesh edges"
     redo.trigger()
-    assert said() == "Done again: mesh edges"
+    assert said() == "Redone: mesh edges"
     keys = {keys.toString() for keys in redo.shortcuts()}
     assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
     bar = opened.window.actions_table

@@ -65,7 +65,7 @@ def test_numbers_are_combined(monkeypatch):
     assert again.columns == table.columns
     assert again.rows == (*table.rows, ("7", "x"), ("7", "y"))
     monkeypatch.setattr(design_table, "MOST", 7)
-    with pytest.raises(CaseError, match="8 designs are too many"):
+    with pytest.raises(CaseError, match="8 designs exceed the limit of"):
         table.crossed("c", ["1", "2"])
 
 

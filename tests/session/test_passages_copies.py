@@ -58,7 +58,7 @@ def test_what_makes_no_wheel_says_so():
     assert flat.around is None
     assert odd.around is None
     for pair in (flat, odd):
-        with pytest.raises(CaseError, match="makes no whole wheel; give the number"):
+        with pytest.raises(CaseError, match="do not close a wheel; give the number"):
             passages(pair, "wheel")
     assert len(passages(odd, 20)) == 41
 

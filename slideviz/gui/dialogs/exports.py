@@ -328,7 +328,7 @@ OPTIONS = {
         "Without it, it shows the same part of the mesh as the view.",
     ),
     "marked": ("Marked cell", "Its outline, with its number and its value."),
-    "both": ("Both runs beside each other", "As the two views, with one legend."),
+    "both": ("Both runs side by side", "Like the two views, with one legend."),
 }
 """Text and tip of the check box for each field of `PictureOptions` that is a bool."""
 

@@ -27,7 +27,7 @@ def passage_choices(session: Session, around: Sequence[int]) -> dict[int | Liter
     numbers = " and ".join(map(str, around))
     words: dict[int | Literal["all"], str] = {"all": f"the whole wheel, {numbers}"}
     if 1 < shown < min(around):
-        words[shown] = f"those in the view, {shown}"
+        words[shown] = f"the passages in the view, {shown}"
     return words
 
 
@@ -54,8 +54,8 @@ class WheelDialog(QDialog):
         self.passages.chosen.connect(lambda _: self._draw())
         self.numbered = check_box(
             "Number the boundaries",
-            "Give each passage boundaries of its own: blade_1, blade_2. Otherwise each boundary is "
-            "that of all passages.",
+            "Give each passage boundaries of its own: blade_1, blade_2. Otherwise each boundary "
+            "belongs to all passages.",
             name="wheel_numbered",
         )
         self.words = hint_label()
@@ -81,7 +81,7 @@ class WheelDialog(QDialog):
         assert mesh is not None
         many = self._around if count == "all" else [count] * len(self._around)
         cells = sum(k * len(zone.cells) for k, zone in zip(many, zones_of(mesh), strict=True))
-        self.words.setText(f"{cells:,} cells; where passages meet, nodes are one.")
+        self.words.setText(f"{cells:,} cells; nodes are merged where passages meet.")
         self._runner.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:

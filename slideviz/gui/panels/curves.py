@@ -122,7 +122,7 @@ class CurvesPanel(Panel):
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
         self.whole = check_box(
             "0–1",
-            "Show all possible qualities instead of those of the curves.",
+            "Show all possible qualities instead of the qualities of the curves.",
             lambda _: self.canvas.request_draw(),
             "whole_quality",
         )
@@ -132,7 +132,7 @@ class CurvesPanel(Panel):
         self.what = Choice(WHAT, "The lowest or the mean quality of each layer.")
         self.coordinate = Choice(
             {},
-            "What the layers of the undeformed mesh are counted along; the radius is that about "
+            "What the layers of the undeformed mesh are counted along; the radius is measured from "
             "the axis of the case.",
         )
         both = (self.what, self.coordinate)

@@ -45,7 +45,7 @@ from slideviz.session.run_messages import stopped_words
 from slideviz.session.state import Session
 
 EMPTY = "This plot shows curves of quality: add designs, and run them."
-FAILED = "No design has a result yet: those that were run failed."
+FAILED = "No design has a result yet: all that were run failed."
 
 
 class DesignCanvas(PlotCanvas):

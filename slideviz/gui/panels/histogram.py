@@ -151,7 +151,9 @@ class HistogramPanel(Panel):
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
         self.whole = check_box(
-            "0–1", "Show all possible values instead of those of the cells.", name="whole_range"
+            "0–1",
+            "Show all possible values instead of the values of the cells.",
+            name="whole_range",
         )
         for box in (self.log, self.whole):
             box.toggled.connect(lambda _: self.canvas.request_draw())

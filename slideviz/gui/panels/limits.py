@@ -38,7 +38,7 @@ FIELD_TIP = (
 )
 LIMIT_TIPS = (
     "A click marks the cells that fail the limit with rings, and flies to the worst of them.",
-    "The number at the step that is shown, or that of the worst cell.",
+    "The number at the step that is shown, or at its worst cell.",
     "How many cells fail.",
 )
 """What each column of the list of limits has."""

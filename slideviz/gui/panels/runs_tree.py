@@ -30,7 +30,7 @@ line, the run's own name."""
 
 PAD = 4  # space around the text of a row, in pixels
 TIPS = (
-    "Number, and name (F2) or method; below it what sets it apart. Ctrl+click shows it beside.",
+    "Run and name (F2 renames); below: how it differs. Ctrl+click: side by side.",
     "Lowest quality of a cell after the last step; the best of the runs with one motion is bold.",
     "Mean quality of the cells after the last step.",
     "Inverted cells after the last step.",

@@ -72,7 +72,7 @@ class WarmupThread(QObject):
         self.thread_: Thread | None = None
 
     def watch(self) -> None:
-        """Tell of compilation in other threads too, as of a job, until all loops are compiled."""
+        """Report compilation in other threads like a job, until all loops are compiled."""
         self._watched.enter_context(compilation_watched(self._compilation_begun))
 
     def start(self) -> None:

@@ -94,7 +94,7 @@ class SpanCurveField(QWidget):
         self._refit()
 
     def written(self, text: str) -> str:
-        """Return the text of a curve as the motion would have it; CaseError if it is none."""
+        """Return the text of a curve as the motion would have it; CaseError if it is wrong."""
         assert self._motion is not None
         spans, values = read_curve(text)
         return curve_text(replace(self._motion, spans=spans, values=values))

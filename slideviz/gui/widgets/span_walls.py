@@ -24,7 +24,8 @@ class SpanWalls(Panel):
         super().__init__(store)
         self.ends = tuple(
             Choice(
-                {}, f"The boundary where the span is {words}; at first the one with such a name."
+                {},
+                f"The boundary where the span is {words}; at first the boundary with such a name.",
             )
             for words in WALLS.values()
         )
