@@ -6,13 +6,56 @@ The command line and the window show it as it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
 
+@dataclass(frozen=True)
+class Message:
+    """A sentence for the user, printed as ``place: value rule; remedy``."""
+
+    rule: str
+    remedy: str = ""
+    place: tuple[str | Path, ...] = ()  # from the outermost: a file, a zone, a motion, a key
+    line: int = 0  # of the file, from 1; 0 for none
+    value: str = ""  # in quotes; empty where the rule has it
+    keys: tuple[str, ...] = ()  # of the case file, that contradict each other
+
+    def __str__(self) -> str:
+        return self.printed(printable)
+
+    def printed(self, file: Callable[[Path], str]) -> str:
+        """Return the message with the names that ``file`` gives to files."""
+        line = f":{self.line}" if self.line else ""
+        places = (f"{file(one)}{line}" if isinstance(one, Path) else one for one in self.place)
+        return ": ".join((*places, self.text))
+
+    @property
+    def text(self) -> str:
+        """Return the message without its place."""
+        sentence = f"{self.value} {self.rule}" if self.value else self.rule
+        return f"{sentence}; {self.remedy}" if self.remedy else sentence
+
+
 class SlidevizError(Exception):
-    """An error that the user can correct; the base of all others."""
+    """An error that the user can correct, with a line for each message; the base of all others."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.args))
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Return the messages, one for each mistake."""
+        return tuple(Message(each) if isinstance(each, str) else each for each in self.args)
+
+    def within(self, *places: str | Path, line: int = 0) -> tuple[Message, ...]:
+        """Return the messages with places around their own, and a line if it is not 0."""
+        return tuple(
+            replace(message, place=(*places, *message.place), line=line or message.line)
+            for message in self.messages
+        )
 
 
 class MeshError(SlidevizError):
@@ -21,6 +64,12 @@ class MeshError(SlidevizError):
 
 class CaseError(SlidevizError):
     """The case is wrong: its file, a role, a motion, a setting or a displacement file."""
+
+
+def raise_all(problems: Iterable[str | Message]) -> None:
+    """Raise a CaseError of the problems, if there are any; equal ones count once."""
+    if each := dict.fromkeys(problems):
+        raise CaseError(*each)
 
 
 class DeformError(SlidevizError):
@@ -76,7 +125,7 @@ def printable(path: str | Path) -> str:
 
 def path_error(path: Path, message: str) -> MeshError:
     """Return the error ``path: message``."""
-    return MeshError(f"{printable(path)}: {message}")
+    return MeshError(Message(message, place=(path,)))
 
 
 def shown(text: str) -> str:

@@ -8,15 +8,16 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
+from slideviz.case.lines import Entry, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case, with_paths
-from slideviz.errors import CaseError, nearest, shown
+from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
@@ -28,8 +29,7 @@ def read_case(path: Path) -> Case:
     """Return the case that a file describes; CaseError with a line for each mistake."""
     text, warnings = read_text(path, "case file")
     case, problems, remarks = _parsed(path, text)
-    if problems:
-        raise CaseError(listed(path, problems))
+    raise_all(listed(path, problems))
     case = with_paths(case, lambda file: _from_folder(file, path.parent))
     if case.mesh_file is not None and case.mesh_file == case.mesh_out:
         remarks += (
@@ -51,28 +51,27 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     # Whatever is saved can be opened again: better no file than one with mistakes.
     again, problems, _ = _parsed(path, text)
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:
-        problems = [(0, "a case file cannot hold some of its values; check points and motions")]
-    if problems:
-        raise CaseError("\n".join(f"{path}: cannot be written: {text}" for _, text in problems))
+        problems = [Message("a case file cannot hold some of its values; check points and motions")]
+    raise_all(f"{path}: cannot be written: {problem}" for problem in problems)
     with atomic_write(path, CaseError, case.source) as file:
         file.write(text.encode("utf-8"))
 
 
-def set_key(case: Case, key: str, value: str) -> Case:
-    """Return the case with another value of a key, as ``--set KEY=VALUE`` asks for.
+def set_key(case: Case, key: str, value: str, option: str = "--set") -> Case:
+    """Return the case with another value of a key, as an option such as ``--set`` asks for.
 
     A list of markers replaces all markers with that role; one that had another role loses it. A
     path is relative to the current folder. Contradictions between keys are not looked for here
     but by ``check_case``, so that several keys can be set one after the other. Raises CaseError if
     there is no such key, or the value is wrong.
     """
-    place = f"--set {key}={value}"
+    place = f"{option} {key}={value}"
     row = KEYS.get(key.strip().upper())
-    if row is None:
-        raise CaseError(f"{place}: {_unknown(key)}")
-    if row.group == REDUCTION and row.name != "DATA_REDUCTION" and case.reduction is None:
-        raise CaseError(f"{place}: it needs DATA_REDUCTION= YES; set that first")
     try:
+        if row is None:
+            raise CaseError(_unknown(key))
+        if row.group == REDUCTION and row.name != "DATA_REDUCTION" and case.reduction is None:
+            raise CaseError("it needs DATA_REDUCTION= YES; set that first")
         wanted = row.kind.read(value.strip())
         if row.name in _ROLE_OF:
             role = _ROLE_OF[row.name]
@@ -80,15 +79,14 @@ def set_key(case: Case, key: str, value: str) -> Case:
             case = case.change(roles={k: r for k, r in roles if r != role and k not in wanted})
         changed = row.put(case, wanted)
     except CaseError as problem:
-        lines = str(problem).splitlines()
-        raise CaseError("\n".join(f"{place}: {line}" for line in lines)) from problem
+        raise CaseError(*problem.within(place)) from problem
     remark = row.kind.remark(value.strip())
     if remark:
         changed = changed.change(warnings=(*changed.warnings, f"{place}: {remark}"))
     return changed
 
 
-def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
+def _parsed(path: Path, text: str) -> tuple[Case, list[Message], tuple[str, ...]]:
     """Return the case of a text, its problems, and warnings; ``path`` is for messages only."""
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
@@ -99,19 +97,19 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
             f"it with `slideviz def {path}`"
         )
     if len(problems) > _FEW and not names & KEYS.keys():
-        line, sentence = min(problems)
+        one = problems[0]
         raise CaseError(
-            f"{path}: is not a case file, for it has no line with a key of slideviz (line {line}: "
-            f"{sentence}); a mesh is named in MESH_FILENAME="
+            f"{path}: is not a case file, for it has no line with a key of slideviz (line "
+            f"{one.line}: {one}); a mesh is named in MESH_FILENAME="
         )
     rows: dict[str, Entry] = {}
     for entry in entries:
         first = rows.setdefault(entry.key, entry)
         if entry.key not in KEYS:
-            problems.append((entry.line, _unknown(entry.key)))
+            problems.append(Message(_unknown(entry.key), line=entry.line))
         elif first is not entry:
-            sentence = f"{entry.key} is in line {first.line} already; keep one of the two"
-            problems.append((entry.line, sentence))
+            rule = f"{entry.key} is in line {first.line} already; keep one of the two"
+            problems.append(Message(rule, line=entry.line))
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
     case = Case()
@@ -126,21 +124,24 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
             case = key.put(case, values[name])
         except CaseError as problem:
             values.pop(name, None)
-            problems += [(entry.line, f"{name}: {line}") for line in str(problem).splitlines()]
+            problems += problem.within(name, line=entry.line)
         else:
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
     twice = _second_roles(rows, values)
     # A mistyped key, or two roles of a marker, make contradictions that are not reported as well.
-    doubtful = {key for key in KEYS for _, text in problems if f"did you mean {key}?" in text}
+    said = " ".join(problem.text for problem in problems)
+    doubtful = {key for key in KEYS if f"did you mean {key}?" in said}
     doubtful |= {"MARKER_MOVING"} if twice else set()
     problems += twice
-    for keys, sentence in contradictions(case):
+    for message in contradictions(case):
+        keys = message.keys
         if doubtful.intersection(keys):
             continue
         # A key that could not be read is reported already; what follows from it need not be.
         if all(key in values for key in keys if key in rows):
-            problems.append((next(rows[key].line for key in keys if key in rows), sentence))
+            line = next(rows[key].line for key in keys if key in rows)
+            problems.append(replace(message, line=line))
     return case, problems, tuple(remarks)
 
 
@@ -150,20 +151,20 @@ def _value(key: Key, entry: Entry) -> Any:
     return key.kind.read(entry.value)
 
 
-def _second_roles(rows: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Problem]:
+def _second_roles(rows: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Message]:
     """Return a problem for each marker in two lists of roles, at the later one's line."""
-    problems: list[Problem] = []
+    problems: list[Message] = []
     first: dict[str, Entry] = {}
     lists = [entry for key, entry in rows.items() if key in _ROLE_OF and key in values]
     for entry in sorted(lists, key=lambda entry: entry.line):
         for name in values[entry.key]:
             other = first.setdefault(name, entry)
             if other is not entry:
-                sentence = (
+                rule = (
                     f"{entry.key}: marker {name!r} is in {other.key} too, line {other.line}; "
                     "a marker has one role: take it out of one of the lists"
                 )
-                problems.append((entry.line, sentence))
+                problems.append(Message(rule, line=entry.line))
     return problems
 
 

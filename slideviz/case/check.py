@@ -15,7 +15,7 @@ from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.zones import with_marker_names, zone_cases
-from slideviz.errors import CaseError, Note, nearest
+from slideviz.errors import CaseError, Message, Note, nearest
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
 from slideviz.terms import KERNELS, ROLES, SLIDES
@@ -34,7 +34,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return (
         *_radius_problems(case, mesh),
         *_method_problems(case),
-        *(sentence for _, sentence in contradictions(case, exact=True)),
+        *map(str, contradictions(case, exact=True)),
         *marker_problems(case, mesh),
         *motion_problems(case, mesh),
         *_zone_problems(case, mesh),
@@ -54,7 +54,7 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
     if several:  # what else is wrong may be so by these names only
         yield from unknown_markers(mesh, several)
         return
-    yield from (sentence for _, sentence in contradictions(case, exact=True))
+    yield from map(str, contradictions(case, exact=True))
     yield from marker_problems(case, mesh)
     yield from unknown_markers(mesh, dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE"))
     yield from _zone_problems(case, mesh)
@@ -85,19 +85,13 @@ def _method_problems(case: Case) -> Iterator[str]:
             )
 
 
-def raise_all(problems: tuple[str, ...]) -> None:
-    """Raise a CaseError with a line for each problem, if there are any; equal ones count once."""
-    if problems:
-        raise CaseError("\n".join(dict.fromkeys(problems)))
-
-
-def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, ...], str]]:
-    """Return the keys that contradict each other, with a sentence, whatever the mesh.
+def contradictions(case: Case, *, exact: bool = False) -> list[Message]:
+    """Return a message for keys that contradict each other, whatever the mesh.
 
     What else a run needs is found by `check_case`: a case without it can be read from a file, and
     put right with ``--set``. Unless ``exact``, 1:blade may be another spelling of blade.
     """
-    problems: list[tuple[tuple[str, ...], str]] = []
+    problems = list[Message]()
     moving = case.markers_with("moving")
     spelt = () if exact else {without_zone(name) for name in moving}
     seen: set[str] = set()
@@ -115,20 +109,20 @@ def contradictions(case: Case, *, exact: bool = False) -> list[tuple[tuple[str, 
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; {remedy}"
             )
-            problems.append((("MOTION", "MARKER_MOVING"), sentence))
+            problems.append(Message(sentence, keys=("MOTION", "MARKER_MOVING")))
     if case.periodic_type == "rotational" and case.direction in (0, 2):
         name = "r" if case.direction == 0 else "z"
         sentence = (
             f"rotational periodicity repeats in theta, not in {name} (PERIODIC_DIRECTION= "
             f"{case.direction}); write theta, or PERIODIC_TYPE= translational"
         )
-        problems.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
+        problems.append(Message(sentence, keys=("PERIODIC_DIRECTION", "PERIODIC_TYPE")))
     if case.polynomial == "no" and KERNELS[case.kernel].polynomial:
         sentence = (
             f"RBF_KERNEL= {case.kernel} needs the linear polynomial: without it the system may be "
             "singular; use POLYNOMIAL= AUTO, or another kernel such as wendland-c2"
         )
-        problems.append((("POLYNOMIAL", "RBF_KERNEL"), sentence))
+        problems.append(Message(sentence, keys=("POLYNOMIAL", "RBF_KERNEL")))
     return problems + ffd_contradictions(case)
 
 
@@ -185,8 +179,10 @@ def _text_problem(motion: Motion) -> str:
         return ""
     try:
         read_motions(write_motions((motion,)))
-    except (CaseError, TypeError, ValueError) as problem:
-        return str(problem).removeprefix("motion 1: ")
+    except CaseError as problem:
+        return problem.messages[0].text
+    except (TypeError, ValueError) as problem:
+        return str(problem)
     return ""
 
 
@@ -201,7 +197,7 @@ def _without_motion(case: Case) -> list[str]:
     ]
 
 
-def key_problems(case: Case) -> Iterator[str]:
+def key_problems(case: Case) -> Iterator[Message]:
     """Yield a sentence for each value out of range, when a program makes a case."""
     for key in KEYS.values():
         value = key.get(case)
@@ -209,8 +205,10 @@ def key_problems(case: Case) -> Iterator[str]:
             continue
         try:
             key.kind.read(key.kind.write(value))
-        except (CaseError, TypeError, ValueError) as problem:
-            yield f"{key.name}: {problem}"
+        except CaseError as problem:
+            yield from problem.within(key.name)
+        except (TypeError, ValueError) as problem:
+            yield Message(str(problem), place=(key.name,))
 
 
 def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:

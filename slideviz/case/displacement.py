@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.lines import Problem, listed, read_text
+from slideviz.case.lines import listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
-from slideviz.errors import CaseError, shown
+from slideviz.errors import CaseError, Message, raise_all, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
@@ -126,15 +126,14 @@ def in_zones(
     several = {str(k): None for k, *_ in each}
     rule = "begins with none of the zones" if len(several) > 1 else "does not begin with zone"
     wrong = [
-        (at, f"{shown(line.strip())} {rule} {' and '.join(several)}")
+        Message(f"{shown(line.strip())} {rule} {' and '.join(several)}", line=at)
         for at, (line, head) in enumerate(zip(lines, heads, strict=True), 1)
         if line.strip() and (head is None or head[1] not in several)
     ]
     if wrong:
-        at, said = wrong[0]
         k, first, _, here = each[0]
-        said += f"; write zone and node, e.g. {k}:{here[0] - first}"
-        raise CaseError(listed(path, [(at, _with_count(said, len(wrong)))]))
+        rule = f"{wrong[0].rule}; write zone and node, e.g. {k}:{here[0] - first}"
+        raise CaseError(*listed(path, [_with_count(replace(wrong[0], rule=rule), len(wrong))]))
     missing = [k for k in several if not any(head is not None and head[1] == k for head in heads)]
     if missing:
         raise CaseError(
@@ -184,8 +183,7 @@ def parse_rows(
     lines = text.translate(_SEPARATORS).split("\n")
     table = _table(path, lines, shape[1], columns)
     problems = _table_problems(table, lines, nodes, count=shape[0], of=of, what=columns.what)
-    if problems:
-        raise CaseError(listed(path, problems))
+    raise_all(listed(path, problems))
     return table[np.unique(table[:, 0], return_index=True)[1]]
 
 
@@ -204,18 +202,16 @@ def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArr
         return table[:, :3]
     # Slower, but finds every line that is wrong.
     rows: list[list[float]] = []
-    problems: list[Problem] = []
+    problems = list[Message]()
     for line, content in enumerate(lines, start=1):
         try:
             rows += _row(content, dim, columns)
         except CaseError as problem:
-            problems.append((line, str(problem)))
-    if problems:
-        kinds: dict[str, list[Problem]] = {}
-        for line, sentence in problems:
-            kinds.setdefault(sentence.rpartition("' ")[2], []).append((line, sentence))
-        messages = [(kind[0][0], _with_count(kind[0][1], len(kind))) for kind in kinds.values()]
-        raise CaseError(listed(path, messages))
+            problems += problem.within(line=line)
+    kinds: dict[str, list[Message]] = {}
+    for mistake in problems:
+        kinds.setdefault(mistake.rule, []).append(mistake)
+    raise_all(listed(path, [_with_count(kind[0], len(kind)) for kind in kinds.values()]))
     return np.array(rows, np.float64)
 
 
@@ -237,14 +233,15 @@ def _row(content: str, dim: int, columns: Columns) -> list[list[float]]:
             )
         words.pop()
     if words and len(words) != 1 + dim:
-        sentence = f"{shown(content.strip())} has {len(words)} columns; expected {1 + dim}"
-        raise CaseError(f"{sentence}: {columns.heading(dim)} (put % before a heading)")
+        rule = f"has {len(words)} columns; expected {1 + dim}: {columns.heading(dim)}"
+        value = shown(content.strip())
+        raise CaseError(Message(f"{rule} (put % before a heading)", value=value))
     return [[number(word) for word in words]] if words else []
 
 
 def _table_problems(
     table: FloatArray, lines: list[str], nodes: IntArray, *, count: int, of: str, what: str
-) -> list[Problem]:
+) -> list[Message]:
     """Return a problem for each line whose node is not in ``nodes``, or was given otherwise."""
     index = table[:, 0]
     broken = index != np.floor(index)
@@ -257,7 +254,7 @@ def _table_problems(
         return []
     row_line = [line for line, content in enumerate(lines, start=1) if content.strip()]
     last = f"its nodes are 0 to {count - 1}"
-    problems: list[Problem] = []
+    problems = list[Message]()
     for wrong, begin, end in (
         (broken, "", "is not a node number"),
         (outside, "node ", f"is not in the mesh; {last}"),
@@ -265,19 +262,21 @@ def _table_problems(
     ):
         if wrong.any():
             k = int(np.argmax(wrong))
-            sentence = f"{begin}{index[k]:.15g} {end}"
-            problems.append((row_line[k], _with_count(sentence, int(np.count_nonzero(wrong)))))
+            found = Message(f"{begin}{index[k]:.15g} {end}", line=row_line[k])
+            problems.append(_with_count(found, int(np.count_nonzero(wrong))))
     if differ.any():
         k = int(np.argmax(differ))
         before = row_line[order[k]]
         after = row_line[order[k + 1]]
-        sentence = f"node {int(index[order[k]])} has another {what} in line {before}"
-        sentence += "; keep one of the two"
-        problems.append((after, _with_count(sentence, int(np.count_nonzero(differ)))))
+        rule = f"node {int(index[order[k]])} has another {what} in line {before}"
+        found = Message(f"{rule}; keep one of the two", line=after)
+        problems.append(_with_count(found, int(np.count_nonzero(differ))))
     return problems
 
 
-def _with_count(sentence: str, count: int) -> str:
-    """Return the sentence on the first of ``count`` wrong lines, with the number of the others."""
+def _with_count(first: Message, count: int) -> Message:
+    """Return the message on the first of ``count`` wrong lines, with the number of the others."""
+    if count == 1:
+        return first
     more = "line" if count == 2 else "lines"
-    return f"{sentence} (and {count - 1} more {more} like it)" if count > 1 else sentence
+    return replace(first, rule=f"{first.rule} (and {count - 1} more {more} like it)")

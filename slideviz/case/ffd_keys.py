@@ -10,7 +10,7 @@ from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
 from slideviz.case.model import Case
 from slideviz.case.values import POINT, Kind
 from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
-from slideviz.errors import CaseError, shown
+from slideviz.errors import CaseError, Message, shown
 
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
@@ -82,15 +82,15 @@ def _without_axis(case: Case) -> str:
     return "FFD_COORD_SYSTEM= CARTESIAN has no axis" if case.ffd_system == "CARTESIAN" else ""
 
 
-def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
-    """Return the FFD keys that contradict each other, with a sentence."""
+def ffd_contradictions(case: Case) -> list[Message]:
+    """Return a message for FFD keys that contradict each other."""
     boxes = len(case.ffd_boxes)
     degrees = len(case.ffd_degrees)
     if boxes == degrees or not boxes:
         return []
     sentence = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}" if degrees else ""
     sentence = f"{sentence or 'FFD_DEGREE is missing'}; give a degree (i, j, k) for each box"
-    return [(("FFD_DEFINITION", "FFD_DEGREE"), sentence)]
+    return [Message(sentence, keys=("FFD_DEFINITION", "FFD_DEGREE"))]
 
 
 DEFINITION = Kind("(NAME, 8 corners x, y, z) ; ...", _read_definition, _write_definition)

@@ -18,7 +18,7 @@ import numpy as np
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.values import Kind
 from slideviz.case.words import first_of, name_text, number
-from slideviz.errors import CaseError, nearest, not_one_of, shown
+from slideviz.errors import CaseError, Message, nearest, not_one_of, raise_all, shown
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
@@ -359,8 +359,7 @@ def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[Limit
             for limit in limits
             if NUMBERS[limit.name].compares
         ]
-    if problems:
-        raise CaseError("\n".join(problems))
+    raise_all(problems)
     return tuple(_result(limit, measured) for limit in limits)
 
 
@@ -463,14 +462,13 @@ def read_limits(text: str) -> tuple[Limit, ...]:
     if not inside or inside.upper() == "NONE":
         return ()
     limits = []
-    problems = []
+    problems = list[Message]()
     for item in _ITEM.findall(inside):
         try:
             limits.append(_read_limit(item.strip()))
         except CaseError as problem:
-            problems.append(str(problem))
-    if problems:
-        raise CaseError("\n".join(problems))
+            problems += problem.messages
+    raise_all(problems)
     return tuple(limits)
 
 

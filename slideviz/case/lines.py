@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.words import COMMENT_SIGNS, without_comment
-from slideviz.errors import CaseError, shown
+from slideviz.errors import CaseError, Message, shown
 from slideviz.system.file_checks import require_length
 
-Problem = tuple[int, str]
 _END_OF_LINE = re.compile(r"\r\n|\n|\r")
 _KEY_LINE = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*=(.*)\Z", re.DOTALL)
 _LISTED = 30
@@ -69,14 +68,14 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     return text, ()
 
 
-def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Problem]]:
+def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Message]]:
     """Return the entries of a case file (comments by ``signs``), and a problem per invalid line."""
     entries: list[Entry] = []
-    problems: list[Problem] = []
+    problems: list[Message] = []
     for line, content in _joined(text, problems, signs):
         match = _KEY_LINE.match(content)
         if match is None:
-            problems.append((line, f"{shown(content.strip())} is not `KEY= value`"))
+            problems.append(Message(f"{shown(content.strip())} is not `KEY= value`", line=line))
         else:
             entries.append(Entry(match[1].upper(), match[2].strip(), line))
     return entries, problems
@@ -88,7 +87,7 @@ def require_no_mesh(path: Path, entries: list[Entry]) -> None:
         raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
 
 
-def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:
+def _joined(text: str, problems: list[Message], signs: str) -> Iterator[tuple[int, str]]:
     """Yield the number and the content of each line, joined with its continuation lines.
 
     Comments and empty lines are left out. If a backslash joins a line that has a key to the line
@@ -103,8 +102,8 @@ def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[in
             continue
         match = _KEY_LINE.match(content)
         if parts and match is not None:
-            sentence = f"the backslash at the end of the line before joins {match[1]} to it"
-            problems.append((line, f"{sentence}; take the backslash away"))
+            rule = f"the backslash at the end of the line before joins {match[1]} to it"
+            problems.append(Message(f"{rule}; take the backslash away", line=line))
             yield start, " ".join(parts)
             parts = []
         if not parts:
@@ -119,20 +118,19 @@ def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[in
         yield start, " ".join(parts)
 
 
-def listed(path: Path, problems: list[Problem]) -> str:
-    """Return the problems by ascending line, one ``file:line: sentence`` each.
+def listed(path: Path, problems: Iterable[Message]) -> list[Message]:
+    """Return the problems of a file by ascending line.
 
-    Where there are very many (it may be no case file at all), only the first are listed. Line 0 is
-    for a problem that is not in the file, but was given beside it.
+    Line 0 is for a problem that is not in the file, but was given beside it.
     """
-    places = ((f"{path}:{line}" if line else f"{path}", said) for line, said in sorted(problems))
-    lines = [f"{place}: {sentence}" for place, sentence in places]
-    return first_lines(path, lines)
+    ordered = sorted(problems, key=lambda problem: (problem.line, str(problem)))
+    return first_of_many(path, CaseError(*ordered).within(path))
 
 
-def first_lines(path: Path, lines: list[str]) -> str:
-    """Return the first of very many lines as a text that ends with how many there are more."""
-    more = len(lines) - _LISTED
-    return "\n".join(
-        lines if more <= 0 else [*lines[:_LISTED], f"{path}: and {more} more problems"]
-    )
+def first_of_many(path: Path, problems: Sequence[Message]) -> list[Message]:
+    """Return the first of very many problems of a file, and how many more there are.
+
+    There are very many where it is not a case file at all.
+    """
+    more = [Message(f"{path}: and {len(problems) - _LISTED} more problems")]
+    return [*problems[:_LISTED], *(more if len(problems) > _LISTED else ())]

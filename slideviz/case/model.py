@@ -11,7 +11,7 @@ from slideviz import terms
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.limits import Limit, read_limits
 from slideviz.case.motions.motion import Motion
-from slideviz.errors import CaseError, nearest, not_one_of
+from slideviz.errors import CaseError, nearest, not_one_of, raise_all
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG
 from slideviz.rbf.reduction import AUTO, Reduction
@@ -152,9 +152,9 @@ class Case(CheckedFields):
                 object.__setattr__(self, name, Path(path))
         usual = self.__dataclass_fields__
         if any(getattr(self, name) is not usual[name].default for name in _NUMBERS):
-            from slideviz.case.check import key_problems, raise_all
+            from slideviz.case.check import key_problems
 
-            raise_all(tuple(key_problems(self)))
+            raise_all(key_problems(self))
 
     def change(self, **values: Any) -> Case:
         """Return the case with other values of some fields.

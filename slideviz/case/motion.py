@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from slideviz.case.check import marker_problems, motion_problems, raise_all
+from slideviz.case.check import marker_problems, motion_problems
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.kinds import IN_ZONES, OF_MESH
 from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.zones import each_zone, of_several_zones, zone_motion
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message, raise_all
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.zones import names_in
@@ -32,7 +32,7 @@ def placed_displacements(
     case: Case,
     mesh: Mesh,
     on: Mapping[str, IntArray],
-    problems: list[str],
+    problems: list[Message],
     families: Iterable[type[Motion]] = (*IN_ZONES, *OF_MESH),
 ) -> dict[int, Displacements]:
     """Return the displacements from undeformed places, by the place of their motion in a case.
@@ -53,7 +53,7 @@ def _of_zones(
     case: Case,
     mesh: Mesh,
     on: Mapping[str, IntArray],
-    problems: list[str],
+    problems: list[Message],
     family: type[Motion],
 ) -> dict[int, Displacements]:
     """Return what the displacements of each zone are together, by the place in the case."""
@@ -85,13 +85,12 @@ def required_displacements(
     case: Case, mesh: Mesh, on: Mapping[str, IntArray]
 ) -> dict[int, Displacements]:
     """Return what `placed_displacements` does; CaseError with all problems, if there are any."""
-    problems: list[str] = []
+    problems = list[Message]()
     try:
         found = placed_displacements(case, mesh, on, problems)
     except CaseError as problem:
-        problems.append(str(problem))
-    if problems:
-        raise CaseError("\n".join(dict.fromkeys(problems)))
+        problems += problem.messages
+    raise_all(problems)
     return found
 
 
@@ -135,7 +134,7 @@ def moving_nodes(case: Case, mesh: Mesh) -> Displacements:
     if apart.any():
         rows = np.flatnonzero(apart)
         pairs = np.stack([owner[first[rows]], owner[rows]], axis=1)
-        raise CaseError("\n".join(_disagreements(mesh, names, nodes[rows], pairs)))
+        raise_all(_disagreements(mesh, names, nodes[rows], pairs))
     keep = np.flatnonzero(first == np.arange(len(nodes)))
     warnings = [text for moved in placed.values() for text in moved.warnings]
     return Displacements(nodes[keep], stacked[keep], tuple(dict.fromkeys(warnings)))

@@ -10,7 +10,7 @@ from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.motion import Motion, Target, named
 from slideviz.case.values import Kind
 from slideviz.case.words import Word, is_none, name_text, words_of
-from slideviz.errors import CaseError, nearest, shown
+from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 
 ALL_MOVING = "*"
 
@@ -21,14 +21,13 @@ def read_motions(text: str) -> tuple[Motion, ...]:
     if not [group for group in groups if group]:
         return ()
     motions: list[Motion] = []
-    problems = []
+    problems = list[Message]()
     for place, group in enumerate(groups, start=1):
         try:
             motions.append(_read_motion(group))
         except CaseError as problem:
-            problems.append(f"motion {place}: {problem}")
-    if problems:
-        raise CaseError("\n".join(problems))
+            problems += problem.within(f"motion {place}")
+    raise_all(problems)
     return tuple(motions)
 
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from slideviz.errors import CaseError, shown
+from slideviz.errors import CaseError, Message, shown
 from slideviz.mesh.check import LARGEST
 
 LARGEST_ANGLE = 1e9  # in degrees
@@ -103,8 +103,8 @@ def is_number(text: str) -> bool:
 def number(text: str) -> float:
     """Return the number that a text is; CaseError if it is none, or too large to compute with."""
     if not is_number(text):
-        hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
-        raise CaseError(f"{shown(text)} is not a number{hint}")
+        remedy = "write decimals with a point" if is_number(text.replace(",", ".")) else ""
+        raise CaseError(Message("is not a number", remedy, value=shown(text)))
     value = float(text)
     if abs(value) > LARGEST:
         raise CaseError(

@@ -7,7 +7,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from slideviz.errors import CaseError, not_one_of
+from slideviz.errors import CaseError, Message, not_one_of, raise_all
 from slideviz.terms import NO_REFERENCE, RATED, ROLES, Quantity, field_of
 
 if TYPE_CHECKING:
@@ -180,20 +180,21 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     needs; with a line for each.
     """
     from slideviz.case.cfg import set_key
-    from slideviz.case.check import idle_roles, raise_all
+    from slideviz.case.check import idle_roles
 
     before = idle_roles(case)
-    problems = []
+    problems = list[Message]()
     taken: dict[str, tuple[str, Role]] = {}
     for text in texts:
         key, sign, value = text.partition("=")
         if not sign:
-            problems.append(f"{option} {text!r} is not of the form KEY=VALUE")
+            rule = f"{option} {text!r} is not of the form KEY=VALUE"
+            problems.append(Message(rule))
             continue
         try:
-            after = set_key(case, key.strip(), value.strip())
+            after = set_key(case, key.strip(), value.strip(), option)
         except CaseError as problem:
-            problems.append(str(problem).replace("--set", option))
+            problems += problem.messages
             continue
         for name, role in case.roles.items():
             if after.roles.get(name, role) != role:
@@ -264,7 +265,7 @@ def checked(read: Callable[[str], Read]) -> Callable[[str], Read]:
         try:
             return read(text)
         except CaseError as problem:
-            raise argparse.ArgumentTypeError("; ".join(str(problem).splitlines())) from None
+            raise argparse.ArgumentTypeError("; ".join(map(str, problem.messages))) from None
 
     return argument
 

@@ -171,7 +171,7 @@ def _in_zone(mesh: Mesh, index: int) -> Iterator[None]:
         yield
     except SlidevizError as problem:
         if isinstance(mesh, Assembly):
-            problem.args = (f"zone {index + 1}: {problem}",)
+            problem.args = problem.within(f"zone {index + 1}")
         raise
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.errors import MeshError
+from slideviz.errors import MeshError, Message
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Mesh
 
@@ -131,6 +131,9 @@ def check_size(mesh: Mesh, name: str = "") -> None:
 def too_large(name: str, k: int, point: FloatArray) -> MeshError:
     """Return the error for a ``point`` (d,), number ``k``, with a coordinate above ``LARGEST``."""
     return MeshError(
-        f"{name}: point {k} is at {tuple(point.tolist())}; nothing can be computed with "
-        f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh"
+        Message(
+            f"point {k} is at {tuple(point.tolist())}; nothing can be computed with coordinates "
+            f"larger than {LARGEST:g}, so correct it or scale the mesh",
+            place=(name,),
+        )
     )

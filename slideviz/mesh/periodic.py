@@ -13,7 +13,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from slideviz.errors import MeshError
+from slideviz.errors import MeshError, Message
 from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.halo import without_halo
@@ -36,7 +36,7 @@ _KINDS: dict[PeriodicType, tuple[PeriodicKind, ...]] = {
 WHOLE_NUMBER = 1e-3
 """Largest difference of the number of passages of a wheel from a whole number, over that number."""
 
-CHECK_PERIODIC = "check the markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
+_CHECK = "check the markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
 """What to do about markers that do not match, in a case."""
 _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 """Axes of rotation that `find_pairs` tries, in that order."""
@@ -116,12 +116,13 @@ def match(
     """
     a = mesh.marker(first).nodes
     b = mesh.marker(second).nodes
-    where = f"{mesh.name}: periodic markers {first!r} and {second!r} do not match"
+    where = mesh.name, f"periodic markers {first!r} and {second!r} do not match"
     if len(a) != len(b):
-        raise MeshError(
-            f"{where}: {len(a)} and {len(b)} nodes; periodic boundaries need the same nodes, so "
-            "choose other markers or remesh one of them"
+        rule = (
+            f"{len(a)} and {len(b)} nodes; periodic boundaries need the same nodes, so choose "
+            "other markers or remesh one of them"
         )
+        raise MeshError(Message(rule, place=where))
     allowed = TOLERANCE * mesh.extent
     tried = []
     for one in _KINDS[kind]:
@@ -131,10 +132,11 @@ def match(
             return pair
         tried.append((worst, pair))
     worst, best = min(tried, key=itemgetter(0))
-    raise MeshError(
-        f"{where}: with the best {best.kind} transformation ({best.describe()}) a node is "
-        f"{worst:.3g} from its image, allowed is {allowed:.3g}; {CHECK_PERIODIC}"
+    rule = (
+        f"with the best {best.kind} transformation ({best.describe()}) a node is {worst:.3g} from "
+        f"its image, allowed is {allowed:.3g}"
     )
+    raise MeshError(Message(rule, _CHECK, where))
 
 
 def _match_kind(
@@ -307,7 +309,7 @@ def _left_over(
     """
     good: list[Pair] = []
     alone = list(names)
-    why = "they are not images of each other; choose other markers"
+    why = Message("they are not images of each other", "choose other markers")
     for each in _KINDS[kind]:
         for one, other in combinations(names, 2):
             if one in alone and other in alone:
@@ -322,12 +324,13 @@ def _left_over(
         try:
             match(mesh, alone[0], alone[1], kind, axis, origin)
         except MeshError as problem:
-            why = str(problem).partition(" do not match: ")[2]
-            if not why:  # a marker is not there, or is empty
+            (why,) = problem.messages
+            if not why.place:  # a marker is not there, or is empty
                 return problem
     pairs = ", ".join(f"{p.first!r} and {p.second!r} match ({p.describe()})" for p in good)
     left = " and ".join(repr(name) for name in alone)
-    return MeshError(f"{mesh.name}: the periodic markers {pairs}, but {left} do not: {why}")
+    rule = f"the periodic markers {pairs}, but {left} do not: {why.rule}"
+    return MeshError(Message(rule, why.remedy, (mesh.name,)))
 
 
 def agree(one: Pair, other: Pair) -> bool:

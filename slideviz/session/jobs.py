@@ -147,10 +147,9 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
             return "", ""
         found, folded = check_motions(case, mesh)
     except SlidevizError as error:
-        first, *others = str(error).splitlines()
-        for path in files:  # without their folders
-            first = first.replace(str(path), path.name)
-        return (f"{first} ({len(others)} more)." if others else f"{first}."), ""
+        first, *others = error.messages
+        said = first.printed(lambda path: path.name)
+        return (f"{said} ({len(others)} more)." if others else f"{said}."), ""
     message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
     return message, (f"{folded}." if folded else "")
 

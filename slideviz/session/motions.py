@@ -69,7 +69,8 @@ class TableRows:
         try:
             read = parsed_displacements(text, PLACEHOLDER, self.mesh, self.nodes, self.of)
         except CaseError as error:
-            first, *others = str(error).replace(f"{PLACEHOLDER}:", "Line ").splitlines()
+            first, *others = error.messages
+            first = replace(first, place=(f"Line {first.line}",) if first.line else ())
             raise CaseError(f"{first} ({len(others)} more)" if others else first) from error
         moved = np.linalg.norm(read.vectors, axis=1)
         return (

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from slideviz.case.check import check_case, raise_all
+from slideviz.case.check import check_case
 from slideviz.case.model import Case
 from slideviz.case.motion import by_zone
 from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.errors import raise_all
 from slideviz.mesh.model import Mesh
 
 

@@ -15,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
-from slideviz.case.check import raise_all, unknown_markers
+from slideviz.case.check import unknown_markers
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.case.zones import zone_cases
 from slideviz.elastic.conditions import conditions
-from slideviz.errors import CaseError, MeshError, not_one_of
+from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, sealed
-from slideviz.mesh.periodic import CHECK_PERIODIC, find_pairs, pair_up
+from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, quality_ratings
@@ -137,11 +137,11 @@ def _case_alone(
         if roles[name] != role
     )
     case = Case(roles=roles, repair="yes")
-    wrong = []
+    wrong = list[str | Message]()
     try:
         case = case.change(repair_below=below)
     except CaseError as problem:
-        wrong.append(str(problem).replace("REPAIR_BELOW", "below"))
+        wrong += [replace(message, place=("below",)) for message in problem.messages]
     periodic = case.markers_with("periodic")
     if len(periodic) % 2:
         rule = "boundaries repeat in pairs, so name both of each"
@@ -157,7 +157,8 @@ def _case_alone(
         try:
             pair_up(without_halo(mesh)[0], periodic, "auto", case.axis, case.origin)
         except MeshError as problem:
-            raise MeshError(str(problem).replace(CHECK_PERIODIC, _NO_IMAGES)) from None
+            messages = (replace(m, remedy=m.remedy and _NO_IMAGES) for m in problem.messages)
+            raise MeshError(*messages) from None
     return case
 
 

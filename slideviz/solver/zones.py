@@ -212,7 +212,7 @@ def zone_runs(motion: InterfaceMotion, run: Run, report: Report) -> Runs:
         try:
             runs[index] = list(run(motion.prepared(index), zone_report))
         except SlidevizError as problem:
-            problem.args = (f"zone {index + 1}: {problem}",)
+            problem.args = problem.within(f"zone {index + 1}")
             raise
         shift = runs[index][-1].mesh.points - part.mesh.points
         motion.slid(index, shift, np.flatnonzero(shift.any(axis=1)), ahead)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.errors import MeshError
+from slideviz.errors import MeshError, Message
 from slideviz.formats.su2b.read import read_markers
 from slideviz.mesh.margin import SafeFraction, step_safety
 from slideviz.mesh.metrics import MetricValues, rated_metric
@@ -331,11 +331,12 @@ def require_consistent_orientation(
     with ranks.sharing(facet_sums, *zone.undeformed) as do:
         total = sum(do(parts))
     if total % 2**64:
-        raise MeshError(
-            f"{zone.file.name}: some cells are numbered the other way round than others, and "
-            "others are folded, or a part of the boundary is in no marker, which only the whole "
-            f"mesh can tell; {remedy}run it without --stream, or mesh again"
+        rule = (
+            "some cells are numbered the other way round than others, and others are folded, or a "
+            "part of the boundary is in no marker, which only the whole mesh can tell"
         )
+        remedy += "run it without --stream, or mesh again"
+        raise MeshError(Message(rule, remedy, (zone.file.name,)))
 
 
 def folded_steps(

@@ -56,10 +56,13 @@ def naming_text(text: Text, path: Path) -> Iterator[None]:
     try:
         yield
     except MeshError as problem:
-        message = str(problem).replace(printable(path), text.lines.name)
-        if message == str(problem):
-            raise
-        raise MeshError(message) from problem
+        names = {printable(path): text.lines.name}
+        raise MeshError(
+            *(
+                replace(message, place=tuple(names.get(str(part), part) for part in message.place))
+                for message in problem.messages
+            )
+        ) from problem
 
 
 T = TypeVar("T")

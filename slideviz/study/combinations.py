@@ -150,11 +150,7 @@ def _reason(problem: str, given: list[str] | None) -> str:
     if problem in given:
         return f"[{given.index(problem) + 1}]"
     given.append(problem)
-    return f"[{len(given)}]: {_one_line(problem)}"
-
-
-def _one_line(problem: str) -> str:
-    return "; ".join(" ".join(line.split()) for line in problem.splitlines())
+    return f"[{len(given)}]: {' '.join(problem.split())}"
 
 
 def _cell(text: str, column: StudyColumn) -> str:
@@ -317,7 +313,7 @@ def compare(
         except Cancelled:
             raise
         except SlidevizError as problem:
-            yield CombinationRow(combination, problem=str(problem))
+            yield CombinationRow(combination, problem="; ".join(map(str, problem.messages)))
         except MemoryError:
             yield CombinationRow(
                 combination, problem="out of memory; a coarser mesh or DATA_REDUCTION= YES"
@@ -445,7 +441,7 @@ def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]
     """Return for each reason the combinations that have it."""
     groups: dict[str, list[Combination]] = {}
     for combination, problem in problems.items():
-        groups.setdefault(_one_line(problem), []).append(combination)
+        groups.setdefault(" ".join(problem.split()), []).append(combination)
     return groups
 
 

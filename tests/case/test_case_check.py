@@ -188,5 +188,5 @@ def test_all_problems_at_once(square):
 
 def test_several_markers_with_a_plus_are_told_their_brackets():
     roles = dict.fromkeys(("UPPER", "LEFT"), "moving")
-    ((_, said),) = contradictions(Case(roles=roles, motions=(Translate("UPPER+LEFT", (1.0, 0.0)),)))
-    assert said.endswith("write several in brackets, e.g. ((UPPER, LEFT), translate, ...)")
+    (said,) = contradictions(Case(roles=roles, motions=(Translate("UPPER+LEFT", (1.0, 0.0)),)))
+    assert str(said).endswith("write several in brackets, e.g. ((UPPER, LEFT), translate, ...)")

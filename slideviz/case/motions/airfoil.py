@@ -22,7 +22,7 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.words import Word, counted, number
-from slideviz.errors import CaseError, not_one_of
+from slideviz.errors import CaseError, Message, not_one_of
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import vertex_normals
@@ -81,7 +81,7 @@ class OnAirfoil(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):
@@ -99,11 +99,12 @@ class OnAirfoil(Motion):
             found[place] = Displacements(nodes, vectors)
             if not shape.any():
                 side = f" on its {motion.side} side" if isinstance(motion, OneSided) else ""
-                problems.append(
+                rule = (
                     f"motion {place + 1}: no node of {marker_words(motion.marker)} is{side} "
                     f"between x = {low:g} and {high:g}; give x of the leading and of the trailing "
                     "edge"
                 )
+                problems.append(Message(rule))
         return found
 
     @classmethod

@@ -26,7 +26,7 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, name_text, number
-from slideviz.errors import CaseError, Note, SlidevizError
+from slideviz.errors import CaseError, Message, Note, SlidevizError
 from slideviz.ffd.box import Box, Index
 from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
@@ -102,12 +102,12 @@ class BoxMotion(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         motions = box_motions(case)
         boxes = boxes_for(case, mesh) if motions else {}
         found: dict[int, Displacements] = {}
-        outside: dict[int, str] = {}
+        outside: dict[int, Message] = {}
         alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
         for name, changes in box_changes(case, mesh, boxes).items():
             for place, q, change in changes:
@@ -120,7 +120,7 @@ class BoxMotion(Motion):
                         moved = replace(moved, warnings=(*moved.warnings, stays))
                     found[place] = moved
                 elif mine:
-                    outside[place] = (
+                    outside[place] = Message(
                         f"motion {place + 1}: no node of {marker_words(motion.marker)} is in the "
                         f"FFD box {name!r}; move the box, or take another boundary"
                     )

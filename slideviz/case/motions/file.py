@@ -15,7 +15,7 @@ from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
 from slideviz.case.values import path_text
 from slideviz.case.words import Word
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import Term
@@ -75,7 +75,7 @@ class FromFile(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):
@@ -87,7 +87,7 @@ class FromFile(Motion):
             try:
                 found[place] = motion._displacements(mesh, moved)
             except CaseError as problem:
-                problems.append(str(problem))
+                problems += problem.messages
         return found
 
     def _displacements(self, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:

@@ -14,7 +14,7 @@ import numpy as np
 from slideviz.argument_types import CheckedFields
 from slideviz.case.displacement import Displacements
 from slideviz.case.words import Word
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
 from slideviz.terms import AXES, Term
 
@@ -164,7 +164,7 @@ class Motion(CheckedFields):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         """Return the displacements by all motions of this family, by their place in the case.
 

@@ -16,7 +16,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
 from slideviz.case.words import Word, number
-from slideviz.errors import CaseError, MeshError, Note, printable
+from slideviz.errors import CaseError, MeshError, Message, Note, printable
 from slideviz.formats.files import read as read_mesh
 from slideviz.formats.files import read_surface
 from slideviz.machine.onto import AGREE, Laid, Nearest, Wall, find_edges, lay_onto
@@ -128,7 +128,7 @@ class Onto(FromFile):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):
@@ -136,7 +136,7 @@ class Onto(FromFile):
                 try:
                     found[place] = laid_displacements(motion, case, mesh, on)
                 except CaseError as problem:
-                    problems.append(str(problem))
+                    problems += problem.messages
         return found
 
 

@@ -22,7 +22,7 @@ from slideviz.case.motions.motion import (
 from slideviz.case.spans import span_field, span_problems
 from slideviz.case.values import read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, number
-from slideviz.errors import CaseError, MeshError, SlidevizError, shown
+from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.gap import bodies
 from slideviz.mesh.cached_boundary import boundary_of
@@ -144,13 +144,13 @@ class SpanMotion(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[str]
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         try:
             blades = blades_of(case, mesh, on)
         except CaseError as problem:
-            problems.append(str(problem))
+            problems += problem.messages
             return found
         for blade in blades:
             totals, _ = blade.totals()
@@ -159,7 +159,7 @@ class SpanMotion(Motion):
                 try:
                     after = blade.sections.moved(total)[0]
                 except MeshError as problem:
-                    problems.append(f"motion {place + 1}: {problem}")
+                    problems += problem.within(f"motion {place + 1}")
                     return found
                 found[place] = Displacements(blade.nodes, after - before)
                 before = after

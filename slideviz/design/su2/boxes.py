@@ -15,14 +15,13 @@ from slideviz.case.boxes import (
     off_points,
     system_of,
 )
-from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
 from slideviz.design.su2.on_mesh import problems_of_markers
 from slideviz.design.su2.shapes import Displacer
 from slideviz.design.su2.variables import DesignVariable, angle_notes, places_words
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message, raise_all
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
 from slideviz.ffd.kinds import DIRECTIONS, NONE, Move, Planes, Request, moves_of, variable_problem
@@ -364,7 +363,7 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     Raises CaseError if the configuration defines no box, a box is not possible, or no node is in
     any.
     """
-    contradictions = (f"{config.source}: {text}" for _, text in ffd_contradictions(config.case))
+    contradictions = (f"{config.source}: {text}" for text in ffd_contradictions(config.case))
     raise_all((*problems_of_markers(config, mesh), *contradictions))
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
@@ -381,12 +380,12 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     return with_boxes(mesh, boxes, anew=True), tuple(boxes)
 
 
-def problems_of_boxes(config: Su2Config, mesh: Mesh) -> list[str]:
+def problems_of_boxes(config: Su2Config, mesh: Mesh) -> list[str | Message]:
     """Return which variables move what is not there."""
     try:
         known = boxes_for(config.case, mesh)
     except CaseError as problem:
-        return str(problem).splitlines()
+        return [*problem.messages]
     problems = []
     for place, variable in enumerate(config.variables, start=1):
         if variable.box not in known:

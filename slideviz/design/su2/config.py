@@ -17,9 +17,8 @@ from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import (
     Entry,
-    Problem,
     entries_of,
-    first_lines,
+    first_of_many,
     listed,
     read_text,
     require_no_mesh,
@@ -34,7 +33,7 @@ from slideviz.design.su2.variables import (
     read_variables,
     supported,
 )
-from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
+from slideviz.errors import CaseError, Message, Note, nearest, not_one_of, raise_all, shown
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
@@ -75,7 +74,7 @@ def radial_keys(rows: Mapping[str, Entry]) -> set[str]:
 
 
 def radial_settings(
-    case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str], None], warnings: list[str]
+    case: Case, rows: Mapping[str, Entry], note: Callable[..., None], warnings: list[str]
 ) -> Case:
     """Return the case with SU2's settings of its method, where slideviz's own are not given.
 
@@ -93,7 +92,7 @@ def radial_settings(
             try:
                 fields[name] = form.read(rows[name].value)
             except CaseError as problem:
-                note(rows[name], str(problem))
+                note(rows[name], *problem.messages)
     if kind == "RBF":
         word = _word(rows, FUNCTION) or "WENDLAND_C2"
         if word not in KERNELS:
@@ -110,7 +109,7 @@ def radial_settings(
     return _reduced(case, rows, fields)
 
 
-def _elastic(case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str], None]) -> Case:
+def _elastic(case: Case, rows: Mapping[str, Entry], note: Callable[..., None]) -> Case:
     """Return the case with SU2's settings of linear elasticity, or its defaults."""
     for name, default in ELASTIC.items():
         key = KEYS["STEPS" if name == "DEFORM_NONLINEAR_ITER" else name]
@@ -119,7 +118,7 @@ def _elastic(case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str],
         try:
             case = key.put(case, key.kind.read(rows[name].value if name in rows else default))
         except CaseError as problem:
-            note(rows[name], str(problem))
+            note(rows[name], *problem.messages)
     return case
 
 
@@ -288,10 +287,9 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     if "CONFIG_LIST" not in rows:
         return _config(path, rows, problems, warnings)
     files = _listed_files(rows, problems)
-    if problems:
-        raise CaseError(listed(path, problems))
+    raise_all(listed(path, problems))
     each = dict[Path, Su2Config]()
-    faults = dict[str, None]()
+    faults = dict[Message, None]()
     # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
     inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
     for file, numbers in _numbers_of_zones(files).items():
@@ -300,11 +298,11 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
             said = (*said, *_list_warnings(path, file, own, numbers))
             each[file] = _config(file, inherited | own | given, problems, said, path, numbers[0])
         except CaseError as problem:
-            faults |= dict.fromkeys(str(problem).splitlines())
+            faults |= dict.fromkeys(problem.messages)
     if not faults and not any("DV_KIND" in config.present for config in each.values()):
-        faults[f"{path}: DV_KIND is missing, in the files of CONFIG_LIST, too"] = None
-    if faults:
-        raise CaseError(first_lines(path, [*faults]))
+        rule = "DV_KIND is missing, in the files of CONFIG_LIST, too"
+        faults[Message(rule, place=(path,))] = None
+    raise_all(first_of_many(path, [*faults]))
     zones = [replace(each[file], zone=zone) for zone, file in enumerate(files, 1)]
     first = zones[0]
     reader = _Reader(rows, problems)
@@ -344,7 +342,7 @@ def _list_warnings(
         yield f"{file}:{line}: CONFIG_LIST is ignored in a file that {path} lists; take it out"
 
 
-def _rows(path: Path) -> tuple[dict[str, Entry], list[Problem], tuple[str, ...]]:
+def _rows(path: Path) -> tuple[dict[str, Entry], list[Message], tuple[str, ...]]:
     """Return the keys of a configuration, with what is wrong, and warnings of reading the file."""
     text, warnings = read_text(path, "case file")
     entries, problems = entries_of(text, "%")  # other signs have a meaning in some values
@@ -352,12 +350,12 @@ def _rows(path: Path) -> tuple[dict[str, Entry], list[Problem], tuple[str, ...]]
     rows = {entry.key: entry for entry in entries}  # of two, SU2 would complain
     for entry in entries:
         if rows[entry.key] is not entry:
-            sentence = f"{entry.key} is given again in line {rows[entry.key].line}; keep one"
-            problems.append((entry.line, sentence))
+            rule = f"{entry.key} is given again in line {rows[entry.key].line}"
+            problems.append(Message(rule, "keep one", line=entry.line))
     return rows, problems, warnings
 
 
-def _listed_files(rows: dict[str, Entry], problems: list[Problem]) -> list[Path]:
+def _listed_files(rows: dict[str, Entry], problems: list[Message]) -> list[Path]:
     """Return the configurations of zones in CONFIG_LIST; appends to ``problems``."""
     entry = rows["CONFIG_LIST"]
     reader = _Reader(rows, problems)
@@ -368,14 +366,14 @@ def _listed_files(rows: dict[str, Entry], problems: list[Problem]) -> list[Path]
     try:
         return [Path(word.text) for word in list_of(entry.value)]
     except CaseError as problem:
-        reader.note(entry, str(problem))
+        reader.note(entry, *problem.messages)
         return []
 
 
 def _config(
     path: Path,
     rows: dict[str, Entry],
-    problems: list[Problem],
+    problems: list[Message],
     warnings: tuple[str, ...],
     main: Path | None = None,
     zone: int | None = None,
@@ -394,13 +392,10 @@ def _config(
             f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
         )
         last = max((entry.line for entry in rows.values()), default=1)
-        problems.append((last, sentence + misspelt("DV_KIND", rows)))
-    if problems:
-        own = [problem for problem in problems if problem[0] >= 0]
-        texts = [listed(path, own)] if own else []
-        if main is not None and len(own) < len(problems):
-            texts.append(listed(main, [(-line, said) for line, said in problems if line < 0]))
-        raise CaseError("\n".join(texts))
+        problems.append(Message(sentence + misspelt("DV_KIND", rows), line=last))
+    inherited = [replace(each, line=-each.line) for each in problems if each.line < 0]
+    own = listed(path, [problem for problem in problems if problem.line >= 0])
+    raise_all(own if main is None else [*own, *listed(main, inherited)])
     case = case.change(
         source=path,
         mesh_file=files["MESH_FILENAME"],
@@ -458,7 +453,7 @@ def _with_ending(path: Path, case: Case) -> Path:
 class _Reader:
     """Reads the keys of a configuration; appends mistakes to ``problems``, fills ``named``."""
 
-    def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
+    def __init__(self, rows: dict[str, Entry], problems: list[Message]) -> None:
         self.rows = rows
         self.problems = problems
         self.named: dict[str, str] = {}
@@ -487,12 +482,12 @@ class _Reader:
             kind = KEYS["MARKER_PERIODIC" if key == "MARKER_PERIODIC" else "MARKER_FIXED"].kind
             return tuple(kind.read(entry.value))
         except CaseError as problem:
-            self.note(entry, str(problem))
+            self.note(entry, *problem.messages)
             return ()
 
-    def note(self, entry: Entry, sentence: str) -> None:
-        """Append a sentence about a key, with its line, to the problems."""
-        self.problems += [(entry.line, f"{entry.key}: {line}") for line in sentence.splitlines()]
+    def note(self, entry: Entry, *messages: str | Message) -> None:
+        """Append messages about a key, with its line, to the problems."""
+        self.problems += CaseError(*messages).within(entry.key, line=entry.line)
 
     def case(self) -> tuple[Case, tuple[str, ...]]:
         """Return the case with roles and settings, and the markers that move."""
@@ -509,7 +504,7 @@ class _Reader:
             try:
                 case = row.put(case, row.kind.read(entry.value))
             except CaseError as problem:
-                self.note(entry, str(problem))
+                self.note(entry, *problem.messages)
         case = radial_settings(case, self.rows, self.note, self.warnings)
         mover = "DV_MARKER" if self.names("DV_MARKER") else "MARKER_DEFORM_MESH"
         moving = self.names(mover)
@@ -569,4 +564,4 @@ class _Reader:
                     needed = "whole number" if key.endswith(COUNTS) else "number"
                     raise CaseError(f"{shown(words[key])} is not a {needed} above {least:g}")
             except CaseError as problem:
-                self.note(self.rows[key], str(problem))
+                self.note(self.rows[key], *problem.messages)

@@ -8,11 +8,11 @@ from itertools import chain
 
 import numpy as np
 
-from slideviz.case.check import raise_all, unknown_markers
+from slideviz.case.check import unknown_markers
 from slideviz.case.zones import renamed, with_marker_names
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.design.su2.variables import NOTHING
-from slideviz.errors import CaseError, nearest
+from slideviz.errors import CaseError, nearest, raise_all
 from slideviz.formats.files import read
 from slideviz.mesh.model import Assembly, IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
@@ -33,12 +33,10 @@ def read_mesh(config: Su2Config) -> Mesh:
     assert file is not None
     if config.words["MULTIZONE_MESH"].upper() == "YES" or not config.zones:
         raise_all(
-            tuple(
-                f"{each.source}: MESH_FILENAME= {each.case.mesh_file}, and with MULTIZONE_MESH= "
-                f"YES all zones are in one file, {file}; leave the key out there, or write NO"
-                for each in config.zones
-                if each.case.mesh_file != file
-            )
+            f"{each.source}: MESH_FILENAME= {each.case.mesh_file}, and with MULTIZONE_MESH= "
+            f"YES all zones are in one file, {file}; leave the key out there, or write NO"
+            for each in config.zones
+            if each.case.mesh_file != file
         )
         return read(file, zone=config.case.zone, file_format=form)
     meshes = []

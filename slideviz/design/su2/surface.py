@@ -13,7 +13,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from slideviz.case.check import raise_all
 from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
@@ -24,7 +23,7 @@ from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.on_mesh import joined, problems_of_markers, zone_of
 from slideviz.design.su2.shapes import Displacer, Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
-from slideviz.errors import CaseError, DeformError, Note, SlidevizError
+from slideviz.errors import CaseError, DeformError, Message, Note, SlidevizError, raise_all
 from slideviz.ffd.box import Box
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
@@ -386,10 +385,11 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     if config.zones:
         return _of_zones(config, mesh)
     group = config.variables[0].group
-    problems = problems_of_markers(config, mesh, needed=group not in ("grid", "nothing"))
+    needed = group not in ("grid", "nothing")
+    problems: list[str | Message] = [*problems_of_markers(config, mesh, needed)]
     if group == "ffd":
         problems += problems_of_boxes(config, mesh)
-    raise_all(tuple(problems))
+    raise_all(problems)
     listed = [mesh.marker(name).nodes for name in config.markers]
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
     nodes = zone_of(config, mesh)[0] if group == "grid" else nodes

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Literal
 
-from slideviz.case.lines import Entry, Problem
+from slideviz.case.lines import Entry
 from slideviz.case.words import Word, counted, groups_of, list_of, number, words_of
-from slideviz.errors import CaseError, Note, nearest
+from slideviz.errors import CaseError, Message, Note, nearest
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
 """What SU2 does with a list of variables; the first kind decides it for all of them."""
@@ -136,7 +136,7 @@ def form(name: str) -> str:
 
 
 def read_variables(
-    rows: Mapping[str, Entry], problems: list[Problem], warnings: list[str]
+    rows: Mapping[str, Entry], problems: list[Message], warnings: list[str]
 ) -> tuple[DesignVariable, ...]:
     """Return the design variables of ``DV_KIND``, ``DV_PARAM`` and ``DV_VALUE``.
 
@@ -149,10 +149,10 @@ def read_variables(
     try:
         kinds = [word.text.upper() for word in list_of(row.value)]
     except CaseError as problem:
-        problems.append((row.line, f"DV_KIND: {problem}"))
+        problems += problem.within("DV_KIND", line=row.line)
         return ()
     if strange := _strange(kinds):
-        problems += [(row.line, f"DV_KIND: {sentence}") for sentence in strange]
+        problems += CaseError(*strange).within("DV_KIND", line=row.line)
         return ()
     groups = _groups(rows, kinds, problems, warnings)
     variables = []
@@ -160,7 +160,7 @@ def read_variables(
         try:
             variables.append(_variable(kind, group))
         except CaseError as problem:
-            problems.append((rows["DV_PARAM"].line, f"DV_PARAM: variable {place}: {problem}"))
+            problems += problem.within("DV_PARAM", f"variable {place}", line=rows["DV_PARAM"].line)
             continue
         if (side := variables[-1].parameter("side")) not in (0.0, 1.0):
             said = f"side {side:g} is neither 0 (lower) nor 1 (upper): as in SU2, the upper side"
@@ -168,7 +168,7 @@ def read_variables(
     if len(variables) < len(groups):
         return ()
     variables = _with_values(rows, variables, problems, warnings)
-    problems += [(row.line, f"DV_KIND: {sentence}") for sentence in _contradictions(variables)]
+    problems += CaseError(*_contradictions(variables)).within("DV_KIND", line=row.line)
     return _dispatched(variables, warnings)
 
 
@@ -194,7 +194,7 @@ def _strange(kinds: list[str]) -> list[str]:
 
 
 def _groups(
-    rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem], warnings: list[str]
+    rows: Mapping[str, Entry], kinds: list[str], problems: list[Message], warnings: list[str]
 ) -> list[list[Word]]:
     """Return the words of each variable's parameters; none where DV_PARAM is wrong."""
     entry = rows.get("DV_PARAM")
@@ -202,19 +202,19 @@ def _groups(
         if any(KINDS[kind].form for kind in kinds):
             needed = ", ".join(f"{kind} needs {form(kind)}" for kind in dict.fromkeys(kinds))
             sentence = f"DV_PARAM is missing: {needed}{misspelt('DV_PARAM', rows)}"
-            problems.append((rows["DV_KIND"].line, sentence))
+            problems.append(Message(sentence, line=rows["DV_KIND"].line))
             return []
         return [[] for _ in kinds]
     try:
         groups = groups_of(words_of(entry.value))
     except CaseError as problem:
-        problems.append((entry.line, f"DV_PARAM: {problem}"))
+        problems += problem.within("DV_PARAM", line=entry.line)
         return []
     if len(groups) != len(kinds):  # SU2 takes several semicolons for one
         groups = [group for group in groups if group]
     sentence = f"{counted(len(groups), 'group')} for {counted(len(kinds), 'variable')}"
     if len(groups) > len(kinds) or not groups:
-        problems.append((entry.line, f"DV_PARAM has {sentence}; give one each"))
+        problems.append(Message(f"DV_PARAM has {sentence}; give one each", line=entry.line))
         return []
     if len(groups) < len(kinds):
         warnings.append(
@@ -253,7 +253,7 @@ def _variable(name: str, group: list[Word]) -> DesignVariable:
 def _with_values(
     rows: Mapping[str, Entry],
     variables: list[DesignVariable],
-    problems: list[Problem],
+    problems: list[Message],
     warnings: list[str],
 ) -> list[DesignVariable]:
     entry = rows.get("DV_VALUE")
@@ -261,24 +261,25 @@ def _with_values(
     if entry is None:
         if not needless:
             sentence = f"DV_VALUE is missing: a value for each variable{misspelt('DV_VALUE', rows)}"
-            problems.append((rows["DV_KIND"].line, sentence))
+            problems.append(Message(sentence, line=rows["DV_KIND"].line))
         return variables
     try:
         words = [word.text for word in list_of(entry.value)]
         values = [number(word) for word in words]
     except CaseError as problem:
-        problems.append((entry.line, f"DV_VALUE: {problem}"))
+        problems += problem.within("DV_VALUE", line=entry.line)
         return variables
     needed = sum(len(each.values) for each in variables)
     sentence = f"{counted(len(values), 'value')} for {counted(len(variables), 'variable')}"
     if len(variables) < needed:
         sentence += f", which need {needed}"
     if len(values) < needed and not needless:
-        problems.append((entry.line, f"DV_VALUE has {sentence}; give one each"))
+        problems.append(Message(f"DV_VALUE has {sentence}; give one each", line=entry.line))
     numbers = (*(word.lstrip("+-") for word in words[::2]), *words[1::2])  # as in 0,01 -0,02
     comma = len(values) == 2 * needed and any(values) and all(map(str.isdecimal, numbers))
     if comma and not needless:
-        problems.append((entry.line, f"DV_VALUE has {sentence}; decimals are written with a point"))
+        rule = f"DV_VALUE has {sentence}; decimals are written with a point"
+        problems.append(Message(rule, line=entry.line))
     elif len(values) > needed:
         warnings.append(f"DV_VALUE has {sentence}: as in SU2, the last ones mean nothing")
     left = iter(values + [0.0] * needed)

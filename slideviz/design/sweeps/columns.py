@@ -23,7 +23,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.kinds import KIND_OF
 from slideviz.case.motions.motion import Motion
 from slideviz.case.words import number
-from slideviz.errors import CaseError, nearest, shown
+from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""
@@ -84,7 +84,7 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
     """Return for each column's name the place of its number, or its key; or raise CaseError."""
     columns: dict[str, NumberPlace | str] = {}
     first: dict[NumberPlace | str, str] = {}
-    problems = []
+    problems = list[Message]()
     known = _all_names(case)
     for name in names:
         try:
@@ -93,16 +93,16 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
                 raise CaseError(f"it means the same as column {first[meant]}; keep one of them")
             columns[name] = meant
         except CaseError as problem:
-            problems.append(f"column {shown(name)}: {problem}")
+            problems += problem.within(f"column {shown(name)}")
     places = [name for name, what in columns.items() if isinstance(what, NumberPlace)]
     whole = [name for name, what in columns.items() if what in _WHOLE_MOTION]
     if places and whole:
-        problems.append(
+        rule = (
             f"column {shown(whole[0])} replaces motions whose numbers column {shown(places[0])} "
             "changes; keep one of them"
         )
-    if problems:
-        raise CaseError("\n".join(problems))
+        problems.append(Message(rule))
+    raise_all(problems)
     return columns
 
 
@@ -113,7 +113,7 @@ def applied(
 
     Raises CaseError if some values are wrong: a sentence for each, which names the column.
     """
-    problems = []
+    problems = list[Message]()
     keys = {what: name for name, what in columns.items() if isinstance(what, str)}
     # In the order of the table, as in a case file: a key may be needed for another.
     for key in (key for key in KEYS if key in keys):
@@ -121,8 +121,8 @@ def applied(
             text = _text(values.get(keys[key], ""))
             case = set_key(case, key, text) if text else case
         except CaseError as problem:
-            message = str(problem).replace(f"--set {key}={text}: ", "")
-            problems.append(f"column {shown(keys[key])}: {message}")
+            column = f"column {shown(keys[key])}"  # instead of the option
+            problems += [replace(m, place=(column, *m.place[1:])) for m in problem.messages]
     motions = list(case.motions)
     for name, place in columns.items():
         value = values.get(name, "")
@@ -131,9 +131,8 @@ def applied(
         try:
             place.put(motions, number_of(value))
         except CaseError as problem:
-            problems.append(f"column {shown(name)}: {problem}")
-    if problems:
-        raise CaseError("\n".join(problems))
+            problems += problem.within(f"column {shown(name)}")
+    raise_all(problems)
     return case.change(motions=tuple(motions))
 
 

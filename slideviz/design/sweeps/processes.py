@@ -115,7 +115,7 @@ def run_task(task: Task) -> TaskResult:
             with nullcontext() if task.streamed else _one_thread():
                 row = _result(task, mesh, begin)
         except SlidevizError as problem:
-            row = DesignRow(task.design, problem="; ".join(str(problem).splitlines()))
+            row = DesignRow(task.design, problem="; ".join(map(str, problem.messages)))
         except MemoryError:
             row = DesignRow(task.design, problem="out of memory; a coarser mesh or fewer workers")
         except Exception as problem:

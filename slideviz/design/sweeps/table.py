@@ -25,7 +25,7 @@ from slideviz.design.sweeps.columns import (
     columns_of,
     number_of,
 )
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message, raise_all
 from slideviz.system.csv_table import csv_rows
 
 
@@ -109,15 +109,14 @@ def read_designs(case: Case, table: Table) -> Designs:
     if not columns or not rows:
         raise CaseError("the table of designs is empty; give at least one column and one row")
     designs = []
-    problems = []
+    problems = list[Message]()
     for at, row in enumerate(rows, start=1):
         values = {name: _value(row.get(name, "")) for name in names}
         try:
             designs.append(_design(case, columns, at, values))
         except CaseError as problem:
-            problems += [f"design {at}: {line}" for line in str(problem).splitlines()]
-    if problems:
-        raise CaseError("\n".join(problems))
+            problems += problem.within(f"design {at}")
+    raise_all(problems)
     return Designs(columns, tuple(designs))
 
 
@@ -223,11 +222,11 @@ def _read_csv(case: Case, path: Path) -> Designs:
         raise CaseError(f"{path}:{first}: {problem}") from None
     own = design_columns(words)
     names = [column_name(name) for name in words[own]]
-    problems: list[tuple[int, str]] = []
+    problems = list[Message]()
     try:
         columns = columns_of(case, names)
     except CaseError as problem:
-        problems += [(first, message) for message in str(problem).splitlines()]
+        problems += problem.within(line=first)
         columns = _known_columns(case, names)
     designs: list[Design] = []
     for at, (line, content) in enumerate(rest, start=1):
@@ -241,9 +240,8 @@ def _read_csv(case: Case, path: Path) -> Designs:
             values: dict[str, Value] = {name: cell for name, cell in row if name in columns}
             designs.append(_design(case, columns, at, values))
         except CaseError as problem:
-            problems += [(line, message) for message in str(problem).splitlines()]
-    if problems:
-        raise CaseError(listed(path, problems))
+            problems += problem.within(line=line)
+    raise_all(listed(path, problems))
     return Designs(columns, tuple(designs))
 
 

@@ -21,7 +21,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from slideviz.errors import MeshError, printable
+from slideviz.errors import MeshError, Message, printable
 from slideviz.formats.su2.lines import chosen_zones
 
 NAME_BYTES = 33  # bytes of the name of a marker, padded with zeros
@@ -114,7 +114,7 @@ class BinaryFile:
 
     def error(self, at: int, message: str) -> MeshError:
         """Return the error ``file: byte n: message``."""
-        return MeshError(f"{self.name}: byte {at}: {message}")
+        return MeshError(Message(message, place=(self.name, f"byte {at}")))
 
     def require(self, at: int, count: int, width: int, what: str) -> int:
         """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``at``.

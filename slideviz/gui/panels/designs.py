@@ -339,7 +339,7 @@ class DesignsPanel(Panel):
         try:
             table = change()
         except SlidevizError as error:
-            first, *more = str(error).splitlines()
+            first, *more = map(str, error.messages)
             self._show_status(f"{first} (and {len(more)} more)" if more else first, wrong=True)
             if more:
                 self._mistakes = str(error)
