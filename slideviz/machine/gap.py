@@ -1,6 +1,6 @@
 """Smallest distances between boundaries: the throats between blades, and the gaps at their tips.
 
-Distances are those of the facets, not of the nodes. The distance from a surface changes at most as
+Distances are measured between facets, not nodes. The distance from a surface changes at most as
 much as a point moves. So a segment whose ends are at distances a and b has no point nearer than
 (a + b - length) / 2. It is halved while that is nearer than the nearest point known (S. A.
 Piyavskii, 1972; B. O. Shubert, 1972).
