@@ -89,11 +89,9 @@ def parsed_displacements(
     """Return the displacements that the text of a file lists; as `read_displacements`."""
     each = []
     for first, here, part, lines in in_zones(text, path, mesh, nodes):
-        whole = part.part
-        numbers, count = (
-            (here, len(part.points)) if whole is None else (whole.points[here], whole.n_points)
-        )
-        read = parse_displacements(lines, path, numbers, (count, part.dim), of)
+        whole = part.whole
+        shape = whole.n_points, part.dim
+        read = parse_displacements(lines, path, whole.points[here], shape, of)
         each.append(replace(read, nodes=here + first))
     return Displacements(
         np.concatenate([read.nodes for read in each]),

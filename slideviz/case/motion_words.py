@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, Target, named
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Mesh, Skin
 
 MOST_NAMED = 4  # most markers of a motion whose names are all in its words
 
@@ -75,10 +75,9 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = bounds_words(mesh)
-    part = mesh.part
-    cells, points = (part.n_cells, part.n_points) if part else (len(mesh.cells), len(mesh.points))
-    count = f"{cells:,} cells{halo}   {points:,} points"
-    if part is not None:
+    whole = mesh.whole
+    count = f"{whole.n_cells:,} cells{halo}   {whole.n_points:,} points"
+    if isinstance(mesh, Skin):
         count += "   boundary and sections only"
         about += f"In memory: {len(mesh.cells):,} cells at the boundary; the rest is in its file.\n"
     return f"{mesh.dim}D   {count}   {size}", about + ends

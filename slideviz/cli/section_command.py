@@ -166,6 +166,7 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     import numpy as np
 
     from slideviz.cli.mesh_source import open_mesh, progress_of
+    from slideviz.mesh.model import Skin
     from slideviz.session.passages import keeps
     from slideviz.streaming.quality import quality_blocks
     from slideviz.streaming.source import cut_cells, join_blocks
@@ -187,7 +188,7 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
             near = join_blocks(blocks) if mesh.dim == 2 else cut_cells(blocks, chosen, moves)
     near = near.part_of(mesh)
     assert near.quality is not None
-    outer = mesh.points if mesh.part is not None else mesh.points[mesh.cells.nodes]
+    outer = mesh.points if isinstance(mesh, Skin) else mesh.points[mesh.cells.nodes]
     return _Scene(near.mesh, near.base, near.quality, chosen, matrices, outer, path)
 
 
@@ -199,8 +200,7 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
     mesh = scene.mesh
     chosen = scene.chosen
     summary = shown.paint.summary(shown.ids)
-    if mesh.part is not None:
-        summary["worst_cell"] = int(mesh.part.cells[int(summary["worst_cell"])])
+    summary["worst_cell"] = mesh.cell_number(int(summary["worst_cell"]))
     report: dict[str, Any] = {
         "mesh": mesh.name,
         "section": _as_json(chosen),

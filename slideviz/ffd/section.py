@@ -25,7 +25,7 @@ from slideviz.ffd.box import (
 )
 from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZonePart
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, Skin, ZonePart
 from slideviz.mesh.zones import names_from, names_in, require_one_zone, with_zones, zones_of
 from slideviz.system.weak_cache import WeakCache
 
@@ -221,8 +221,7 @@ class _Reader:
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
         key = "FFD_SURFACE_POINTS"
-        part = self.mesh.part
-        n_points = len(self.mesh.points) if part is None else part.n_points
+        part = self.mesh.whole
         on: dict[str, list[Row]] = {}
         for line, words in self.rows(key, self.count(key)):
             on.setdefault(words[0], []).append((line, words[1:]))
@@ -231,7 +230,7 @@ class _Reader:
             table = self.table(key, tails, 4)
             number = table[:, 0]
             known = self.mesh.zones == 1 or marker in self.mesh.marker_names
-            most = n_points if known else np.inf  # SU2 lists nodes of all zones in one section
+            most = part.n_points if known else np.inf  # SU2 lists nodes of all zones in one section
             bad = (number != np.floor(number)) | (number < 0) | (number >= most)
             if bad.any():
                 line, words = tails[int(np.argmax(bad))]
@@ -245,7 +244,7 @@ class _Reader:
                     line,
                 )
             nodes, first = np.unique(number.astype(np.int64), return_index=True)
-            if part is not None:  # which has all nodes of markers
+            if isinstance(self.mesh, Skin):  # which has all nodes of markers
                 inside = np.isin(nodes, part.points)
                 nodes = np.searchsorted(part.points, nodes[inside])
                 first = first[inside]

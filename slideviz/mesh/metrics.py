@@ -22,7 +22,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import path_margins
-from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, Skin, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, checked_reference, quality
 from slideviz.mesh.topology import vertex_normals
@@ -175,7 +175,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     name = metric_name(name)
     if name in SIZE_SKEW:
         return rated_metric(mesh, name, reference, quality(mesh, reference))
-    if mesh.part is not None and not METRICS[name].alone:
+    if isinstance(mesh, Skin) and not METRICS[name].alone:
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
     check_size(mesh)

@@ -275,7 +275,7 @@ class ZonePart:
     first_point: int
     first_cell: int
     """`first_point`, `first_cell`: numbers of its first point and cell in the file of all zones;
-    other than in the mesh where that is only a part (`Mesh.part`)."""
+    other than in the mesh where that is a `Skin`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -304,9 +304,6 @@ class Mesh:
     """Warnings of the reader, a sentence each."""
     interfaces: tuple[ZoneInterface, ...] = ()
     """The boundaries that coincide with boundaries of other zones of the file."""
-    part: Part | None = None
-    """For a mesh that is only a part of another (its skin, where that is larger than memory): where
-    its points and cells are in the whole."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -364,13 +361,20 @@ class Mesh:
                 return marker
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
 
+    @property
+    def whole(self) -> Part:
+        """Return where its points and cells are in the mesh of its file: all, but of a `Skin`."""
+        points = len(self.points)
+        cells = len(self.cells)
+        return Part(np.arange(points), np.arange(cells), points, cells)
+
     def number(self, node: int) -> int:
         """Return the number that a node has in its file, for messages."""
-        return node if self.part is None else int(self.part.points[node])
+        return node
 
     def cell_number(self, cell: int) -> int:
         """Return the number that a cell has in its file, for messages."""
-        return cell if self.part is None else int(self.part.cells[cell])
+        return cell
 
     @check_types
     def with_points(self, points: ArrayLike) -> Self:
@@ -388,8 +392,34 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Skin(Mesh):
+    """Those points and cells of a mesh in a file that are in memory: mostly at its boundary."""
+
+    part: Part = field(kw_only=True)
+    """Where they are in the file."""
+
+    @property
+    def whole(self) -> Part:
+        """Return where its points and cells are in the mesh of its file."""
+        return self.part
+
+    def number(self, node: int) -> int:
+        """Return the number that a node has in its file."""
+        return int(self.part.points[node])
+
+    def cell_number(self, cell: int) -> int:
+        """Return the number that a cell has in its file."""
+        return int(self.part.cells[cell])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Assembly(Mesh):
     """Several zones of a file as one mesh (`slideviz.mesh.zones`)."""
 
     parts: tuple[ZonePart, ...] = ()
     """Where each zone is; they share no points."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SkinAssembly(Assembly, Skin):
+    """The skins of several zones of a file as one mesh."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Sized
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -23,6 +23,8 @@ from slideviz.mesh.model import (
     Marker,
     Mesh,
     Part,
+    Skin,
+    SkinAssembly,
     ZoneInterface,
     ZonePart,
     sealed,
@@ -58,7 +60,9 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     points = _slices([zone.points for zone in zones])
     cells = _slices([zone.cells for zone in zones])
     markers = _slices([zone.markers for zone in zones])
-    part, first_point, first_cell = _part(zones)
+    whole = [zone.whole for zone in zones]
+    *first_point, n_points = accumulate((part.n_points for part in whole), initial=0)
+    *first_cell, n_cells = accumulate((part.n_cells for part in whole), initial=0)
     coords = sealed(np.concatenate([zone.points for zone in zones]))
     alone = [
         replace(zone, points=coords[part], interfaces=())
@@ -79,11 +83,16 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
         zone=None,
         zones=len(zones),
         parts=tuple(map(ZonePart, alone, points, cells, markers, first_point, first_cell)),
-        part=part,
         source=first.source,
         remarks=tuple(f"zone {zone.zone}: {text}" for zone in zones for text in zone.remarks),
     )
-    return replace(mesh, halo=_halo(mesh), interfaces=tuple(_interfaces(mesh)))
+    mesh = replace(mesh, halo=_halo(mesh), interfaces=tuple(_interfaces(mesh)))
+    if not all(isinstance(zone, Skin) for zone in zones):
+        return mesh
+    numbers = [part.points + first for part, first in zip(whole, first_point, strict=True)]
+    ids = [part.cells + first for part, first in zip(whole, first_cell, strict=True)]
+    part = Part(sealed(np.concatenate(numbers)), sealed(np.concatenate(ids)), n_points, n_cells)
+    return SkinAssembly(**{one.name: getattr(mesh, one.name) for one in fields(mesh)}, part=part)
 
 
 def unique_names(zones: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -156,24 +165,6 @@ def spellings(mesh: Mesh) -> Mapping[str, str]:
 def _slices(parts: Sequence[Sized]) -> list[slice]:
     """Return the place of each part where all stand one after the other."""
     return [slice(*ends) for ends in pairwise(accumulate(map(len, parts), initial=0))]
-
-
-def _part(zones: Sequence[Mesh]) -> tuple[Part | None, list[int], list[int]]:
-    """Return the part of all zones of which parts are in memory; the first numbers of each zone."""
-    sizes = [
-        (one.n_points, one.n_cells) if (one := zone.part) else (len(zone.points), len(zone.cells))
-        for zone in zones
-    ]
-    *points, n_points = accumulate((size[0] for size in sizes), initial=0)
-    *cells, n_cells = accumulate((size[1] for size in sizes), initial=0)
-    parts = [zone.part for zone in zones if zone.part is not None]
-    if len(parts) < len(zones):
-        return None, points, cells
-    numbers = [
-        sealed(np.concatenate([mine + first for mine, first in zip(each, firsts, strict=True)]))
-        for each, firsts in (([p.points for p in parts], points), ([p.cells for p in parts], cells))
-    ]
-    return Part(numbers[0], numbers[1], n_points, n_cells), points, cells
 
 
 def _shifted(cells: Cells, by: int) -> Cells:

@@ -222,11 +222,8 @@ class RepairLayer(KeyedLayer):
             return
         mesh = done.mesh
         before = np.array(done.mesh.points)
-        nodes = done.nodes
-        cells = done.cells
-        if mesh.part is not None:
-            nodes = np.searchsorted(mesh.part.points, nodes)
-            cells = np.searchsorted(mesh.part.cells, cells)
+        nodes = np.searchsorted(mesh.whole.points, done.nodes)
+        cells = np.searchsorted(mesh.whole.cells, done.cells)
         before[nodes] = done.points
         lift = 4.0 * self.stage.lift(mesh)
         edges = np.concatenate(

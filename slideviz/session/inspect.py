@@ -195,12 +195,10 @@ def worst_cells(
 
 def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCells:
     """Return the worst cells of a large mesh by size-skew: the first of ``extra`` of the frame."""
-    assert extra.mesh.part is not None
     assert extra.base is not None
-    assert frame.mesh.part is not None
     cells = np.arange(min(count, len(extra.mesh.cells)))
-    numbers = extra.mesh.part.cells[cells]
-    in_memory = frame.mesh.part.cells
+    numbers = extra.mesh.whole.cells[cells]
+    in_memory = frame.mesh.whole.cells
     place = np.minimum(np.searchsorted(in_memory, numbers), len(in_memory) - 1)
     drawn = in_memory[place] == numbers  # those at the boundary are drawn as parts of it
     before = quality(extra.base, metric=extra.quality.metric).values[cells]

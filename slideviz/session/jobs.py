@@ -26,7 +26,7 @@ from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.margin import step_safety
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, Mesh, Skin
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
@@ -278,7 +278,7 @@ def prepare(
     pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
     report(JobProgress("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
-    if mesh.part is None:
+    if not isinstance(mesh, Skin):
         measured = quality(mesh, metric=metric, going_on=going_on)
         periodic = {name for pair in pairs for name in (pair.first, pair.second)}
         names = [name for name in mesh.marker_names if name not in periodic]

@@ -46,9 +46,8 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
     Raises MeshError if the file has a mistake, and OSError if it cannot be read.
     """
     skin = read_skin(path, zone, tick)
-    assert skin.part is not None
     remark = (
-        f"{skin.part.n_cells:,} cells stay in the file. The window shows the boundary, sections "
+        f"{skin.whole.n_cells:,} cells stay in the file. The window shows the boundary, sections "
         f"and the worst cells; a run deforms the mesh from file to file"
     )
     return replace(skin, remarks=(*skin.remarks, remark))

@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.model import NEW, Case
 from slideviz.case.motions.box import box_motions
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
 from slideviz.session.saving import bound_sections, view_from_case
@@ -51,7 +51,7 @@ def open_mesh(
         view = view.with_drawn({"ffd": True})
     view = replace(view, sections=bound_sections(view.sections, mesh, chosen, pairs))
     flat = view.flat_index
-    if mesh.part is not None:
+    if isinstance(mesh, Skin):
         view = replace(view, threshold=None)  # needs the values of all cells
     if flat is None and view.sections:
         flat = 0

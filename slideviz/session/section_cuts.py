@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.surfaces import padded
@@ -253,7 +253,7 @@ class Cuts:
         ``only`` are the cells that are shown at all; None: all of them. Empty for a mesh in its
         file until the cells of the section were read.
         """
-        if mesh.part is not None:
+        if isinstance(mesh, Skin):
             return self._of_slab(mesh, section, matrix)
         cutter = self.cutter(mesh)
         if self._points is not mesh.points:
@@ -286,13 +286,13 @@ def cut_frame(frame: StepFrame, section: Section) -> StepFrame:
 
     That is ``frame`` or, for a mesh in its file, the slab of cells that was read for the section.
     """
-    slab = slab_of(frame.mesh, section) if frame.mesh.part is not None else None
+    slab = slab_of(frame.mesh, section)
     return frame if slab is None else slab
 
 
 def is_awaited(mesh: Mesh, section: Section) -> bool:
     """Return whether the cells of a section are still to be read from the mesh's file."""
-    return mesh.part is not None and slab_of(mesh, section) is None
+    return isinstance(mesh, Skin) and slab_of(mesh, section) is None
 
 
 def can_cut(mesh: Mesh | None, section: Section) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from slideviz.case.check import effective
 from slideviz.case.model import Case
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
 from slideviz.terms import RATED, SHOWN, WALL_VALUES, ColorBy, PointsShown, Role, Shown
@@ -152,7 +152,7 @@ class Session:
     @property
     def in_file(self) -> bool:
         """Return whether only the boundary of the mesh is in memory, and its cells in the file."""
-        return self.mesh is not None and self.mesh.part is not None
+        return isinstance(self.mesh, Skin)
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the session was read from, with words for what each is."""

@@ -17,7 +17,7 @@ from slideviz.case.limits import rated_limits
 from slideviz.case.model import Case
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.margin import step_safety
-from slideviz.mesh.model import Assembly, IntArray, Mesh
+from slideviz.mesh.model import Assembly, IntArray, Mesh, Skin
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.tape import value
@@ -123,7 +123,7 @@ def _steps_of_zone(
             setup = make_setup(prepared)
     require_memory(setup, case)
     mend = None
-    if case.repair != "no" and mesh.part is None:
+    if case.repair != "no" and not isinstance(mesh, Skin):
         from slideviz.solver.repair import mended_step  # loads SciPy's sparse matrices
 
         mend = partial(mended_step, case, mesh, setup, report)

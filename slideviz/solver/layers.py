@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.topology import facet_vectors
 from slideviz.mesh.walls import BADNESS, Columns, Walls, find_columns
 from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
@@ -141,7 +141,7 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
     """
     if zone is None:
         return []
-    if not len(zone.nodes) and mesh.part is None:  # the skin of a mesh in a file may have none
+    if not len(zone.nodes) and not isinstance(mesh, Skin):  # which may have none
         thickness = max(wall.thickness for wall, *_ in zone.walls.walls)
         sentence = (
             f"LAYERS= {case.layers.upper()} has no effect, since no node is nearer to a wall than "

@@ -11,7 +11,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
 from slideviz.case.zones import each_zone
 from slideviz.errors import SlidevizError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.steps import Step
@@ -89,7 +89,7 @@ def remedies(
 
 def fixed_beside(case: Case, mesh: Mesh, cells: IntArray) -> tuple[str, ...]:
     """Return the fixed boundaries that have nodes of cells (k,); none of a mesh in its file."""
-    if mesh.part is not None:
+    if isinstance(mesh, Skin):
         return ()
     near = np.zeros(len(mesh.points), bool)
     near[mesh.cells.take(cells).connectivity] = True

@@ -24,7 +24,7 @@ from slideviz.elastic.conditions import conditions
 from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, Skin, sealed
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
@@ -268,7 +268,7 @@ def unmendable_words(
     """
     if not impossible:
         return (), ()
-    numbers = np.arange(len(mesh.points)) if mesh.part is None else mesh.part.points
+    numbers = mesh.whole.points
     nodes = {marker.name: numbers[marker.nodes] for marker in mesh.markers}
 
     def on(ones: Sequence[Impossible]) -> str:
@@ -294,7 +294,7 @@ def slide_advice(case: Case, mesh: Mesh, poor: Cells, limit: float) -> tuple[str
     ``mesh``: it has the markers.
     ``poor``: the cells that are proved valid, but below a limit after the repair.
     """
-    numbers = np.arange(len(mesh.points)) if mesh.part is None else mesh.part.points
+    numbers = mesh.whole.points
     beside = [
         marker.name
         for marker in mesh.markers
@@ -351,7 +351,7 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     if setup is None or sliding is not case:
         setup = still_setup(sliding, mesh, points)
     held = np.concatenate([known, setup.known])
-    if mesh.part is None:
+    if not isinstance(mesh, Skin):
         held = np.concatenate([held, unmarked_sides(mesh, setup.boundary.facets).ravel()])
     if mesh.halo is not None:  # copies that are not images would have to follow their donors
         copies = np.setdiff1d(mesh.halo.receivers, setup.images)

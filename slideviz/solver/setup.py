@@ -17,7 +17,7 @@ from slideviz.case.spans import span_field
 from slideviz.errors import Note
 from slideviz.machine.span import SpanField
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.zones import require_one_zone
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
@@ -368,7 +368,7 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
                 f"METHOD= {case.method} is not relaxed; RELAX= AUTO relaxes with METHOD= rbf only"
             ),
         )
-    if mesh.part is not None:
+    if isinstance(mesh, Skin):
         return (Note("RELAX= AUTO does not relax a streamed mesh"),)
     if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:
         return (

@@ -19,7 +19,7 @@ import numpy as np
 from slideviz.errors import Note
 from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.margin import chain as chained_safety
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, sealed
 from slideviz.mesh.zones import join_zones, names_from
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
@@ -114,13 +114,13 @@ class MeshRepair:
             each = [getattr(one, name) + getattr(part, start) for part, one in done]
             return sealed(np.concatenate(each))
 
-        if mesh.part is not None:  # of streamed zones, the bad cells and the moved nodes
-            parts = [(place, one.mesh.part) for place, one in done if one.mesh.part is not None]
+        if isinstance(mesh, Skin):  # of streamed zones, the bad cells and the moved nodes
+            parts = [(place, one.mesh.whole) for place, one in done]
             points = np.concatenate([each.points + place.first_point for place, each in parts])
             cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
-            part = Part(sealed(points), sealed(cells), mesh.part.n_points, mesh.part.n_cells)
-            bare = [replace(one.mesh, markers=()) for _, one in done]
-            now = replace(join_zones(bare), part=part)
+            part = replace(mesh.part, points=sealed(points), cells=sealed(cells))
+            bare = join_zones([replace(one.mesh, markers=()) for _, one in done])
+            now = Skin(bare.points, bare.cells, name=bare.name, part=part)
         return cls(
             mesh=now,
             cells=numbers("cells"),

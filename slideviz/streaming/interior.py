@@ -36,12 +36,10 @@ class InteriorDisplacer:
         """Return the same after the repair of the whole mesh, with its nodes in the skin moved."""
         last = self.steps[-1]
         mesh = repair.mesh
-        assert self.skin.part is not None
-        assert mesh.part is not None
-        skin = self.skin.part.points
+        skin = self.skin.whole.points
         points = np.array(last.mesh.points)
         nodes = repair.nodes[np.isin(repair.nodes, skin)]
-        now = mesh.points[np.searchsorted(mesh.part.points, nodes)]
+        now = mesh.points[np.searchsorted(mesh.whole.points, nodes)]
         points[np.searchsorted(skin, nodes)] = now
         last = replace(
             last,
@@ -113,9 +111,9 @@ class InteriorDisplacer:
 
         ``nodes`` (m,) are ascending numbers in the whole mesh.
         """
-        assert self.skin.part is not None
-        low, high = np.searchsorted(self.skin.part.points, [nodes[0], nodes[-1] + 1])
-        numbers = self.skin.part.points[low:high]
+        skin = self.skin.whole.points
+        low, high = np.searchsorted(skin, [nodes[0], nodes[-1] + 1])
+        numbers = skin[low:high]
         at = np.searchsorted(nodes, numbers)
         same = np.flatnonzero(nodes[at] == numbers)
         return at[same], low + same

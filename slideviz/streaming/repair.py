@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from slideviz.case.model import Case
 from slideviz.formats.su2b.read import ElementBlock
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, sealed
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, Skin, sealed
 from slideviz.mesh.quality import VALID, Quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
@@ -47,11 +47,10 @@ class FileRegions:
         facets: IntArray,
         going_on: Callable[[], object],
     ) -> None:
-        assert skin.part is not None
         self._source = source
         self._file = file
         self._going_on = going_on
-        self._skin = skin.part.points
+        self._skin = skin.whole.points
         self._freedom = freedom
         self._facets = facets
         self.nodes = self._skin[:0]
@@ -197,7 +196,7 @@ def mend_file(
     nodes = np.union1d(cells.nodes, regions.nodes)
     cells = Cells.from_types(cells.types, np.searchsorted(nodes, cells.connectivity))
     part = Part(sealed(nodes), sealed(bad), source.n_points, count)
-    mesh = Mesh(source.points.at(nodes), cells, name=skin.name, part=part)
+    mesh = Skin(source.points.at(nodes), cells, name=skin.name, part=part)
     moved = np.searchsorted(nodes, regions.nodes)
     way = np.linalg.norm(mesh.points[moved] - regions.before, axis=1)
     # Later regions may have moved a node back to where it was.

@@ -240,12 +240,11 @@ class _ZoneRuns:
 
     def _close_gaps(self, zone: int, before: Mesh, after: Mesh) -> None:
         """Write those points of a skin into the file that interfaces have changed by rounding."""
-        assert after.part is not None
         apart = np.flatnonzero(
             (before.points.view(np.int64) != after.points.view(np.int64)).any(axis=1)
         )
         if len(apart):
-            numbers = after.part.points[apart]
+            numbers = after.whole.points[apart]
             points = after.points[apart]
             self._out.change(
                 zone, "evaluate", lambda at, file, _: at.points.write(file, numbers, points)
@@ -259,11 +258,10 @@ class _ZoneRuns:
         """
         case = prepared.case
         skin = prepared.mesh
-        assert skin.part is not None
         zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
         timer = step_timer(report, 1, max(1, case.steps))
         give_back()
-        with _naming_file_nodes(skin.part.points):
+        with _naming_file_nodes(skin.whole.points):
             with timer.phase("classify"):
                 setup = make_setup(prepared)
             require_memory(setup, case)
@@ -403,8 +401,7 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
     """
     skin = displacer.skin
     last = displacer.steps[-1]
-    assert skin.part is not None
-    more = skin.part.n_points - len(skin.points)
+    more = skin.whole.n_points - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
     steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return [

@@ -43,6 +43,7 @@ from slideviz.mesh.model import (
     Mesh,
     Origin,
     Part,
+    Skin,
     sealed,
 )
 from slideviz.mesh.zones import join_zones
@@ -85,7 +86,7 @@ def read_skin(
     """
     with open_zones(path, zone) as (source, places):
         shares = equal_shares(progress, len(places))
-        skins = [
+        skins: list[Mesh] = [
             _skin_of_zone(source, place, path, share, ranks)
             for place, share in zip(places, shares, strict=True)
         ]
@@ -118,7 +119,7 @@ def _of_text(skin: Mesh, text: Text) -> Mesh:
 
 def _skin_of_zone(
     source: BinaryFile, place: ZonePlace, path: Path, progress: Tick, ranks: SerialPool
-) -> Mesh:
+) -> Skin:
     markers = read_markers(source, place)
     used = np.zeros(place.n_points, bool)
     for marker in markers:
@@ -138,7 +139,7 @@ def _skin_of_zone(
         ]
         found = _ticking(do(parts), progress_share(progress, 0.6), len(parts))
         numbers, points = _join_points(source, place, numbers, found)
-    return Mesh(
+    return Skin(
         points,
         _renumbered(cells, numbers),
         tuple(Marker(m.name, _renumbered(m.cells, numbers)) for m in markers),

@@ -22,7 +22,7 @@ from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
 from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, frozen_array
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, frozen_array
 from slideviz.mesh.quality import Quality
 from slideviz.sections.cut import crossed_cells
 from slideviz.sections.model import Section
@@ -67,15 +67,19 @@ class CellBlock:
 
     def part_of(self, whole: Mesh) -> CellBlock:
         """Return the block with the name and the zone of the mesh that it is a part of."""
-        n_points = len(whole.points)
-        n_cells = len(whole.cells)
-        if whole.part is not None:
-            n_points = whole.part.n_points
-            n_cells = whole.part.n_cells
-        part = Part(
-            frozen_array(self.nodes, np.int64), frozen_array(self.ids, np.int64), n_points, n_cells
+        part = replace(
+            whole.whole,
+            points=frozen_array(self.nodes, np.int64),
+            cells=frozen_array(self.ids, np.int64),
         )
-        mesh = replace(self.mesh, name=whole.name, zone=whole.zone, zones=whole.zones, part=part)
+        mesh = Skin(
+            self.mesh.points,
+            self.mesh.cells,
+            name=whole.name,
+            zone=whole.zone,
+            zones=whole.zones,
+            part=part,
+        )
         base = None if self.base is None else mesh.with_points(self.base.points)
         return replace(self, mesh=mesh, base=base)
 

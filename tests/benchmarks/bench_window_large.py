@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from slideviz.mesh.model import Skin
 from slideviz.samples.table import write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -84,8 +85,8 @@ def until_read(bench) -> None:
 
 def test_opening(benchmark, bench):
     measure(benchmark, bench, bench.open)
-    part = bench.window.store.session.mesh.part
-    assert bench.window.store.session.in_file == (part is not None)
+    mesh = bench.window.store.session.mesh
+    assert bench.window.store.session.in_file == isinstance(mesh, Skin)
 
 
 def test_turning(benchmark, bench):
