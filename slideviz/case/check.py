@@ -173,6 +173,15 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return tuple(found)
 
 
+def motion_doubts(case: Case, mesh: Mesh) -> Iterator[str]:
+    """Yield a sentence for each motion that can be made, but hardly does what is meant."""
+    moving = case.markers_with("moving")
+    for place, motion in enumerate(case.motions, 1):
+        names = [name for name in moving if applies_to(motion, name)]
+        if names:
+            yield from (f"motion {place}: {text}" for text in motion.doubts(mesh, names))
+
+
 def _text_problem(motion: Motion) -> str:
     """Return why a motion has values that cannot be read from a case file; "" if it has none."""
     if not motion.checked_as_text:

@@ -59,16 +59,6 @@ def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     return min(repeated, default=None)
 
 
-def unused_nodes(mesh: Mesh) -> IntArray:
-    """Return ascending indices (u,) of the points that no cell uses.
-
-    They do no harm in slideviz, but SU2 makes control volumes of size zero around them.
-    """
-    used = np.zeros(len(mesh.points), bool)
-    used[mesh.cells.connectivity] = True
-    return np.flatnonzero(~used)
-
-
 def check_mesh(mesh: Mesh) -> None:
     """Raise if the coordinates, elements or marker names of a mesh cannot be used.
 

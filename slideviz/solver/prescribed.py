@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motion import ROUNDING, moving_nodes, same
@@ -114,9 +115,10 @@ def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str |
 
 
 def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
-    """Return the `motion_messages` of a case of one zone before it runs."""
+    """Return the `motion_messages` of a case of one zone before it runs, or a doubt about it."""
     moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
-    return motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
+    problem, folded = motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
+    return problem, folded or next(motion_doubts(case, mesh), None)
 
 
 def prescribe(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.check import file_before_motions, idle_settings
+from slideviz.case.check import file_before_motions, idle_settings, motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.span import moves_over_span
@@ -300,6 +300,7 @@ def setup_of(
         *loose,
         *idle_settings(case),
         *file_before_motions(case),
+        *motion_doubts(case, mesh),
     )
     zone = layer_zone(case, mesh, domain, conditions.known)
     warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, mesh, domain, zone))

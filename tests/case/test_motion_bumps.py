@@ -1,5 +1,7 @@
 """Bumps on airfoils as motions of a case."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,9 @@ from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.design.sweeps.columns import applied, columns_of, numbers_of
 from slideviz.errors import CaseError
+from slideviz.session.jobs import find_intersection
+from slideviz.solver.prepare import prepare
+from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, cube
 from tests.oracles import airfoils
 
@@ -64,6 +69,28 @@ def test_bumps_go_by_undeformed_places_and_add_up(kind):
     np.testing.assert_array_equal(displacements(case(shift, bump), mesh).vectors, one)
     twice = displacements(case(bump, bump), mesh).vectors
     np.testing.assert_allclose(twice, 2.0 * (one - [0.3, 0.0]), atol=1e-16)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("chord", "told"),
+    [
+        ((0.0, 1.0), False),
+        ((0.0, 0.5), False),
+        ((-0.4, 1.4), False),
+        ((0.0, 0.1), True),
+        ((0.4, 0.8), True),
+        ((-1.0, 1.2), True),
+        ((0.0, 100.0), True),
+    ],
+)
+def test_a_chord_that_does_not_fit_is_told_before_a_run_and_after(kind, chord, told):
+    mesh = bent()
+    moved = case(replace(KINDS[kind][0](*chord), height=1e-6))
+    words = f"goes from x = {chord[0]:g} to {chord[1]:g}, but airfoil from 0 to 1; end its MOTION"
+    messages = make_setup(prepare(moved, mesh)).warnings
+    assert any(words in text for text in messages) == told
+    assert (words in find_intersection(moved, mesh, lambda _: None, lambda: False)[1]) == told
 
 
 def test_a_bump_of_a_side_that_is_not_there_is_refused():
