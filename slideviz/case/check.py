@@ -173,13 +173,13 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return tuple(found)
 
 
-def motion_doubts(case: Case, mesh: Mesh) -> Iterator[str]:
-    """Yield a sentence for each motion that can be made, but hardly does what is meant."""
+def motion_doubts(case: Case, mesh: Mesh) -> Iterator[Message]:
+    """Yield a message for each motion that can be made, but hardly does what is meant."""
     moving = case.markers_with("moving")
     for place, motion in enumerate(case.motions, 1):
         names = [name for name in moving if applies_to(motion, name)]
         if names:
-            yield from (f"motion {place}: {text}" for text in motion.doubts(mesh, names))
+            yield from CaseError(*motion.doubts(mesh, names)).within(f"motion {place}")
 
 
 def _text_problem(motion: Motion) -> str:

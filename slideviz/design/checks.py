@@ -14,7 +14,14 @@ from slideviz.case.motion import ROUNDING
 from slideviz.case.words import counted, wrong_by
 from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep, StepState
-from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning, UnsoundError
+from slideviz.errors import (
+    ConditionWarning,
+    DeformError,
+    Message,
+    Note,
+    ToleranceWarning,
+    UnsoundError,
+)
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits
 from slideviz.rbf.loops import farthest
@@ -114,16 +121,15 @@ def warn_of_errors(
     worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
     chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
     of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
-    why = f": {chosen} are those of another displacement; renew them with `deformer = "
-    why += "deformer.refresh(displacement)`"
+    why = f": {chosen} are those of another displacement"
+    remedy = "renew them with `deformer = deformer.refresh(displacement)`"
     if reference[worst]:
-        why = f", with {chosen} chosen for this displacement; use more STEPS, a less smooth "
-        why += "RBF_KERNEL such as wendland-c0, or a smaller displacement"
+        why = f", with {chosen} chosen for this displacement"
+        remedy = "use more STEPS, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
+        remedy += "displacement"
+    rule = f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
     warnings.warn(
-        f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
-        f"{allowed[worst]:.3g}{why}",
-        ToleranceWarning,
-        stacklevel=3,
+        ToleranceWarning(Message(f"{rule}{allowed[worst]:.3g}{why}", remedy)), stacklevel=3
     )
 
 

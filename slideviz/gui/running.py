@@ -254,7 +254,7 @@ class Running(QObject):
         warnings = self._log_remarks(run)
         bad = inverted_words(run)
         if bad:
-            folding = "" if session.outdated else session.folding
+            folding = None if session.outdated else session.folding
             warnings.insert(0, f"{bad}. {remedy_for(run, session.mesh, folding)}")
         if missed:
             warnings.insert(0, f"{missed}: {outcome(run.last.limits)}.")

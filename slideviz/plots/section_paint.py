@@ -107,7 +107,11 @@ class Paint:
         }
 
     def sentence(self, cells: IntArray, of: int | None = None, shown: str = "") -> str:
-        """Return the summary of cells (c,) as a sentence.
+        """Return the label, with the `numbers` of cells (c,)."""
+        return f"{self.label}: {self.numbers(cells, of, shown)}"
+
+    def numbers(self, cells: IntArray, of: int | None = None, shown: str = "") -> str:
+        """Return the summary of cells (c,) in words.
 
         If they are only those of ``of`` cells that a threshold leaves, ``shown`` is its text.
         """
@@ -120,8 +124,8 @@ class Paint:
         if facts["inverted"]:
             count += f", {facts['inverted']:,} inverted"
         if np.isnan(facts["min"]) and self.label in WALL_VALUES:
-            return f"{RATED[self.label].label}: no cell at a wall; {count}"
-        return f"{self.label}: {end} {facts[end]:{number}}, mean {facts['mean']:{number}}; {count}"
+            return f"no cell at a wall; {count}"
+        return f"{end} {facts[end]:{number}}, mean {facts['mean']:{number}}; {count}"
 
 
 def shown_paint(session: Session, frame: StepFrame | None = None) -> Paint:

@@ -243,10 +243,10 @@ class SectionInRun:
     @property
     def numbers(self) -> str:
         """Return step, minimum and mean of the cut cells in words, with the note."""
-        text = self.paint.sentence(self.ids) if self.drawn else "no cell is cut"
-        if self.place:
-            text = f"{self.place}: {text.removeprefix(f'{self.paint.label}: ')}"
-        return "; ".join(part for part in (text, self.note) if part)
+        text = self.paint.numbers(self.ids) if self.drawn else "no cell is cut"
+        of = self.place or (self.paint.label if self.drawn else "")
+        text = f"{of}: {text}" if of else text
+        return f"{text}; {self.note}" if self.note else text
 
 
 def require_picture_name(file: Path) -> None:

@@ -21,7 +21,7 @@ from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_l
 from slideviz.case.model import Case
 from slideviz.case.motions.span import prepare_span
 from slideviz.case.zones import each_zone, with_marker_names
-from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
+from slideviz.errors import Cancelled, CaseError, MeshError, Message, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
@@ -132,26 +132,28 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around, *rims)
 
 
-def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
-    """Return two sentences on boundaries that the motions make cross each other, "" for none.
+def find_intersection(
+    case: Case, mesh: Mesh, _report: Report, stopped: Stopped
+) -> tuple[str, Message | None]:
+    """Return two messages on boundaries that the motions make cross each other.
 
     The first keeps a run from starting: a moved boundary crosses another one, or a displacement
-    file has mistakes. The second does not: what moves crosses itself. Both are "" where the case
-    has other problems, which are reported elsewhere.
+    file has mistakes. The second does not: what moves crosses itself. There are none where the
+    case has other problems, which are reported elsewhere.
     """
     files = [path for motion in case.motions for path in motion.files]
     prepare_spans(case, mesh)
     try:
         ready = case.motions and not check_case(case, mesh) and not stopped()
         if not ready or not all(path.is_file() for path in files):
-            return "", ""
+            return "", None
         found, folded = check_motions(case, mesh)
     except SlidevizError as error:
         first, *others = error.messages
         said = first.printed(lambda path: path.name)
-        return (f"{said} ({len(others)} more)." if others else f"{said}."), ""
+        return (f"{said} ({len(others)} more)." if others else f"{said}."), None
     message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
-    return message, (f"{folded}." if folded else "")
+    return message, folded
 
 
 def prepare_spans(case: Case, mesh: Mesh) -> None:
@@ -164,7 +166,9 @@ def prepare_spans(case: Case, mesh: Mesh) -> None:
                 _ = channel.curves
 
 
-def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
+def set_intersection(
+    session: Session, found: tuple[str, Message | None], key: tuple[object, ...]
+) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
     case = session.case
     laid: tuple[object, ...] = tuple(one for one in case.motions if one.takes_time)
@@ -184,7 +188,7 @@ def forget_intersection(session: Session, key: tuple[object, ...]) -> Session:
     known = session.intersection or session.folding
     if not known or intersection_key(session) == key:
         return session
-    return replace(session, intersection="", folding="")
+    return replace(session, intersection="", folding=None)
 
 
 Report = Callable[[object], None]

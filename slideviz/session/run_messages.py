@@ -12,7 +12,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import applies_to
 from slideviz.case.words import counted
-from slideviz.errors import Note
+from slideviz.errors import Message, Note
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
 from slideviz.session.motion_scale import moves_nothing
@@ -128,7 +128,7 @@ def limits_words(run: Run) -> str:
     return f"{counted(count, 'limit')} {verb} not met" if count else ""
 
 
-def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
+def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> str:
     """Return sentences on a run's inverted cells: their first step, and remedies.
 
     ``run``: a run with inverted cells after its last step. ``mesh``: the undeformed mesh.
@@ -136,8 +136,7 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     mend.
     """
     if folding:
-        crossed = folding.partition("; ")[0]
-        return f"{crossed}, so more steps cannot help; another motion, or a smaller one, may."
+        return f"{folding.rule}, so more steps cannot help; another motion, or a smaller one, may."
     assert mesh is not None
     beside: tuple[str, ...] = ()
     if run.last is not None:

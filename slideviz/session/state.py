@@ -12,6 +12,7 @@ import numpy as np
 
 from slideviz.case.check import effective
 from slideviz.case.model import Case
+from slideviz.errors import Message
 from slideviz.mesh.model import Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
@@ -137,9 +138,8 @@ class Session:
     intersection: str = ""
     """A sentence on boundaries that the motions put through each other, which keeps a run from
     starting; empty if none are known."""
-    folding: str = ""
-    """A sentence on moving boundaries that cross themselves, with which a run can start; or
-    empty."""
+    folding: Message | None = None
+    """On moving boundaries that cross themselves, with which a run can start."""
     laid: tuple[object, ...] = ()
     """What ghosts wait for and is computed: the motions onto surfaces, and for which roles rims
     stay on their walls."""

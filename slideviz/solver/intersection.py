@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.motion import moving_nodes
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Message
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swept_crossing
@@ -160,8 +160,8 @@ def _turned(case: Case, mesh: Mesh, part: float) -> FloatArray:
     return moving_nodes(case.change(motions=motions), mesh).vectors
 
 
-def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
-    """Return a sentence when moving boundaries cross themselves or each other after the motion.
+def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> Message | None:
+    """Return a message when moving boundaries cross themselves or each other after the motion.
 
     None when they do not, when they did so before, or when they have more than ``MOST`` facets.
     """
@@ -183,7 +183,7 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     other = names[two]
     where = "itself" if first == other else other
     place = ", ".join(f"{value:.4g}" for value in hit[0])
-    return f"{first} goes through {where} near ({place}); cells will overlap there"
+    return Message(f"{first} goes through {where} near ({place})", "cells will overlap there")
 
 
 def _affine(points: FloatArray, vectors: FloatArray) -> bool:

@@ -11,7 +11,7 @@ from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motion import ROUNDING, moving_nodes, same
-from slideviz.errors import CaseError, DeformError
+from slideviz.errors import CaseError, DeformError, Message
 from slideviz.mesh.fans import components
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
@@ -104,7 +104,9 @@ def largest_of(vectors: FloatArray) -> float:
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
-def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str | None, str | None]:
+def motion_messages(
+    case: Case, mesh: Mesh, moved: Displacements
+) -> tuple[str | None, Message | None]:
     """Return why a motion of boundaries is impossible, and where cells will overlap; or None.
 
     ``case`` has the roles of a ``Domain``. ``moved``: as `displaced` returns it.
@@ -114,7 +116,7 @@ def motion_messages(case: Case, mesh: Mesh, moved: Displacements) -> tuple[str |
     return problem, None if problem else folding_message(*asked)
 
 
-def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
+def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
     """Return the `motion_messages` of a case of one zone before it runs, or a doubt about it."""
     moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
     problem, folded = motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)

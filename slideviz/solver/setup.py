@@ -300,7 +300,7 @@ def setup_of(
         *loose,
         *idle_settings(case),
         *file_before_motions(case),
-        *motion_doubts(case, mesh),
+        *map(str, motion_doubts(case, mesh)),
     )
     zone = layer_zone(case, mesh, domain, conditions.known)
     warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, mesh, domain, zone))

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.motion import moving_nodes
 from slideviz.case.motions.file import Prescribed
-from slideviz.errors import SlidevizError
+from slideviz.errors import Message, SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,
     disjoint_interfaces,
@@ -172,7 +172,7 @@ class InterfaceMotion:
         return now.with_points(sealed(out))
 
 
-def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
+def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
     """Return `check_motion` of the first zone that its motion cannot be made in, else of any.
 
     Zones follow others here as far as these move by their motions, before sliding is known.
@@ -180,7 +180,7 @@ def check_motions(case: Case, mesh: Mesh) -> tuple[str | None, str | None]:
     if not isinstance(mesh, Assembly):
         return check_motion(case, mesh)
     motion = InterfaceMotion(Prepared(case, mesh), mesh)
-    folded = None
+    folded: Message | None = None
     for index, _ in motion.leaders_first():
         problem, overlap = check_motion(motion.cases[index], mesh.parts[index].mesh)
         if problem:

@@ -14,7 +14,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 from slideviz import Case, read
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.errors import Note
+from slideviz.errors import Message, Note
 from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
@@ -1167,16 +1167,16 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
 
     window = ready.window
     ready.qtbot.waitUntil(lambda: not window.intersection_check.busy)
-    folding = "airfoil goes through itself near (0, 0); cells will overlap there."
+    folding = Message("airfoil goes through itself near (0, 0)", "cells will overlap there")
     key = intersection_key(ready.session)
     window.store.change(set_intersection, ("", folding), key)
     panel = window.run_panel
-    assert panel.text.text() == f"<a href='motion'>{folding}</a>"
+    assert panel.text.text() == f"<a href='motion'>{folding}.</a>"
     assert panel.run.isEnabled()
     window.docks["method"].raise_()
     panel.text.linkActivated.emit("motion")
     ready.qtbot.waitUntil(lambda: not window.motions.visibleRegion().isEmpty())
-    window.store.change(set_intersection, ("", ""), key)
+    window.store.change(set_intersection, ("", None), key)
     assert panel.text.text() == "Ready."
 
 

@@ -97,11 +97,11 @@ def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
     assert not run_requirements(session)
     key = intersection_key(session)
-    told = set_intersection(session, ("It clashes.", ""), key)
+    told = set_intersection(session, ("It clashes.", None), key)
     assert [(m.text, m.place) for m in run_requirements(told)] == [("It clashes.", "motion")]
-    assert not run_requirements(set_intersection(told, ("", ""), key))
+    assert not run_requirements(set_intersection(told, ("", None), key))
     later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
-    assert set_intersection(later, ("It clashes.", ""), key) is later
+    assert set_intersection(later, ("It clashes.", None), key) is later
     # What is known of other motions is forgotten at once: it would keep a run from starting.
     assert forget_intersection(told, key) is told
     changed = changes.set_case(told, motions=later.case.motions)
@@ -139,7 +139,7 @@ def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
     case = Case(roles={"airfoil": "moving"}, motions=(FromFile(file, "airfoil"),))
     text, folding = find_intersection(case, mesh, lambda _: None, lambda: False)
     assert text == ""
-    assert folding.startswith("airfoil goes through itself near (")
+    assert str(folding).startswith("airfoil goes through itself near (")
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
     told = set_intersection(session, (text, folding), intersection_key(session))
     assert told.folding == folding

@@ -8,6 +8,7 @@ import pytest
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.cli.run_outcome import advice_for
+from slideviz.errors import Message
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import Reduction
@@ -81,7 +82,7 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
 
 
 def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
-    folding = "airfoil goes through itself near (0, 0); cells will overlap there."
+    folding = Message("airfoil goes through itself near (0, 0)", "cells will overlap there")
     assert remedy_for(run, passage.mesh, folding) == (
         "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
         "smaller one, may."

@@ -292,7 +292,7 @@ def test_a_body_that_goes_through_itself_is_told():
     case, mesh, nodes, vectors = pushed(sphere_in_box(6), "sphere")
     said = folding_message(case, mesh, nodes, vectors)
     assert said is not None
-    assert said.startswith("sphere goes through itself near (")
+    assert str(said).startswith("sphere goes through itself near (")
     assert folding_message(case, mesh, nodes, 0.1 * vectors) is None
     # What was so before is not told of the motion.
     points = np.array(mesh.points)
@@ -315,7 +315,7 @@ def test_two_parts_of_a_body_that_go_through_each_other_are_named():
     said = folding_message(both, split, nodes, vectors)
     assert said is not None
     # The one that moves comes first.
-    assert said.startswith("top goes through low near (")
+    assert str(said).startswith("top goes through low near (")
 
 
 @pytest.mark.parametrize(("mesh", "name"), [(sphere_in_box(), "sphere"), (airfoil(), "airfoil")])

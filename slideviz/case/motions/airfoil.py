@@ -79,15 +79,16 @@ class OnAirfoil(Motion):
             return f"{words}, chord {vector_words(self.chord, form)}"
         return words
 
-    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[str]:
+    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Message]:
         x = np.concatenate([mesh.points[mesh.marker(name).nodes, 0] for name in markers])
         low, high = self.chord
         size = np.ptp(x)
         covered = np.ptp(np.clip(self.chord, x.min(), x.max()))
         if covered < 0.5 * size or high - low > 2.0 * size:
-            yield (
+            yield Message(
                 f"the chord goes from x = {low:g} to {high:g}, but {' and '.join(markers)} from "
-                f"{x.min():.6g} to {x.max():.6g}; end its MOTION with these if all of it is meant"
+                f"{x.min():.6g} to {x.max():.6g}",
+                "end its MOTION with these if all of it is meant",
             )
 
     @classmethod

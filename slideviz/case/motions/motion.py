@@ -162,7 +162,7 @@ class Motion(CheckedFields):
         """Yield why the motion, number ``place`` (from 0) of a case, does not fit case or mesh."""
         yield from ()
 
-    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[str]:
+    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Message]:
         """Yield why the motion hardly does what is meant, of the moving ``markers`` it moves."""
         yield from ()
 

@@ -29,7 +29,7 @@ DIRECTIONS = 16  # most displacements for which control nodes are chosen at a de
 REACH = 1e-3  # size of these displacements, as a part of the mesh's extent
 
 INSUFFICIENT = (
-    "; boundary nodes still get exactly their displacement, and the gradient is that of such a "
+    "boundary nodes still get exactly their displacement, and the gradient is that of such a "
     "deformation; see what `slideviz def` warns of"
 )
 
@@ -159,11 +159,11 @@ def _heard(said: list[str]) -> Iterator[None]:
         warnings.simplefilter("always", ToleranceWarning)
         yield
     for one in caught:
+        assert isinstance(one.message, Warning)
         if one.category is ConditionWarning:
-            assert isinstance(one.message, Warning)
             said.append(one.message.args[0])  # a `Note`, where little
         elif one.category is ToleranceWarning:  # its remedy is one for Python
-            said.append(str(one.message).partition("; ")[0] + INSUFFICIENT)
+            said.append(f"{one.message.args[0].rule}; {INSUFFICIENT}")
         else:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
 

@@ -8,6 +8,7 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QPushButton, QSizePolicy
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.errors import Message
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
 from slideviz.gui.widgets.command import Command
@@ -51,7 +52,7 @@ class RunPanel(Panel):
         self._compiling = False
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
-        self._remedy: tuple[Run | None, str, str] = (None, "", "")
+        self._remedy: tuple[Run | None, Message | None, str] = (None, None, "")
         self.run = self._button(COMMANDS["run"], "#ffffff")
         self.cancel = self._button(COMMANDS["cancel"], "#3b4652")
         self.text = LinkLabel()
@@ -150,10 +151,12 @@ class RunPanel(Panel):
 
     def _show_ready(self, text: str, session: Session) -> None:
         """Show ``text`` (or a warning that cells will fold), and the cost of the run."""
-        folding = _shortened(session.folding)
-        text = html.escape(" ".join(filter(None, (folding or text, self._cost))))
+        folding = session.folding
+        full = f"{folding}." if folding else ""
+        text = _shortened(full) if full else text
+        text = html.escape(" ".join(filter(None, (text, self._cost))))
         self.text.setText(f"<a href='motion'>{text}</a>" if folding else text)
-        self.text.setToolTip(wrapped(session.folding))
+        self.text.setToolTip(wrapped(full))
 
     def _link(self, target: str) -> None:
         if target == NOTES:
@@ -166,7 +169,7 @@ class RunPanel(Panel):
         elif target == SETTINGS:
             self.store.change(changes.adopt_settings, self.store.session.shown)
         else:
-            asked = Requirement(self.store.session.folding, "motion")
+            asked = Requirement("", "motion")
             self.requirement_clicked.emit((*self._missing, asked)[0])
 
     def take_theme(self, _scheme: ColorScheme) -> None:
