@@ -361,4 +361,4 @@ def _rename_broken(path: Path, why: str) -> str:
         path.rename(target)
     except OSError as problem:
         return f"{path}: a saved session cannot be read ({why}), nor renamed ({problem})."
-    return f"A saved session cannot be read ({why}); it is still there, as {target}."
+    return f"A saved session cannot be read ({why}); it was kept: {target}."

@@ -197,7 +197,9 @@ def test_changing_one_zone_leaves_the_other(tmp_path, zone):
 def test_names_that_a_file_cannot_hold_are_refused(tmp_path, name):
     mesh = _anew(read(save(tmp_path, SQUARE)))
     changed = replace(mesh, markers=(Marker(name, mesh.markers[0].cells),))
-    with pytest.raises(MeshError, match=r"the marker name .* cannot stand in an SU2 file; rename"):
+    with pytest.raises(
+        MeshError, match=r"the marker name .* cannot be written to an SU2 file; rename"
+    ):
         write(tmp_path / "out.su2", changed)
     assert not (tmp_path / "out.su2").exists()
 

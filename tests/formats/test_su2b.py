@@ -339,7 +339,7 @@ def test_what_cannot_be_held_is_refused(tmp_path):
         write(tmp_path / "a.su2b", replace(square, halo=halo))
     for name in ("a" * 33, "", "a\nb", "Send_Receive"):
         bad = replace(square, markers=(Marker(name, square.markers[0].cells),))
-        with pytest.raises(MeshError, match="cannot stand in an SU2 binary file"):
+        with pytest.raises(MeshError, match="cannot be written to an SU2 binary file"):
             write(tmp_path / "a.su2b", bad)
     assert not (tmp_path / "a.su2b").exists()
 

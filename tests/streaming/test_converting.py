@@ -71,7 +71,7 @@ def test_a_binary_of_any_width_and_byte_order_becomes_a_text(capsys, width, orde
     ("old", "new", "message"),
     [
         ("NMARK= 4\n", f"NMARK= 5\n{HALO}", "has a halo (SEND_RECEIVE markers), which an SU2 bin"),
-        ("MARKER_TAG= x_m", f"MARKER_TAG= {'x' * 33}", "cannot stand in an SU2 binary file"),
+        ("MARKER_TAG= x_m", f"MARKER_TAG= {'x' * 33}", "cannot be written to an SU2 binary file"),
         ("\n9 0", "\n9 99", "node 99 does not exist"),
         ("NPOIN= 25", "NPOIN= 26", "NPOIN= 26"),
     ],
@@ -110,7 +110,7 @@ def test_there_must_be_such_a_zone_and_a_name_for_a_text(capsys):
     sv.write("mesh.su2b", grid((4, 4)))
     data = Path("mesh.su2b").read_bytes().replace(b"x_p", b"x%p")
     Path("mesh.su2b").write_bytes(data)
-    assert "'x%p' cannot stand in an SU2 file" in check_alike(capsys, "mesh.su2b", ".su2")[2]
+    assert "'x%p' cannot be written to an SU2 file" in check_alike(capsys, "mesh.su2b", ".su2")[2]
 
 
 @pytest.mark.parametrize(("ending", "other"), [(".su2", ".su2b"), (".su2b", ".su2")])

@@ -182,7 +182,7 @@ def test_what_a_text_of_a_binary_mesh_will_not_have_is_told(tmp_path, capsys):
     (tmp_path / "mesh.su2b").write_bytes(data)
     for more in ([], ["--stream"]):
         assert run([*call, *more]) == 1
-        assert "'x%m' cannot stand in an SU2 file" in capsys.readouterr().err
+        assert "'x%m' cannot be written to an SU2 file" in capsys.readouterr().err
 
 
 def test_what_a_binary_mesh_has_no_place_for_is_told(tmp_path, capsys):
@@ -199,7 +199,7 @@ def test_what_a_binary_mesh_has_no_place_for_is_told(tmp_path, capsys):
     (tmp_path / "mesh.su2").write_text(text)
     for more in ([], ["--stream"]):
         assert run([*call, *more]) == 1
-        assert "x' cannot stand in an SU2 binary file" in capsys.readouterr().err
+        assert "x' cannot be written to an SU2 binary file" in capsys.readouterr().err
         assert run([*call[:2], "-q", "-o", str(tmp_path / "out.su2"), *more]) == 0
 
 

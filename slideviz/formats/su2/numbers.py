@@ -143,7 +143,7 @@ def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
         number = _parse(word, kind)
         if number is None or len(number) != 1:
             what = "a whole number" if kind is np.int64 else "a number"
-            raise lines.error(index, f"'{show(word)}' stands where {what} should be; correct it")
+            raise lines.error(index, f"expected {what}, found '{show(word)}'; correct it")
         numbers.append(number)
     return np.concatenate(numbers)
 
@@ -237,6 +237,6 @@ def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
 def _wrong_count(lines: Lines, index: int, count: int, dim: int) -> MeshError:
     return lines.error(
         index,
-        f"a point has {dim} coordinates (NDIME= {dim}) and perhaps an index, but "
-        f"{count} numbers stand here; correct the line or NDIME",
+        f"a point has {dim} coordinates (NDIME= {dim}) and perhaps an index, but this line has "
+        f"{count} numbers; correct the line or NDIME",
     )

@@ -165,8 +165,8 @@ class _Walk:
             word = (self.lines.line(text).split() or [b""])[0]
             raise self.lines.error(
                 text,
-                f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
-                f"on line {section.line + 1}); correct it",
+                f"expected one of the {count} {what}, found '{show(word)}' ({section.key} on line "
+                f"{section.line + 1}); correct it",
             )
         if found < count:
             raise self.lines.error(
@@ -177,8 +177,8 @@ class _Walk:
         if found > count:
             raise self.lines.error(
                 self.lines.row(rows, count),
-                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
-                f"says: {found}; correct the count",
+                f"{found} {what} are here, but {section.key}= {count} (line {section.line + 1}) "
+                f"says {count}; correct the count",
             )
         return rows
 

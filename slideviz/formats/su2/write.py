@@ -41,7 +41,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     For a mesh that was read from an SU2 file and has the same cells and markers it is that file, in
     which only the coordinates that changed are replaced. Any other mesh is written anew; sections
     of its file that slideviz does not know follow at the end of its zone. Raises MeshError if the
-    mesh cannot be used, or a marker's name cannot stand in an SU2 file.
+    mesh cannot be used, or a marker's name cannot be written to an SU2 file.
     """
     zones = zones_of(mesh)
     document = mesh.origin
@@ -220,8 +220,8 @@ def require_text_names(mesh: str, names: Iterable[str]) -> None:
     for name in names:
         if not name or name != name.strip() or not name.isprintable() or "%" in name:
             raise MeshError(
-                f"{mesh}: the marker name {name!r} cannot stand in an SU2 file; rename it without "
-                "percent sign, line break or blanks around it"
+                f"{mesh}: the marker name {name!r} cannot be written to an SU2 file; rename it "
+                "without percent sign, line break or blanks around it"
             )
         if name.upper() == SEND_RECEIVE:
             raise MeshError(
@@ -237,7 +237,7 @@ PointsOf = Callable[[int, int], FloatArray]
 def content_blocks(contents: Sequence[ZoneContent], name: str) -> Iterator[bytes]:
     """Yield the SU2 file of zones whose parts are made by functions, called from several threads.
 
-    Raises MeshError if a boundary has a name that cannot stand in an SU2 file.
+    Raises MeshError if a boundary has a name that cannot be written to an SU2 file.
     """
     require_text_names(name, (marker.name for content in contents for marker in content.markers))
 

@@ -82,9 +82,9 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
         size = len(name.encode("utf-8", "replace"))
         if not name or not name.isprintable() or size >= NAME_BYTES or name.upper() == SEND_RECEIVE:
             raise MeshError(
-                f"{mesh}: the marker name {name!r} cannot stand in an SU2 binary file, which has "
-                f"room for {NAME_BYTES - 1} bytes ({size} given) and no {SEND_RECEIVE}; rename the "
-                "marker"
+                f"{mesh}: the marker name {name!r} cannot be written to an SU2 binary file, which "
+                f"has room for {NAME_BYTES - 1} bytes ({size} given) and no {SEND_RECEIVE}; rename "
+                "the marker"
             )
 
 
