@@ -124,5 +124,5 @@ def test_nodes_that_stray_are_named_with_the_remedy(tmp_path, monkeypatch):
     # A streamed run says the same, of nodes that are not in its skin.
     monkeypatch.setattr(output, "CHUNK", 50)
     done = stream(case, tmp_path / "out.su2b")
-    assert node not in done.mesh.whole.points
+    assert node not in done.mesh.numbering.points
     assert done.steps[-1].warnings == (said,)

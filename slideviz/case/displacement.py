@@ -89,7 +89,7 @@ def parsed_displacements(
     """Return the displacements that the text of a file lists; as `read_displacements`."""
     each = []
     for first, here, part, lines in in_zones(text, path, mesh, nodes):
-        whole = part.whole
+        whole = part.numbering
         shape = whole.n_points, part.dim
         read = parse_displacements(lines, path, whole.points[here], shape, of)
         each.append(replace(read, nodes=here + first))

@@ -75,7 +75,7 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = bounds_words(mesh)
-    whole = mesh.whole
+    whole = mesh.numbering
     count = f"{whole.n_cells:,} cells{halo}   {whole.n_points:,} points"
     if isinstance(mesh, Skin):
         count += "   boundary and sections only"

@@ -221,7 +221,7 @@ class _Reader:
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
         key = "FFD_SURFACE_POINTS"
-        part = self.mesh.whole
+        part = self.mesh.numbering
         on: dict[str, list[Row]] = {}
         for line, words in self.rows(key, self.count(key)):
             on.setdefault(words[0], []).append((line, words[1:]))

@@ -362,7 +362,7 @@ class Mesh:
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
 
     @property
-    def whole(self) -> Part:
+    def numbering(self) -> Part:
         """Return where its points and cells are in the mesh of its file: all, but of a `Skin`."""
         points = len(self.points)
         cells = len(self.cells)
@@ -399,7 +399,7 @@ class Skin(Mesh):
     """Where they are in the file."""
 
     @property
-    def whole(self) -> Part:
+    def numbering(self) -> Part:
         """Return where its points and cells are in the mesh of its file."""
         return self.part
 

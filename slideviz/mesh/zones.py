@@ -60,7 +60,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     points = _slices([zone.points for zone in zones])
     cells = _slices([zone.cells for zone in zones])
     markers = _slices([zone.markers for zone in zones])
-    whole = [zone.whole for zone in zones]
+    whole = [zone.numbering for zone in zones]
     *first_point, n_points = accumulate((part.n_points for part in whole), initial=0)
     *first_cell, n_cells = accumulate((part.n_cells for part in whole), initial=0)
     coords = sealed(np.concatenate([zone.points for zone in zones]))

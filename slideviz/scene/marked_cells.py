@@ -222,8 +222,8 @@ class RepairLayer(KeyedLayer):
             return
         mesh = done.mesh
         before = np.array(done.mesh.points)
-        nodes = np.searchsorted(mesh.whole.points, done.nodes)
-        cells = np.searchsorted(mesh.whole.cells, done.cells)
+        nodes = np.searchsorted(mesh.numbering.points, done.nodes)
+        cells = np.searchsorted(mesh.numbering.cells, done.cells)
         before[nodes] = done.points
         lift = 4.0 * self.stage.lift(mesh)
         edges = np.concatenate(

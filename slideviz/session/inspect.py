@@ -197,8 +197,8 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
     """Return the worst cells of a large mesh by size-skew: the first of ``extra`` of the frame."""
     assert extra.base is not None
     cells = np.arange(min(count, len(extra.mesh.cells)))
-    numbers = extra.mesh.whole.cells[cells]
-    in_memory = frame.mesh.whole.cells
+    numbers = extra.mesh.numbering.cells[cells]
+    in_memory = frame.mesh.numbering.cells
     place = np.minimum(np.searchsorted(in_memory, numbers), len(in_memory) - 1)
     drawn = in_memory[place] == numbers  # those at the boundary are drawn as parts of it
     before = quality(extra.base, metric=extra.quality.metric).values[cells]

@@ -47,8 +47,8 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
     """
     skin = read_skin(path, zone, tick)
     remark = (
-        f"{skin.whole.n_cells:,} cells stay in the file. The window shows the boundary, sections "
-        f"and the worst cells; a run deforms the mesh from file to file"
+        f"{skin.numbering.n_cells:,} cells stay in the file. The window shows the boundary, "
+        "sections and the worst cells; a run deforms the mesh from file to file"
     )
     return replace(skin, remarks=(*skin.remarks, remark))
 

@@ -268,7 +268,7 @@ def unmendable_words(
     """
     if not impossible:
         return (), ()
-    numbers = mesh.whole.points
+    numbers = mesh.numbering.points
     nodes = {marker.name: numbers[marker.nodes] for marker in mesh.markers}
 
     def on(ones: Sequence[Impossible]) -> str:
@@ -294,7 +294,7 @@ def slide_advice(case: Case, mesh: Mesh, poor: Cells, limit: float) -> tuple[str
     ``mesh``: it has the markers.
     ``poor``: the cells that are proved valid, but below a limit after the repair.
     """
-    numbers = mesh.whole.points
+    numbers = mesh.numbering.points
     beside = [
         marker.name
         for marker in mesh.markers

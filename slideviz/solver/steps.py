@@ -115,7 +115,7 @@ class MeshRepair:
             return sealed(np.concatenate(each))
 
         if isinstance(mesh, Skin):  # of streamed zones, the bad cells and the moved nodes
-            parts = [(place, one.mesh.whole) for place, one in done]
+            parts = [(place, one.mesh.numbering) for place, one in done]
             points = np.concatenate([each.points + place.first_point for place, each in parts])
             cells = np.concatenate([each.cells + place.first_cell for place, each in parts])
             part = replace(mesh.part, points=sealed(points), cells=sealed(cells))

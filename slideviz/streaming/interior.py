@@ -36,10 +36,10 @@ class InteriorDisplacer:
         """Return the same after the repair of the whole mesh, with its nodes in the skin moved."""
         last = self.steps[-1]
         mesh = repair.mesh
-        skin = self.skin.whole.points
+        skin = self.skin.numbering.points
         points = np.array(last.mesh.points)
         nodes = repair.nodes[np.isin(repair.nodes, skin)]
-        now = mesh.points[np.searchsorted(mesh.whole.points, nodes)]
+        now = mesh.points[np.searchsorted(mesh.numbering.points, nodes)]
         points[np.searchsorted(skin, nodes)] = now
         last = replace(
             last,
@@ -111,7 +111,7 @@ class InteriorDisplacer:
 
         ``nodes`` (m,) are ascending numbers in the whole mesh.
         """
-        skin = self.skin.whole.points
+        skin = self.skin.numbering.points
         low, high = np.searchsorted(skin, [nodes[0], nodes[-1] + 1])
         numbers = skin[low:high]
         at = np.searchsorted(nodes, numbers)

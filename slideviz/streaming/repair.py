@@ -50,7 +50,7 @@ class FileRegions:
         self._source = source
         self._file = file
         self._going_on = going_on
-        self._skin = skin.whole.points
+        self._skin = skin.numbering.points
         self._freedom = freedom
         self._facets = facets
         self.nodes = self._skin[:0]

@@ -244,7 +244,7 @@ class _ZoneRuns:
             (before.points.view(np.int64) != after.points.view(np.int64)).any(axis=1)
         )
         if len(apart):
-            numbers = after.whole.points[apart]
+            numbers = after.numbering.points[apart]
             points = after.points[apart]
             self._out.change(
                 zone, "evaluate", lambda at, file, _: at.points.write(file, numbers, points)
@@ -261,7 +261,7 @@ class _ZoneRuns:
         zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
         timer = step_timer(report, 1, max(1, case.steps))
         give_back()
-        with _naming_file_nodes(skin.whole.points):
+        with _naming_file_nodes(skin.numbering.points):
             with timer.phase("classify"):
                 setup = make_setup(prepared)
             require_memory(setup, case)
@@ -401,7 +401,7 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
     """
     skin = displacer.skin
     last = displacer.steps[-1]
-    more = skin.whole.n_points - len(skin.points)
+    more = skin.numbering.n_points - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
     steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return [

@@ -68,7 +68,7 @@ class CellBlock:
     def part_of(self, whole: Mesh) -> CellBlock:
         """Return the block with the name and the zone of the mesh that it is a part of."""
         part = replace(
-            whole.whole,
+            whole.numbering,
             points=frozen_array(self.nodes, np.int64),
             cells=frozen_array(self.ids, np.int64),
         )

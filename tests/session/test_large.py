@@ -90,7 +90,7 @@ def test_the_worst_cells_are_those_of_the_mesh_in_memory(folded):
     mesh, moved, folder = folded
     found = quality(moved, mesh)
     skin = read_skin(folder / "mesh.su2b", None)
-    now = skin.with_points(moved.points[skin.whole.points])
+    now = skin.with_points(moved.points[skin.numbering.points])
     first = frame_of(skin, skin, folder / "mesh.su2b", totals_of(quality(mesh)), "knupp")
     frame = frame_of(now, skin, folder / "moved.su2b", totals_of(found), "knupp")
     there = worst_cells([StepFrame(mesh, quality(mesh)), StepFrame(moved, found)], 1, "size-skew")

@@ -78,7 +78,7 @@ def test_the_same_cells_and_polygons_as_in_memory(files, kind, group, monkeypatc
         return
     # Cells that a section only touches give no polygon, in memory as here.
     found = Cutter.of(slab.mesh).cut(slab.mesh.points, section)
-    numbers = slab.mesh.whole.cells
+    numbers = slab.mesh.numbering.cells
     np.testing.assert_array_equal(numbers[found.cells], there.cells)
     at, wanted = found.points[found.connectivity], there.points[there.connectivity]
     np.testing.assert_allclose(at, wanted, rtol=0, atol=1e-12 * mesh.extent)
@@ -90,7 +90,9 @@ def test_the_same_values_as_in_memory(files, what):
     slab = read_slab(framed(path, file), sections(mesh)[1], lambda _: None, lambda: None)
     whole = StepFrame(moved, quality(moved, mesh))
     np.testing.assert_allclose(
-        slab.shown_values(what), whole.shown_values(what, mesh)[slab.mesh.whole.cells], rtol=1e-12
+        slab.shown_values(what),
+        whole.shown_values(what, mesh)[slab.mesh.numbering.cells],
+        rtol=1e-12,
     )
 
 

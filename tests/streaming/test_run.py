@@ -463,7 +463,7 @@ def test_a_node_beyond_the_sector_of_the_boundary_is_told(tmp_path):
     on = np.unique(np.concatenate([marker.nodes for marker in mesh.markers]))
     inner = np.setdiff1d(np.arange(len(mesh.points)), on)
     skin = read_skin(case.mesh_file, None)
-    inner = np.setdiff1d(inner, skin.whole.points)
+    inner = np.setdiff1d(inner, skin.numbering.points)
     assert len(inner)
     points = mesh.points.copy()
     r, angle = np.hypot(*points[:, :2].T), np.arctan2(points[:, 1], points[:, 0])
@@ -511,7 +511,7 @@ def test_the_skin_is_the_boundary_and_what_is_at_it(tmp_path):
     skin = read_skin(tmp_path / "mesh.su2b", None)
     assert skin.marker_names == mesh.marker_names
     assert skin.extent == mesh.extent
-    part = skin.whole
+    part = skin.numbering
     assert (part.n_points, part.n_cells) == (7**3, 6**3)
     assert np.array_equal(skin.points, mesh.points[part.points])
     inner = ((mesh.points > 0.3) & (mesh.points < 0.7)).all(axis=1)

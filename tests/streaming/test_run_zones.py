@@ -109,10 +109,10 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
         assert (whole is None) == (part is None)
         if whole is not None:
             assert whole.report() == part.report()
-            at = np.searchsorted(part.mesh.whole.points, whole.nodes)
+            at = np.searchsorted(part.mesh.numbering.points, whole.nodes)
             assert np.array_equal(part.mesh.points[at], whole.mesh.points[whole.nodes])
-            at = np.searchsorted(part.mesh.whole.cells, whole.cells)
-            there = part.mesh.whole.points[part.mesh.cells.take(at).connectivity]
+            at = np.searchsorted(part.mesh.numbering.cells, whole.cells)
+            there = part.mesh.numbering.points[part.mesh.cells.take(at).connectivity]
             assert np.array_equal(there, whole.mesh.cells.take(whole.cells).connectivity)
     assert not list(tmp_path.glob(".*"))
 
