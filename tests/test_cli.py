@@ -471,7 +471,8 @@ def test_a_package_that_is_missing_is_named_before_anything_is_computed(
     monkeypatch.setitem(sys.modules, package, None)
     case = square / "square.cfg"
     assert run(["compare", str(case), "-o", str(tmp_path / "compared")]) == 1
-    assert f"this needs {package}, which is not installed; `pip" in capsys.readouterr().err
+    needed = f"this needs {package}, which is not installed; use `pip install {package}"
+    assert needed in capsys.readouterr().err
     assert not (tmp_path / "compared").exists()
 
 

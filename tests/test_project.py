@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 import slideviz
+from slideviz.cli import PACKAGES
 from tools import smoke
 
 ROOT = Path(__file__).parents[1]
@@ -45,9 +46,11 @@ def test_no_address_is_invented():
 
 def test_all_dependencies_are_known_by_what_needs_them():
     needed = {re.split(r"[^\w.-]", one)[0] for one in PROJECT["project"]["dependencies"]}
-    assert {*f"{smoke.COMPUTING} {smoke.PLOTS} {smoke.DRAWING}".split()} == needed
+    assert {*f"{smoke.COMPUTING} {smoke.PLOTS} {smoke.PICTURES} {smoke.WINDOW}".split()} == needed
     page = (ROOT / "docs" / "tutorials" / "cluster.md").read_text(encoding="utf-8")
     assert f"pip install {smoke.COMPUTING} {smoke.PLOTS}\n" in page
+    assert f"`pip install {smoke.PICTURES}`" in page
+    assert smoke.PICTURES in PACKAGES.values()
 
 
 def test_the_desktop_file_starts_what_is_installed():

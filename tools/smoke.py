@@ -24,7 +24,8 @@ ROOT = Path(__file__).resolve().parents[1]
 COMPUTING = "numpy scipy numba scikit-fem pyamg threadpoolctl meshio h5py orjson filelock"
 PLOTS = "matplotlib"
 """What sections and the plots of comparisons are drawn with."""
-DRAWING = "pyvista vtk pyvistaqt qtpy PySide6_Essentials pillow imageio-ffmpeg"
+PICTURES = "pyvista vtk pillow imageio-ffmpeg"
+WINDOW = "pyvistaqt qtpy PySide6_Essentials"
 
 CONFIG = """
 MESH_FILENAME= mesh.su2
@@ -65,19 +66,37 @@ loaded = {"pyvista", "vtkmodules", "PySide6", "pyvistaqt", "matplotlib"} & set(s
 assert not loaded, loaded
 """
 
+MODULES = """
+import importlib, pkgutil, slideviz
+
+def needs_more(name):
+    return name.endswith("openmdao") or name.split(".")[1] in ("gui", "scene", "export", "study")
+
+for module in pkgutil.walk_packages(slideviz.__path__, "slideviz.", onerror=needs_more):
+    if not needs_more(module.name):
+        importlib.import_module(module.name)
+"""
+
 COMPUTED = (
     "sample square --size 12 -o . --force",
     "run square.cfg --steps 1 -q --json report.json",
     "info mesh.su2",
     "quality mesh.su2 -o quality.csv",
     "convert mesh.su2 mesh.vtu",
+    "info mesh.vtu",
     "convert mesh.su2 mesh.vtkhdf",
+    "convert mesh.su2 mesh.msh",
+    "convert mesh.su2 mesh.su2b",
+    "run square.cfg --steps 1 -q --set MESH_FILENAME=mesh.su2b -o streamed.su2b --stream",
+    "repair mesh.su2 -o repaired.su2",
+    "gap square.cfg --between BLOCK,UPPER --steps 1 -q",
     "sweep square.cfg designs.csv -o swept --workers 1 -q",
     "keys",
     "def config.cfg -q",
     "dot config.cfg -q",
 )
 PLOTTED = (
+    "section mesh.su2 --plane y=0.4 -o section.png",
     "section mesh.su2 --plane y=0.4 -o section.svg",
     "section mesh.su2 --plane y=0.4 -o section.pdf",
     "compare square.cfg --methods ps --steps 1 --no-pictures -q -o compared",  # compiles most
@@ -150,11 +169,12 @@ class Commands:
         if done.returncode not in (0, 3):  # 3: done, but cells are inverted
             sys.exit(f"smoke: {words} ended with {done.returncode}\n{done.stdout}{done.stderr}")
 
-    def require_refusal(self, words: str, package: str) -> None:
-        """Run a command, and end the program unless it says which package it lacks."""
+    def require_refusal(self, words: str, packages: str) -> None:
+        """Run a command, and end the program unless its last line says what to install."""
         done = self.run(words)
-        if done.returncode != 1 or f"needs {package}, which is not installed" not in done.stderr:
-            sys.exit(f"smoke: {words} does not say that {package} is missing\n{done.stderr}")
+        said = done.stderr.endswith(f"which is not installed; use `pip install {packages}`\n")
+        if done.returncode != 1 or not said:
+            sys.exit(f"smoke: {words} does not say that {packages} are missing\n{done.stderr}")
 
 
 def main() -> None:
@@ -171,18 +191,22 @@ def main() -> None:
         sample, *others = COMPUTED
         commands.require(f"slideviz {sample}")
         commands.require("python library.py", str(ROOT))
+        commands.require("python -c", MODULES)
         for words in others:
             commands.require(f"slideviz {words}")
         for words in PLOTTED:
-            commands.require_refusal(f"slideviz {words}", "matplotlib")
+            commands.require_refusal(f"slideviz {words}", PLOTS)
         link(PLOTS, packages)
         for words in PLOTTED[:-1]:
             commands.require(f"slideviz {words}")
         for words in DRAWN:
-            commands.require_refusal(f"slideviz {words}", "pyvista")
-        link(DRAWING, packages)
+            commands.require_refusal(f"slideviz {words}", PICTURES)
+        link(PICTURES, packages)
         for words in DRAWN[:-1]:
             commands.require(f"slideviz {words}")
+        commands.require("python -c", "import importlib.util as u; assert not u.find_spec('qtpy')")
+        link(WINDOW, packages)
+        commands.require("python -c", "import slideviz.gui.window")
     sys.stdout.write("smoke: the wheel works\n")
 
 

@@ -85,9 +85,10 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
             return _fail(NO_MEMORY, WRONG_INPUT)
         missing = (isinstance(problem, ModuleNotFoundError) and problem.name) or "slideviz"
         if not missing.startswith("slideviz"):
+            module = missing.partition(".")[0]
+            packages = PACKAGES.get(module, module)
             return _fail(
-                f"this needs {missing.partition('.')[0]}, which is not installed; `pip install "
-                "slideviz` installs all that is missing",
+                f"this needs {module}, which is not installed; use `pip install {packages}`",
                 WRONG_INPUT,
             )
         return _fail(
@@ -96,6 +97,16 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
             WRONG_INPUT,
         )
 
+
+PACKAGES = {
+    "skfem": "scikit-fem",
+    **dict.fromkeys(
+        ("pyvista", "vtkmodules", "PIL", "imageio_ffmpeg"), "pyvista vtk pillow imageio-ffmpeg"
+    ),
+    **dict.fromkeys(("PySide6", "qtpy", "pyvistaqt"), "slideviz"),
+}
+"""What pip installs for a module: packages of another name, or all that pictures or the window
+need."""
 
 NO_MEMORY = (
     "there is not enough memory to load the libraries that this needs; close other programs, or "
