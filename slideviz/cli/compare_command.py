@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_shared, read_case, read_mesh, require_mesh_file
+from slideviz.cli.options import read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
 from slideviz.errors import CaseError
 from slideviz.terms import PERIODIC_MODES
@@ -23,44 +23,6 @@ TABLE = "compare.csv"
 HISTORY = "convergence.csv"
 KEPT_BYTES = 1_500_000_000
 """Most bytes of deformed meshes that are kept in memory, for the pictures."""
-
-
-def add_compare(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``compare`` to the parser."""
-    about = "one case by several methods: table, plots and pictures"
-    call = calls.add_parser(
-        "compare",
-        help=about,
-        description=f"Deform {about}. It first lists what it will compute, and what is impossible.",
-        epilog="exit codes: 0 compared (also if cells are inverted: see the table); 1 no "
-        "combination could be computed; 130 cancelled, finished rows are in the table",
-    )
-    add_shared(call, "case")
-    call.add_argument(
-        "--methods", metavar="LIST", help="of none,ps,ds,idw,elastic, or all (default: none,ps,ds)"
-    )
-    call.add_argument(
-        "--periodic",
-        metavar="LIST",
-        help="of none,periodic,fixed,moving, or all (default: the mode of the case; moving adds "
-        "fixed for the methods that cannot move nodes)",
-    )
-    call.add_argument("--steps", metavar="LIST", help="numbers of steps, or auto (default: 1,5,20)")
-    call.add_argument(
-        "--span",
-        choices=("r", "x", "y", "z", "none"),
-        help="direction of the spanwise plots (default: r or z of a 3D mesh, none of a 2D one)",
-    )
-    call.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_compared)"
-    )
-    add_shared(call, "set")
-    add_shared(call, "zone")
-    call.add_argument(
-        "--no-pictures", action="store_true", help="table and plots only, no quality pictures"
-    )
-    add_shared(call, "quiet")
-    call.set_defaults(command=compare)
 
 
 def compare(arguments: argparse.Namespace) -> int:

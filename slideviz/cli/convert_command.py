@@ -3,25 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from slideviz.cli.options import add_shared
 from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
-
-
-def add_convert(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``convert`` to the parser."""
-    call = calls.add_parser("convert", help="write a mesh in another format")
-    call.add_argument("mesh", type=Path, help="the mesh to read")
-    call.add_argument("output", type=Path, help="the mesh to write; its ending names the format")
-    add_shared(call, "zone", help="one zone, from 1 (default: all)")
-    add_shared(
-        call,
-        "stream",
-        help="for meshes larger than memory: from .su2 to .su2b or back, piece by piece",
-    )
-    call.set_defaults(command=convert, holds=True)
 
 
 def convert(arguments: argparse.Namespace) -> int:

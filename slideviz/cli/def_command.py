@@ -7,10 +7,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared, changed
+from slideviz.cli.options import changed
 from slideviz.cli.terminal import say
 from slideviz.errors import CaseError, SlidevizError
 
@@ -20,24 +19,6 @@ if TYPE_CHECKING:
     from slideviz.design.su2.surface import MovingSurface
     from slideviz.mesh.model import Mesh
     from slideviz.solver.steps import Step
-
-_OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
-"""Options of ``slideviz run`` that `report_outcome` reads; this command sets them to None."""
-
-
-def add_def(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``def`` to the parser."""
-    call = calls.add_parser("def", help="deform as a configuration of SU2 says, like SU2_DEF")
-    add_config(call)
-    add_shared(call, "json", "force")
-    call.set_defaults(command=run_def, holds=True, **dict.fromkeys(_OF_A_RUN))
-
-
-def add_config(call: argparse.ArgumentParser) -> None:
-    """Add the arguments that ``def`` and ``dot`` share."""
-    call.add_argument("case", type=Path, metavar="CONFIG", help="the configuration of SU2 (.cfg)")
-    add_shared(call, "set", help="change a key for this run; may be repeated")
-    add_shared(call, "quiet")
 
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:

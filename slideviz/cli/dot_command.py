@@ -6,8 +6,7 @@ import argparse
 import time
 from typing import TYPE_CHECKING
 
-from slideviz.cli.def_command import add_config, read_configuration, variable_rows
-from slideviz.cli.options import add_shared
+from slideviz.cli.def_command import read_configuration, variable_rows
 from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
@@ -15,14 +14,6 @@ if TYPE_CHECKING:
 
     from slideviz.design.su2.config import Su2Config
     from slideviz.design.su2.gradients import Gradients
-
-
-def add_dot(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``dot`` to the parser."""
-    call = calls.add_parser("dot", help="gradients for SU2's design variables, like SU2_DOT_AD")
-    add_config(call)
-    add_shared(call, "json")
-    call.set_defaults(command=run_dot, holds=True)
 
 
 def run_dot(arguments: argparse.Namespace) -> int:

@@ -6,21 +6,15 @@ import argparse
 import sys
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import (
-    add_changes,
-    add_shared,
-    add_zoom,
     changed,
     read_case,
     read_mesh,
     require_mesh_file,
-    size,
 )
 from slideviz.errors import CaseError
-from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -29,65 +23,6 @@ if TYPE_CHECKING:
     from slideviz.session.state import Run, StepFrame
 
 SMOOTH = 4  # films of fewer steps get a hint on ``--between``
-
-
-def add_film(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``film`` to the parser."""
-    call = calls.add_parser(
-        "film",
-        help="deform a mesh and write the steps as MP4, GIF or numbered pictures",
-        description="Deform a mesh as a case file says, and write the steps as a film.",
-    )
-    add_shared(call, "case")
-    call.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="FILE.mp4 or FILE.gif; a folder, or a pattern such as step_%%03d.png",
-    )
-    call.add_argument(
-        "--size", type=size, metavar="WxH", help="pixels (1280x800; GIF 800x500; PNG 1600x1000)"
-    )
-    call.add_argument(
-        "--fps", type=float, metavar="N", help="images per second (10; fewer if there are few)"
-    )
-    call.add_argument(
-        "--hold", type=float, default=1.5, metavar="S", help="the last image stays S seconds (1.5)"
-    )
-    call.add_argument(
-        "--between",
-        type=int,
-        default=0,
-        metavar="N",
-        help="images between two steps: nodes on straight lines, quality of that mesh (0)",
-    )
-    call.add_argument(
-        "--color",
-        choices=tuple(QUANTITIES),
-        default="size-skew",
-        help="what the colors show (size-skew)",
-    )
-    call.add_argument(
-        "--designs",
-        type=Path,
-        metavar="TABLE",
-        help="an image for each design of a table (see sweep) instead of the steps",
-    )
-    add_zoom(call)
-    add_changes(call)
-    call.add_argument(
-        "--beside",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="show a second run next to it with this change, e.g. SLIDING_MODE=none; may be "
-        "repeated",
-    )
-    add_shared(call, "zone", "quiet")
-    call.add_argument("--force", action="store_true", help="replace files that exist")
-    call.set_defaults(command=film)
 
 
 def film(arguments: argparse.Namespace) -> int:

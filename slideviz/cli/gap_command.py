@@ -8,9 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_shared, read_inputs
+from slideviz.cli.options import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.section_options import pair_of_names
 from slideviz.cli.terminal import holding
 from slideviz.errors import CaseError
 
@@ -18,34 +17,6 @@ if TYPE_CHECKING:
     from slideviz.design.gap import Gap
 
 LISTED = (0.1, 0.3, 0.5, 0.7, 0.9)  # the places that the summary has
-
-
-def add_gap(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``gap`` to the parser."""
-    call = calls.add_parser(
-        "gap",
-        help="throat, tip gap and other smallest distances, before and after",
-        description="Measure the smallest distances between blades (the throat), between blades "
-        "and walls (tip gap, hub gap) and between other boundaries, by span, before and after the "
-        "run of a case. Blades are the moving boundaries. No mesh is written.",
-    )
-    add_shared(call, "case")
-    call.add_argument(
-        "--between",
-        type=pair_of_names,
-        action="append",
-        default=[],
-        metavar="A,B",
-        help="measure between these two boundaries, too; may be repeated",
-    )
-    call.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="the curves as .png, .svg or .pdf"
-    )
-    add_changes(call)
-    add_shared(call, "json")
-    add_shared(call, "zone")
-    add_shared(call, "quiet")
-    call.set_defaults(command=gap)
 
 
 def gap(arguments: argparse.Namespace) -> int:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_shared
 from slideviz.errors import MeshError
 
 if TYPE_CHECKING:
@@ -14,14 +12,6 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.streaming.quality import CellCounts
-
-
-def add_info(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``info`` to the parser."""
-    call = calls.add_parser("info", help="what is in a mesh file")
-    call.add_argument("mesh", type=Path)
-    add_shared(call, "zone", "json", "stream")
-    call.set_defaults(command=info)
 
 
 def info(arguments: argparse.Namespace) -> int:

@@ -5,11 +5,6 @@ from __future__ import annotations
 import argparse
 
 
-def add_keys(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``keys`` to the parser."""
-    calls.add_parser("keys", help="reference of all case keys").set_defaults(command=keys)
-
-
 def keys(_: argparse.Namespace) -> int:
     """Print the reference of all case keys; return the exit code."""
     from slideviz.case.cfg import describe_keys

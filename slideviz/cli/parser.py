@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
 from slideviz import __version__
+from slideviz.cli import command_parsers
+from slideviz.cli.section_options import glued
 from slideviz.errors import CaseError, nearest
 
 
@@ -31,23 +34,23 @@ def window(arguments: argparse.Namespace) -> int:
 
 
 COMMANDS = {
-    "run": "run_command",
-    "info": "info_command",
-    "quality": "quality_command",
-    "repair": "repair_command",
-    "film": "film_command",
-    "section": "section_command",
-    "gap": "gap_command",
-    "compare": "compare_command",
-    "sweep": "sweep_command",
-    "convert": "convert_command",
-    "wheel": "wheel_command",
-    "def": "def_command",
-    "dot": "dot_command",
-    "sample": "sample_command",
-    "keys": "keys_command",
+    "run": "run_command.run",
+    "info": "info_command.info",
+    "quality": "quality_command.quality",
+    "repair": "repair_command.repair",
+    "film": "film_command.film",
+    "section": "section_command.section",
+    "gap": "gap_command.gap",
+    "compare": "compare_command.compare",
+    "sweep": "sweep_command.sweep",
+    "convert": "convert_command.convert",
+    "wheel": "wheel_command.wheel",
+    "def": "def_command.run_def",
+    "dot": "dot_command.run_dot",
+    "sample": "sample_command.sample",
+    "keys": "keys_command.keys",
 }
-"""The module of each command, in the order of the help; its function ``add_NAME`` adds a parser."""
+"""Where the function of each command is, in the order of the help; ``add_NAME`` adds its parser."""
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -73,11 +76,14 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
             meant = nearest(argv[0], COMMANDS)
             parser.error(f"there is no command or file {argv[0]!r}{meant}")
         return parser.parse_args(argv)
-    from slideviz.cli.section_options import glued
-
-    # Load only the module of the command that is called, where it is the first word.
     called = argv[:1] if argv[0] in COMMANDS else COMMANDS
     return _parser(called).parse_args(glued(argv))
+
+
+def _command(place: str, arguments: argparse.Namespace) -> int:
+    """Run the command at a place, whose module is loaded only now; return the exit code."""
+    module, _, function = place.partition(".")
+    return int(getattr(import_module(f"slideviz.cli.{module}"), function)(arguments))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -129,5 +135,6 @@ def _parser(names: Iterable[str]) -> argparse.ArgumentParser:
         title="commands", metavar="COMMAND", required=True, parser_class=_Parser
     )
     for name in names:
-        getattr(import_module(f"slideviz.cli.{COMMANDS[name]}"), f"add_{name}")(calls)
+        getattr(command_parsers, f"add_{name}")(calls)
+        calls.choices[name].set_defaults(command=partial(_command, COMMANDS[name]))
     return parser

@@ -6,62 +6,21 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_reference, add_shared, checked, optional_case, reference_words
+from slideviz.cli.options import optional_case, reference_words
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.table import holds_quality, own_endings
-from slideviz.terms import CELL_STATES, METRICS, RATED, SKEW_METRICS, WALL_VALUES, field_of
+from slideviz.terms import CELL_STATES, METRICS, RATED, WALL_VALUES, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from slideviz.case.limits import Limit, LimitResult
+    from slideviz.case.limits import LimitResult
     from slideviz.cli.mesh_source import OpenMesh
     from slideviz.mesh.metrics import MetricValues
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.mesh.walls import Walls
     from slideviz.terms import Metric
-
-
-def add_quality(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``quality`` to the parser."""
-    call = calls.add_parser("quality", help="size-skew quality of a mesh")
-    call.add_argument("mesh", type=Path)
-    add_reference(call, "case that made it: its MESH_FILENAME is the reference")
-    call.add_argument(
-        "--metric",
-        choices=tuple(SKEW_METRICS),
-        default="knupp",
-        help="rbf-slide: hexahedra as that program measures them (default: knupp)",
-    )
-    call.add_argument(
-        "--limits",
-        type=checked(limits),
-        default=(),
-        metavar="LIMITS",
-        help='limits like those of the key LIMITS, e.g. "min > 0.3, inverted = 0"; exit code 4 if '
-        "one is not met",
-    )
-    add_shared(call, "metrics", "zone", "json")
-    call.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help=f"mesh with quality ({own_endings('quality')}), or .csv",
-    )
-    add_shared(call, "stream")
-    call.set_defaults(command=quality)
-
-
-def limits(text: str) -> tuple[Limit, ...]:
-    """Return the limits of a text."""
-    from slideviz.case.limits import read_limits
-
-    found = read_limits(text)
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} has no limit; write e.g. min > 0.3")
-    return found
 
 
 def quality(arguments: argparse.Namespace) -> int:

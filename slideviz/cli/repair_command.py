@@ -5,63 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared, checked
 from slideviz.cli.terminal import say
-from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS
 
 if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
-
-
-def add_repair(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``repair`` to the parser."""
-    call = calls.add_parser("repair", help="mend inverted and poor cells of a mesh")
-    call.add_argument("mesh", type=Path)
-    call.add_argument(
-        "-o", "--output", type=Path, metavar="OUT", required=True, help="repaired mesh to write"
-    )
-    call.add_argument(
-        "--reference", type=Path, metavar="UNDEFORMED", help="undeformed mesh, with the same cells"
-    )
-    for role, what in (
-        ("fixed", "boundaries that stay; so do boundaries that are not named"),
-        ("sliding", "boundaries along which nodes may slide"),
-        ("periodic", "pairs of periodic boundaries, which may move alike"),
-    ):
-        call.add_argument(f"--{role}", type=_names, default=(), metavar="A,B", help=what)
-    call.add_argument(
-        "--below",
-        type=checked(_below),
-        default=0.1,
-        metavar="Q",
-        help="mend valid cells of a lower quality, too (0.1); 0: only those not proved valid",
-    )
-    call.add_argument(
-        "--target",
-        choices=tuple(REPAIR_TARGETS),
-        help="shapes that cells shall have: of the reference (the default, if there is one), or "
-        "the ideal ones",
-    )
-    call.add_argument(
-        "--metric", choices=tuple(SKEW_METRICS), default="knupp", help="of the quality (knupp)"
-    )
-    add_shared(call, "zone", "json", "quiet", "force")
-    call.set_defaults(command=repair, holds=True)
-
-
-def _names(text: str) -> tuple[str, ...]:
-    """Return the names of a text, separated by commas."""
-    return tuple(filter(None, (name.strip() for name in text.split(","))))
-
-
-def _below(text: str) -> float:
-    """Return the value of a text as of the key REPAIR_BELOW."""
-    from slideviz.case.keys import KEYS
-
-    return float(KEYS["REPAIR_BELOW"].kind.read(text))
 
 
 def repair(arguments: argparse.Namespace) -> int:

@@ -13,13 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import (
-    add_changes,
-    add_shared,
-    add_zoom,
     read_case,
     read_mesh,
     require_mesh_file,
-    size,
 )
 from slideviz.cli.run_outcome import (
     CELLS,
@@ -46,39 +42,6 @@ if TYPE_CHECKING:
 
 KEPT_BYTES = 1_000_000_000
 """Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""
-
-
-def add_run(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``run`` to the parser."""
-    call = calls.add_parser("run", help="deform a mesh as a case file says")
-    add_shared(call, "case")
-    call.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
-    add_changes(call)
-    add_shared(call, "json", "metrics")
-    call.add_argument(
-        "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
-    )
-    call.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
-    call.add_argument(
-        "--steps-file",
-        type=Path,
-        metavar="FILE",
-        help=f"all steps with their quality in one file for ParaView ({own_endings('series')})",
-    )
-    call.add_argument(
-        "--picture",
-        type=Path,
-        metavar="FILE",
-        help="picture of the quality (PNG); keys VIEW_... are for the window",
-    )
-    call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
-    add_zoom(call)
-    add_shared(call, "zone")
-    add_shared(
-        call, "stream", help="for meshes larger than memory (SU2): only the boundary is in memory"
-    )
-    add_shared(call, "quiet", "force")
-    call.set_defaults(command=run, holds=True)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
-from slideviz.cli.section_options import limits, neighbours, pair_of_names, pixels, section_reader
+from slideviz.case.section_shapes import SECTION_SHAPES
+from slideviz.cli.options import optional_case, reference_words
 from slideviz.errors import CaseError
-from slideviz.terms import COLOR_MAPS, QUANTITIES, SKEW_METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,87 +22,7 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
     from slideviz.sections.span import SpanWalls
 
-CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
 WALLS_OPTION = "--between HUB,SHROUD"
-EXAMPLES = """\
-examples:
-  slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
-  slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
-  slideviz section stator.su2 --cone 10,z,0,0,-1.5 --copies 2 -o cone.png
-  slideviz section stator.su2 --span 0.9 --between HUB,SHROUD -o tip.png
-  slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
-"""
-
-
-def add_section(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``section`` to the parser."""
-    call = calls.add_parser(
-        "section",
-        help=f"picture of a {names()} through a mesh",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    call.add_argument("mesh", type=Path)
-    add = call.add_argument
-    where = call.add_mutually_exclusive_group(required=True)
-    for name, row in SECTION_SHAPES.items():
-        metavar = row.metavar or name.upper()
-        where.add_argument(
-            f"--{name}", type=section_reader(row), dest="asked", metavar=metavar, help=row.option
-        )
-    where.add_argument(
-        "--meridional",
-        action="store_true",
-        help="instead of a section: the mean quality of the cells around the axis, by z and r",
-    )
-    add(
-        "--between",
-        type=pair_of_names,
-        metavar="HUB,SHROUD",
-        help="the walls of --span and --meridional; by default SPAN of the case, or what their "
-        "names say",
-    )
-    add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
-    add_reference(
-        call,
-        "case that names periodic boundaries and axis; its MESH_FILENAME is the reference "
-        "where it has the same cells",
-    )
-    add("--color", choices=tuple(QUANTITIES), default="size-skew", help="(default: size-skew)")
-    add("--range", type=limits, metavar="LO,HI", help="ends of the color bar")
-    maps = tuple(COLOR_MAPS)
-    add("--map", choices=maps, default=maps[0], help=f"color map (default: {maps[0]})")
-    cells = call.add_mutually_exclusive_group()
-    cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
-    cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
-    view = call.add_mutually_exclusive_group()
-    view.add_argument(
-        "--unrolled",
-        action="store_true",
-        help="lay sections with an axis flat, a cylinder to (z, r theta); the default",
-    )
-    view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
-    add(
-        "--copies",
-        type=neighbours,
-        metavar="N",
-        default=0,
-        help="neighbouring passages to draw on each side, or wheel for all",
-    )
-    add(
-        "--size",
-        type=pixels,
-        metavar="WxH",
-        help="pixels (default: 1600 wide, and as high as the section needs)",
-    )
-    add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
-    add("--no-title", action="store_false", dest="title", help="leave out the title")
-    add("--no-axes", action="store_false", dest="axes", help="leave out axes and their numbers")
-    add("--metric", choices=tuple(SKEW_METRICS), default="knupp", help="as for quality")
-    add_shared(call, "zone")
-    add_shared(call, "json", help="numbers of the cut as JSON; - is the terminal")
-    add_shared(call, "stream")
-    call.set_defaults(command=section, wrong_usage=call.error)
 
 
 @dataclass(frozen=True, eq=False)

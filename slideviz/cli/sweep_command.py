@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared, integer, read_case, read_mesh, require_mesh_file
+from slideviz.cli.options import read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
 from slideviz.errors import CaseError
 
@@ -23,53 +23,6 @@ if TYPE_CHECKING:
 _LISTED = 5
 """Most designs that are listed in one line, and most reasons of failed designs that are printed."""
 _CONNECTING = 10.0  # seconds to wait for a connection to a scheduler
-
-
-def add_sweep(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``sweep`` to the parser."""
-    call = calls.add_parser(
-        "sweep",
-        help="a run for each row of a table of designs",
-        description="Deform a mesh by each design of a table, on all cores or on a Dask cluster, "
-        "and write a table of quality, errors and times. Columns are numbers of the motions, such "
-        "as BLADE.translate.y or motion2.angle_deg, and keys of the case, such as STEPS; "
-        "`--columns` "
-        "lists them.",
-        epilog="exit codes: 0 done (also if cells are inverted or a design failed: see the "
-        "table); 1 no design could be computed; 130 cancelled, 143 ended by SIGTERM: finished "
-        "designs are in the table, and --resume continues",
-    )
-    add_shared(call, "case")
-    call.add_argument(
-        "table", type=Path, nargs="?", help="the table of designs (CSV), or 'displacement_*.txt'"
-    )
-    call.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_swept)"
-    )
-    call.add_argument("--columns", action="store_true", help="list the possible columns")
-    call.add_argument("--meshes", action="store_true", help="write the mesh of each design")
-    call.add_argument(
-        "--workers", type=integer, metavar="N", help="processes (default: one for each core)"
-    )
-    call.add_argument(
-        "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, e.g. tcp://node1:8786"
-    )
-    call.add_argument("--resume", action="store_true", help="continue an interrupted sweep")
-    call.add_argument(
-        "--force", action="store_true", help="start again, and replace existing results"
-    )
-    add_shared(call, "set")
-    call.add_argument(
-        "--time-step",
-        type=float,
-        metavar="DT",
-        help="number the meshes by time / DT, like SU2's files (table with a column time)",
-    )
-    add_shared(
-        call, "stream", help="with --meshes, for meshes larger than memory (SU2): one at a time"
-    )
-    add_shared(call, "zone", "json", "quiet")
-    call.set_defaults(command=sweep)
 
 
 def sweep(arguments: argparse.Namespace) -> int:

@@ -3,68 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_shared, integer, read_inputs
+from slideviz.cli.options import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
-    from slideviz.design.wheel import Count, WheelQuality
+    from slideviz.design.wheel import WheelQuality
 
 MOST_NAMES = 20  # boundaries whose names are all printed
-
-
-def add_wheel(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``wheel`` to the parser."""
-    call = calls.add_parser(
-        "wheel",
-        help="write the whole wheel of a passage",
-        description="Deform a passage as a case says, and write the wheel that its copies make, "
-        "turned about the axis and merged at the periodic boundaries. Without motions the "
-        "passages are undeformed.",
-    )
-    add_shared(call, "case")
-    call.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="MESH",
-        required=True,
-        help="the wheel: .su2, or .su2b for large ones",
-    )
-    call.add_argument(
-        "--passages",
-        type=passages,
-        default="all",
-        metavar="N",
-        help="their number; all for a whole turn (default); with commas one for each zone",
-    )
-    call.add_argument(
-        "--numbered",
-        action="store_true",
-        help="boundaries of their own for each passage: blade_1, blade_2",
-    )
-    call.add_argument(
-        "--designs",
-        type=Path,
-        metavar="TABLE",
-        help="motions of passages (CSV, see `slideviz sweep`): one row for each passage from the "
-        "first on; the others move as the case says",
-    )
-    add_changes(call)
-    add_shared(call, "json")
-    add_shared(call, "zone")
-    add_shared(call, "quiet")
-    call.set_defaults(command=wheel)
-
-
-def passages(text: str) -> Count | list[Count]:
-    """Return a number of passages, or "all"; with commas one for each zone."""
-    words = [word.strip() for word in text.split(",")]
-    counts: list[Count] = ["all" if word.lower() == "all" else integer(word) for word in words]
-    return counts if len(counts) > 1 else counts[0]
 
 
 def wheel(arguments: argparse.Namespace) -> int:
