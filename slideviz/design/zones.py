@@ -11,8 +11,8 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
 from slideviz.rbf.tape import Array, put, take, value
+from slideviz.solver.interface_motion import InterfaceMotion
 from slideviz.solver.prepare import Prepared
-from slideviz.solver.zones import InterfaceMotion
 
 if TYPE_CHECKING:
     from slideviz.design.deformer import Deformer

@@ -40,8 +40,8 @@ from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
 from slideviz.session.state import Session, StepFrame
+from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.rims import rims_key
-from slideviz.solver.zones import check_motions
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
 from slideviz.system.file_checks import require_regular_file

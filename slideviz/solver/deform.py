@@ -97,7 +97,7 @@ def deform(
     prepared = prepare(case, mesh)
     check_limits = partial(rated_limits, prepared.case, mesh)
     if isinstance(mesh, Assembly):
-        from slideviz.solver.zones import InterfaceMotion, joined_steps, zone_runs
+        from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
 
         motion = InterfaceMotion(prepared, mesh)
         runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)

@@ -26,11 +26,11 @@ from slideviz.mesh.zones import zones_of
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
+from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
 from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step, step_timer
-from slideviz.solver.zones import InterfaceMotion, joined_steps, zone_runs
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
 from slideviz.streaming.quality import RunCollector, folded_steps
