@@ -14,7 +14,7 @@ from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions
 from slideviz.case.motions.motion import Motion, applies_to, named
-from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Message, Note, nearest
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone

@@ -18,7 +18,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.kinds import IN_ZONES, OF_MESH
 from slideviz.case.motions.motion import Motion, applies_to
-from slideviz.case.zones import each_zone, of_several_zones, zone_motion
+from slideviz.case.zone_cases import each_zone, of_several_zones, zone_motion
 from slideviz.errors import CaseError, Message, raise_all
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate

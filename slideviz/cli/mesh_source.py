@@ -77,7 +77,7 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     for temporary files until the context ends. Raises MeshError if the mesh has a mistake or, with
     ``--stream``, is of no format that can be streamed; or ``--reference`` has other cells.
     """
-    from slideviz.case.zones import with_marker_names
+    from slideviz.case.zone_cases import with_marker_names
     from slideviz.cli.report import print_remarks
     from slideviz.formats.files import read
     from slideviz.streaming.stream_input import open_read_only

@@ -130,7 +130,7 @@ def read_case(arguments: argparse.Namespace) -> Case:
 def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
     """Return the case with the names of the boundaries as its mesh has them, and the mesh."""
     from slideviz import read
-    from slideviz.case.zones import with_marker_names
+    from slideviz.case.zone_cases import with_marker_names
 
     mesh = read(path, zone=case.zone, file_format=case.mesh_format)
     return with_marker_names(case, mesh), mesh

@@ -46,7 +46,7 @@ KEPT_BYTES = 1_000_000_000
 
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
-    from slideviz.case.zones import with_marker_names
+    from slideviz.case.zone_cases import with_marker_names
     from slideviz.cli.output_paths import qualities_path
     from slideviz.cli.report import metrics_report, run_report
 

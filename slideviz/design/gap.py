@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
-from slideviz.case.zones import zone_cases
+from slideviz.case.zone_cases import zone_cases
 from slideviz.errors import CaseError
 from slideviz.machine.gap import (
     bodies,

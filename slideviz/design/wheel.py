@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from slideviz.argument_types import check_types
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
-from slideviz.case.zones import zone_cases
+from slideviz.case.zone_cases import zone_cases
 from slideviz.design.sweeps.table import Table, read_designs
 from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.formats.files import read

@@ -17,7 +17,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.spans import WALLS_KEY, span_ends
-from slideviz.case.zones import each_zone
+from slideviz.case.zone_cases import each_zone
 from slideviz.errors import CaseError
 from slideviz.machine.span import WHOLE, SpanCurves, SpanField, find_span
 from slideviz.mesh.model import FloatArray, IntArray, Mesh

@@ -20,7 +20,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case
 from slideviz.case.motions.span import prepare_span
-from slideviz.case.zones import each_zone, with_marker_names
+from slideviz.case.zone_cases import each_zone, with_marker_names
 from slideviz.errors import Cancelled, CaseError, MeshError, Message, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality

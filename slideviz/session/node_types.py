@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.zones import each_zone
+from slideviz.case.zone_cases import each_zone
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.fans import Fans, find_fans

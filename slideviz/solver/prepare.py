@@ -8,7 +8,7 @@ from functools import cached_property
 from slideviz.case.check import check_case
 from slideviz.case.model import Case
 from slideviz.case.motion import by_zone
-from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.errors import raise_all
 from slideviz.mesh.model import Mesh
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.motion import by_zone, displacements
-from slideviz.case.zones import each_zone
+from slideviz.case.zone_cases import each_zone
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair, pair_up

@@ -19,7 +19,7 @@ from slideviz.case.check import unknown_markers
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
-from slideviz.case.zones import zone_cases
+from slideviz.case.zone_cases import zone_cases
 from slideviz.elastic.conditions import conditions
 from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of

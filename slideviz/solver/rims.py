@@ -17,7 +17,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.motion import applies_to
 from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_ends
-from slideviz.case.zones import each_zone
+from slideviz.case.zone_cases import each_zone
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import corner_vectors, unit

@@ -16,7 +16,7 @@ from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import NewMotion, applies_to, named
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
-from slideviz.case.zones import zone_cases
+from slideviz.case.zone_cases import zone_cases
 from slideviz.mesh.quality import quality
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes

@@ -10,7 +10,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.check import check_case
 from slideviz.case.limits import read_limits
-from slideviz.case.zones import with_marker_names, zone_cases
+from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.su2.write import su2_blocks

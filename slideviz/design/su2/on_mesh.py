@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from slideviz.case.check import unknown_markers
-from slideviz.case.zones import renamed, with_marker_names
+from slideviz.case.zone_cases import renamed, with_marker_names
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.design.su2.variables import NOTHING
 from slideviz.errors import CaseError, nearest, raise_all

@@ -17,7 +17,7 @@ from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
-from slideviz.case.zones import each_zone
+from slideviz.case.zone_cases import each_zone
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.on_mesh import joined, problems_of_markers, zone_of
