@@ -1,6 +1,7 @@
 import gc
 import os
 import shutil
+import weakref
 
 import pytest
 
@@ -9,7 +10,7 @@ if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
 else:
     from qtpy.QtCore import QCoreApplication, QEvent, QSettings, Qt
     from qtpy.QtTest import QTest
-    from qtpy.QtWidgets import QApplication
+    from qtpy.QtWidgets import QApplication, QDialog
 
     from slideviz.gui.viewport.canvas import View3D
     from slideviz.gui.widgets import plot_canvas, questions
@@ -18,7 +19,7 @@ else:
     from slideviz.samples.table import write_sample
     from slideviz.scene.pick import to_display
     from slideviz.session import changes, jobs
-    from slideviz.session.state import StepFrame
+    from slideviz.session.state import Session, StepFrame
     from slideviz.session.store import Store
 
 
@@ -48,7 +49,7 @@ def nothing_of_closed_windows():
     What is there before the test, as modules are, no later look finds: each would take longer.
     """
     for top in QApplication.topLevelWidgets():
-        if isinstance(top, MainWindow):
+        if isinstance(top, MainWindow) and not top.isVisible():
             top.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.collect()
@@ -107,23 +108,78 @@ def unpainted(request, monkeypatch):
 
 
 @pytest.fixture
-def window(qtbot, settings, monkeypatch):
-    made = MainWindow(settings, multi_samples=0)
+def window(request, qtbot, settings, monkeypatch):
+    """A window without a mesh; that of the module if it has ``pytest.mark.window("shared")``.
 
-    def close(window):
-        # Whatever a test leaves unsaved is of no interest.
-        monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
-        window.close()
-
-    qtbot.addWidget(made, before_close_func=close)
-    with qtbot.waitExposed(made):
-        made.show()
-    # Shortcuts belong to the active window.
-    made.activateWindow()
-    qtbot.waitUntil(made.isActiveWindow)
+    A shared one still has the mesh of the test before: this is for tests that open one.
+    """
+    mark = request.node.get_closest_marker("window")
+    if mark is not None and mark.args == ("shared",):
+        [made] = request.getfixturevalue("shared_windows")
+        monkeypatch.setattr(made, "settings", settings)
+        monkeypatch.setattr(made.files, "settings", settings)
+    else:
+        made = MainWindow(settings, multi_samples=0)
+        qtbot.addWidget(made, before_close_func=close_unsaved)
+        show(made)
     yield made
     # A listener that raises is told in the banner, and the window goes on: not so a test.
     assert made.error_reporter.count == 0, made.banner.text.text()
+    if made.property("first_layout"):
+        reset(made, qtbot)
+        request.node.funcargs.clear()  # those of the last test would keep the window
+
+
+@pytest.fixture(scope="module")
+def shared_windows(qapp, tmp_path_factory):
+    """A list with the window of a module, which leaves nothing behind at its end."""
+    path = tmp_path_factory.mktemp("settings") / "settings.ini"
+    windows = [MainWindow(QSettings(str(path), QSettings.Format.IniFormat), multi_samples=0)]
+    show(windows[0])
+    windows[0].setProperty("first_layout", windows[0].saveState())
+    yield windows
+    made = windows.pop()
+    close_unsaved(made)
+    assert not made.left_behind
+    parts = (made, made.view, made.scene, made.store)
+    gone = {type(part).__name__: weakref.ref(part) for part in parts}
+    made.deleteLater()
+    del made, parts
+    gc.unfreeze()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.collect()
+    assert [name for name, part in gone.items() if part() is not None] == []
+
+
+def show(window):
+    """Show a window, and make it the active one: shortcuts belong to it."""
+    window.show()
+    assert QTest.qWaitForWindowExposed(window)
+    window.activateWindow()
+    assert QTest.qWaitForWindowActive(window)
+
+
+def close_unsaved(window):
+    """Close a window; whatever a test leaves unsaved is of no interest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(questions, "ask_unsaved", lambda *_: "discard")
+        window.close()
+
+
+def reset(window, qtbot):
+    """Bring a window, but for its mesh, to the state of a new one."""
+    for dialog in window.findChildren(QDialog):
+        dialog.close()
+    window.running.cancel()
+    qtbot.waitUntil(lambda: not window.runner.busy, timeout=60_000)
+    window.player.stop()
+    window.exports.end()
+    window.store.put(Session())
+    window.start.show()
+    window.restoreState(window.property("first_layout"))
+    window.banner.hide()
+    window.statusBar().clearMessage()
+    window.view.setFocus()
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import end_parts
 from slideviz.session.runs_words import describe_run
 
+pytestmark = pytest.mark.window("shared")
 DONE = "he motion could go "
 
 
@@ -58,6 +59,7 @@ def colors(window):
 # Opening ----------------------------------------------------------------------------------
 
 
+@pytest.mark.window("own")
 def test_it_starts_with_a_page_that_offers_to_open_and_the_samples(window):
     assert window.start.isVisible()
     assert set(window.start.sample_buttons) == set(window.files.samples)
@@ -646,6 +648,7 @@ def test_where_drawing_takes_long_steps_are_left_out(ran, monkeypatch):
 
 
 @pytest.mark.usefixtures("painted")
+@pytest.mark.window("own")
 def test_a_run_shows_its_steps_and_the_quality_and_no_size_changes_with_the_numbers(ready):
     window, player = ready.window, ready.window.player
     parts = (window.view, player.slider, window.docks["boundaries"], window.docks["runs"])
@@ -672,6 +675,7 @@ def test_a_run_shows_its_steps_and_the_quality_and_no_size_changes_with_the_numb
     assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
 
 
+@pytest.mark.window("own")
 def test_numbers_without_room_are_shorter_and_a_narrow_player_leaves_out_speed_before_them(ran):
     ran.window.resize(1280, 800)
     QApplication.processEvents()
@@ -764,6 +768,7 @@ def test_a_run_that_fails_says_why_and_leaves_the_window_usable(ready, monkeypat
     assert len(ready.session.frames) == 2
 
 
+@pytest.mark.window("own")
 def test_what_is_typed_into_the_limits_counts_at_f5(ready):
     window = ready.window
     window.dock_manager.bring_to_front("limits")
@@ -893,6 +898,7 @@ def test_opening_while_running_cancels_the_run(ready, passage_file, answers):
     assert len(ready.session.frames) == 1
 
 
+@pytest.mark.window("own")
 def test_closing_while_running_ends_the_run(ready, answers):
     asked = answers("ask_unsaved", "discard")
     ready.window.store.change(changes.set_case, steps=2000)
@@ -904,6 +910,7 @@ def test_closing_while_running_ends_the_run(ready, answers):
     assert not ready.window.runner.alive
 
 
+@pytest.mark.window("own")
 def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkeypatch, answers):
     window = ready.window
     window.store.change(changes.set_case, steps=2000)
@@ -985,6 +992,7 @@ def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
     assert not opened.session.unsaved_case
 
 
+@pytest.mark.window("own")
 def test_a_saved_view_is_shown_again_after_it_was_opened_in_a_narrower_window(
     opened, answers, tmp_path
 ):
@@ -1003,6 +1011,7 @@ def test_a_saved_view_is_shown_again_after_it_was_opened_in_a_narrower_window(
     assert camera.place == pytest.approx(saved, abs=1e-9)
 
 
+@pytest.mark.window("own")
 def test_nothing_is_asked_when_nothing_changed_or_a_case_cannot_be_written(
     opened, answers, tmp_path
 ):
@@ -1037,6 +1046,7 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
 
 
 @pytest.mark.parametrize("given", [("cancel", "case"), ("discard",)])
+@pytest.mark.window("own")
 def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, given):
     opened.role("airfoil", "fixed")
     for answer in given:
@@ -1048,6 +1058,7 @@ def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, giv
         assert (tmp_path / "a.cfg").exists() == (answer == "case")
 
 
+@pytest.mark.window("own")
 def test_the_question_names_other_runs_whose_mesh_would_be_lost(ready, answers):
     asked = answers("ask_unsaved", "cancel")
     run(ready, 1)
@@ -1061,6 +1072,7 @@ def test_the_question_names_other_runs_whose_mesh_would_be_lost(ready, answers):
     assert "either" not in asked[-1][0]
 
 
+@pytest.mark.window("own")
 def test_the_question_promises_the_same_result_only_where_that_is_true(ready, answers):
     asked = answers("ask_unsaved", "cancel")
     ready.window.store.change(changes.set_case, sliding="ds")
@@ -1109,6 +1121,7 @@ def test_colors_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_wh
 
 
 @pytest.mark.usefixtures("painted")
+@pytest.mark.window("own")
 def test_what_moves_fills_the_view_or_what_is_selected_and_the_wheel_zooms_about_the_mouse(opened):
     window = opened.window
     scale = window.view.camera.parallel_scale
@@ -1133,6 +1146,7 @@ def test_what_moves_fills_the_view_or_what_is_selected_and_the_wheel_zooms_about
     assert not fit.isEnabled()
 
 
+@pytest.mark.window("own")
 def test_themes_change_the_view_and_are_remembered(opened, settings):
     opened.window.set_theme("light")
     light = opened.window.view.snapshot()[-5, 5].mean()
@@ -1141,6 +1155,7 @@ def test_themes_change_the_view_and_are_remembered(opened, settings):
     assert settings.value("theme") == "dark"
 
 
+@pytest.mark.window("own")
 def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     window = ready.window
     window.resize(1280, 800)
