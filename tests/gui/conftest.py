@@ -1,6 +1,7 @@
 import gc
 import os
 import shutil
+import threading
 import weakref
 
 import pytest
@@ -104,7 +105,27 @@ def unpainted(request, monkeypatch):
     What is in the scene is as ever, and a snapshot draws it.
     """
     if "painted" not in request.fixturenames:
-        monkeypatch.setattr(View3D, "paintGL", lambda self: None)
+        monkeypatch.setattr(Painting, "is_on", False)
+
+
+class Painting:
+    """Whether 3D views are painted.
+
+    `View3D.paintGL` is replaced once, and not for a test: of a view that lives on, PySide keeps the
+    function that it has called before.
+    """
+
+    is_on = True
+
+    @staticmethod
+    def replace():
+        paint = View3D.paintGL
+        View3D.paintGL = lambda view: paint(view) if Painting.is_on else None
+
+
+@pytest.fixture(scope="session", autouse=True)
+def painting():
+    Painting.replace()
 
 
 @pytest.fixture
@@ -118,6 +139,7 @@ def window(request, qtbot, settings, monkeypatch):
         [made] = request.getfixturevalue("shared_windows")
         monkeypatch.setattr(made, "settings", settings)
         monkeypatch.setattr(made.files, "settings", settings)
+        activate(made)
     else:
         made = MainWindow(settings, multi_samples=0)
         qtbot.addWidget(made, before_close_func=close_unsaved)
@@ -146,8 +168,13 @@ def shared_windows(qapp, tmp_path_factory):
     made.deleteLater()
     del made, parts
     gc.unfreeze()
-    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    gc.collect()
+    for thread in threading.enumerate():
+        if thread.name == plot_canvas.THREAD:
+            thread.join()  # a plot that was on its way
+    for _ in range(3):
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        QCoreApplication.processEvents()
+        gc.collect()
     assert [name for name, part in gone.items() if part() is not None] == []
 
 
@@ -155,6 +182,10 @@ def show(window):
     """Show a window, and make it the active one: shortcuts belong to it."""
     window.show()
     assert QTest.qWaitForWindowExposed(window)
+    activate(window)
+
+
+def activate(window):
     window.activateWindow()
     assert QTest.qWaitForWindowActive(window)
 

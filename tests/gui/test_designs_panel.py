@@ -18,7 +18,7 @@ from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -187,6 +187,7 @@ def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     assert panel.run.text() == "Run 1 design"
 
 
+@pytest.mark.window("own")
 def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     panel = passage
     window.resize(1280, 800)
@@ -229,6 +230,7 @@ def test_where_all_failed_there_is_no_plot(passage):
     assert panel.plot.save.isEnabled()
 
 
+@pytest.mark.window("own")
 def test_the_number_that_varies_is_read_whole(window, passage, qtbot):
     window.resize(1280, 800)
     column = passage.rows.column
@@ -397,6 +399,7 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     assert 1 < len(panel.table.results) < 500
 
 
+@pytest.mark.window("own")
 def test_results_are_not_lost_without_a_question(
     window, passage, qtbot, in_a_thread, answers, tmp_path
 ):
@@ -465,6 +468,7 @@ def test_results_can_be_saved_before_a_number_is_added_or_all_is_run_again(
         assert [row["steps"] for row in csv.DictReader(file)] == ["1", "2"]
 
 
+@pytest.mark.window("own")
 def test_closing_asks_about_designs_that_go_on(
     window, passage, qtbot, in_a_thread, answers, tmp_path
 ):
@@ -489,6 +493,7 @@ def test_closing_asks_about_designs_that_go_on(
     assert 1 < len(done) < 500
 
 
+@pytest.mark.window("own")
 def test_its_key_shows_and_hides_the_panel(window, passage, qtbot):
     assert window.docks["designs"].isVisible()
     QTest.keyClick(window, Qt.Key.Key_F6)

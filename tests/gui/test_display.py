@@ -15,7 +15,7 @@ from slideviz.scene.pick import to_display
 from slideviz.session import changes, jobs
 from tests.builders import stage
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture

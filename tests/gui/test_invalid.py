@@ -10,7 +10,7 @@ from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture

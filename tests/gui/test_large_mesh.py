@@ -17,6 +17,8 @@ from slideviz.session.state import IN_FILE
 from slideviz.solver.deform import deform
 from tests.builders import stage
 
+pytestmark = pytest.mark.window("shared")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -26,7 +26,7 @@ from slideviz.terms import SHOWN
 from tests.builders import airfoil, stage
 from tests.slow import one_of_each_fast
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 NOISE = 3.7e-13
 
@@ -200,6 +200,7 @@ def test_a_curve_over_span_is_typed_checked_and_shown_with_its_ghost(driver, tmp
     assert driver.session.case.motions == (SpanMotion("BLADE", "stagger", (0.0,), (0.0,)),)
 
 
+@pytest.mark.window("own")
 def test_motions_over_span_of_each_zone_have_its_walls(driver, tmp_path):
     names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
     roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
@@ -429,6 +430,7 @@ def test_camber_and_thickness_of_a_box_are_shown_edited_and_kept(boxed, tmp_path
     assert not boxed.window.motions.add_actions[FfdTwist].isEnabled()
 
 
+@pytest.mark.window("own")
 def test_twist_of_a_box_is_shown_edited_and_kept(driver, sample_folder, tmp_path):
     block, mesh = driver, sv.read(sample_folder / "hexahedron" / "mesh.su2")
     low, high = mesh.bounds

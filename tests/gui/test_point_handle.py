@@ -12,6 +12,8 @@ from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 
+pytestmark = pytest.mark.window("shared")
+
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):

@@ -23,7 +23,7 @@ from slideviz.gui.window import MainWindow
 from slideviz.samples.table import SAMPLES
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 SIZES = """
 import sys, tempfile
@@ -101,6 +101,7 @@ def test_a_key_hides_every_panel_and_shows_them_again(driver, passage_file):
     driver.qtbot.waitUntil(lambda: not window.docks["method"].visibleRegion().isEmpty())
 
 
+@pytest.mark.window("own")
 def test_hidden_panels_are_there_in_the_next_window(driver, settings, qtbot):
     window = driver.window
     window.dock_manager.toggle_all()

@@ -18,7 +18,7 @@ from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.panes import run_title
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -456,6 +456,7 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
 
 
 @pytest.mark.parametrize("two", [False, True])
+@pytest.mark.window("own")
 def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved(ran, two):
     viewing = compare(ran) if two else ran.window.viewing
     ran.window.viewing.fit()
@@ -543,6 +544,7 @@ def test_steps_hiding_selection_and_clicks_act_on_both(ran):
         assert one.plotter.actors["selected:airfoil"].visibility
 
 
+@pytest.mark.window("own")
 def test_the_theme_reaches_both(ran):
     viewing = compare(ran)
     ran.window.set_theme("dark")
@@ -575,6 +577,7 @@ def test_another_mesh_ends_the_comparison(ran, passage_file, answers):
 
 
 @pytest.mark.usefixtures("painted")
+@pytest.mark.window("own")
 def test_the_window_closes_during_a_comparison(ran, answers):
     compare(ran)
     answers("ask_unsaved", "discard")

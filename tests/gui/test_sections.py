@@ -20,7 +20,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.changes import selection_after
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture(autouse=True)
@@ -510,6 +510,7 @@ def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
 
 
 @pytest.mark.usefixtures("painted")
+@pytest.mark.window("own")
 def test_another_mesh_and_a_closed_window_have_no_handle_and_no_flat_view(
     window, driver, panel, passage_file, sample_folder, answers, monkeypatch
 ):

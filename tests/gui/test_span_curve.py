@@ -14,7 +14,7 @@ from slideviz.machine.blade import curve_at
 from slideviz.session import jobs
 from tests.builders import passage
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 KEYS = Qt.Key
 

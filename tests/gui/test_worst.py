@@ -40,7 +40,7 @@ from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
 from tests.builders import stage
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 def shaken(mesh, size, seed):
