@@ -14,7 +14,7 @@ from slideviz.design.su2.config import read_config
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
-from tests.solver.test_zones import stage
+from tests.solver.test_interface_motion import stage
 
 DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
 FILES = """

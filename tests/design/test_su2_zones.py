@@ -17,7 +17,7 @@ from slideviz.ffd.section import boxes_of
 from slideviz.mesh.zones import zones_of
 from tests.builders import zones_in_a_row
 from tests.mesh.test_interfaces import zones as square_and_core
-from tests.solver.test_zones import stage
+from tests.solver.test_interface_motion import stage
 
 MAIN = """SOLVER= MULTIPHYSICS
 CONFIG_LIST= ( first.cfg, second.cfg )

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.mesh.zones import zones_of
 from tests.builders import zones_in_a_row
-from tests.solver.test_zones import MOVE, both, last, pair, roles_of, stage, turn
+from tests.solver.test_interface_motion import MOVE, both, last, pair, roles_of, stage, turn
 
 STEP = 1e-6
 

@@ -9,7 +9,7 @@ from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.session import motions
 from slideviz.session.motions import TableRows, table_text, write_table
-from tests.solver.test_zones import stage
+from tests.solver.test_interface_motion import stage
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
 

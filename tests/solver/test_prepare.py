@@ -9,7 +9,7 @@ from slideviz.case import check, motion
 from slideviz.errors import CaseError
 from slideviz.mesh.zones import zones_of
 from slideviz.solver.prepare import prepare
-from tests.solver.test_zones import both, roles_of, stage, turn
+from tests.solver.test_interface_motion import both, roles_of, stage, turn
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from slideviz.mesh.margin import SafeFraction
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.steps import Step
-from tests.solver.test_zones import both, stage
+from tests.solver.test_interface_motion import both, stage
 
 OF_EACH_ZONE = {"field", "check_limits"}
 """What the step of the mesh of all zones has none of: it is used before, or made after."""

@@ -12,8 +12,8 @@ from slideviz.streaming import output, repair
 from slideviz.streaming.run import stream
 from tests.builders import grid, passage
 from tests.mesh.test_interfaces import zones as core_in_a_square
-from tests.solver.test_zones import both, roles_of, turn
-from tests.solver.test_zones import stage as rows
+from tests.solver.test_interface_motion import both, roles_of, turn
+from tests.solver.test_interface_motion import stage as rows
 from tests.streaming.test_run import bits, require_same
 
 
