@@ -67,7 +67,7 @@ def save_section(
     """
     if session.frame is None:
         raise CaseError("no mesh is open, so there is no section to draw")
-    if session.in_file:
+    if session.lacks_cells:
         raise CaseError(
             f"{session.frame.mesh.name} stays in its file; `slideviz section` draws its sections"
         )

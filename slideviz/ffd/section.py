@@ -403,14 +403,14 @@ def _with_boxes_of_zones(
     home = within.pop() if len(within) == 1 and not any(names) else last
     zones = []
     for k, (part, zone) in enumerate(zip(mesh.parts, alone, strict=True)):
-        mine = [_in_file(mesh, part, box) for box in boxes if (uses[box.name] or [home])[0] == k]
+        mine = [_in_zone(mesh, part, box) for box in boxes if (uses[box.name] or [home])[0] == k]
         without = replace(zone.origin, ffd=b"", ffd_at=()) if anew and _lines(zone) else zone.origin
         boxed = with_boxes(zone, mine, anew=anew, renewed=renewed) if mine else None
         zones.append(boxed or replace(zone, origin=without))
     return with_zones(mesh, zones)
 
 
-def _in_file(mesh: Mesh, part: ZonePart, box: Box) -> Box:
+def _in_zone(mesh: Mesh, part: ZonePart, box: Box) -> Box:
     """Return a box as in the section of a zone: the reverse of `_in_whole`."""
     files = {n: (f, zone) for zone in mesh.parts for n, f in names_in(mesh, zone).items()}
     embedded = {}

@@ -137,7 +137,7 @@ class SectionReader(BackgroundJob):
         self._runner.progressed.connect(lambda doing: self.progressed.emit(doing.text))
         self._running: tuple[Mesh, Section] | None = None
         self._unreadable: set[tuple[Mesh, Section]] = set()
-        store.listen(lambda _old, new: self._timer.start() if new.in_file else None)
+        store.listen(lambda _old, new: self._timer.start() if new.lacks_cells else None)
 
     def _awaited(self) -> list[tuple[StepFrame, Section]]:
         """Return the sections whose cells are still to be read, each with the frame it cuts."""
@@ -152,7 +152,7 @@ class SectionReader(BackgroundJob):
         ]
 
     def _start(self) -> None:
-        awaited = self._awaited() if self.store.session.in_file else []
+        awaited = self._awaited()
         if self._runner.busy:
             # The section being read may be dragged on, and its cells no longer wanted.
             if self._running not in [(frame.mesh, section) for frame, section in awaited]:

@@ -16,7 +16,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
-from slideviz.session.jobs import compute_in_file
+from slideviz.session.jobs import compute_streamed
 from slideviz.session.run_messages import (
     inverted_words,
     limits_words,
@@ -156,9 +156,9 @@ class Running(QObject):
         words = "1 step" if steps == 1 else f"{steps} steps"
         log.info("run: %s, %s, %s", method_words(case), periodic, words)
         case = session.with_chosen_roles(case)
-        if session.in_file:
+        if session.lacks_cells:
             assert output is not None
-            call = self._run_done, compute_in_file, case, session.first, output
+            call = self._run_done, compute_streamed, case, session.first, output
             self.start_job("Starting", *call)
             return
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)

@@ -229,10 +229,10 @@ class MainWindow(Services):
         remarks = () if session.mesh is None else session.mesh.remarks
         for remark in remarks:
             log.warning("%s", remark)
-        if session.in_file:
+        notes = [*remarks, boxes_hint(session)]
+        if session.lacks_cells:
             self.banner.show_message("\n".join(remarks))
-        notes = [] if session.in_file else [*remarks]
-        notes.append(boxes_hint(session))
+            notes = [boxes_hint(session)]
         name = (session.case.source or session.path).name
         self.show_status(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
 
@@ -242,7 +242,7 @@ class MainWindow(Services):
         session = self.store.session
         if isinstance(self.focusWidget(), QLineEdit | QSpinBox):
             self.view.setFocus()  # a field would keep Home, End and Space from the player
-        if not session.in_file or self.runner.busy or run_requirements(session):
+        if not session.lacks_cells or self.runner.busy or run_requirements(session):
             self.running.start_run()
             return
         # The deformed mesh would not fit into memory either.

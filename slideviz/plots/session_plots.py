@@ -346,7 +346,7 @@ def shown_measure(session: Session) -> Quantity:
 
     For a mesh that stays in its file it is size-skew, the only one known of all cells.
     """
-    return quantity_of("size-skew" if session.in_file else session.view.color_by)
+    return quantity_of("size-skew" if session.lacks_cells else session.view.color_by)
 
 
 def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:

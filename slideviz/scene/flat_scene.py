@@ -147,7 +147,7 @@ class FlatScene:
         session = self.session
         mesh = self.session.mesh
         shown = "undeformed" in session.view.drawn and session.view.frame > 0
-        key = (mesh, section) if shown and not session.in_file else ()
+        key = (mesh, section) if shown and not session.lacks_cells else ()
         if key != self._undeformed_of:
             self._undeformed_of = key
             lines = NO_POLYGONS
@@ -170,7 +170,7 @@ class FlatScene:
 
     def _draw_mark(self) -> None:
         assert self.polygons is not None
-        marked = None if self.session.in_file else self.session.view.marked_cell
+        marked = None if self.session.lacks_cells else self.session.view.marked_cell
         mine = np.flatnonzero(self.polygons.cells == marked)
         self._mark.show(self.polygons.take(mine))
 
@@ -202,7 +202,7 @@ class FlatScene:
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None."""
-        if self.polygons is None or not len(self.polygons) or self.session.in_file:
+        if self.polygons is None or not len(self.polygons) or self.session.lacks_cells:
             return None
         shown = [self._shown.actor, *self._instances.drawn.values()]
         cells = self.polygons.cells

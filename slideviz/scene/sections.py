@@ -154,7 +154,7 @@ class SectionLayer(Layer):
             for kind, wanted in _kinds(section, session).items():
                 by_name[f"{kind}{index}"] = wanted, 0, None
                 for number, matrix in neighbours.items():
-                    if not keeps(section, matrix) and not session.in_file:
+                    if not keeps(section, matrix) and not session.lacks_cells:
                         by_name[f"{kind}{index}:{number}"] = wanted, number, matrix
         return by_name
 

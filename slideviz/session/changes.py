@@ -103,7 +103,7 @@ def set_view(session: Session, **values: Any) -> Session:
     if "sections" in values:
         index = selection_after(old.section_index, old.sections, values["sections"])
         values.setdefault("section_index", index)
-    if session.in_file:
+    if session.lacks_cells:
         values.pop("threshold", None)  # needs the values of all cells
     drawn = {name: values.pop(name) for name in SHOWN if name in values}
     return replace(session, view=replace(old.with_drawn(drawn), **values))

@@ -29,7 +29,7 @@ NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the ro
 def not_drawable(session: Session) -> str:
     """Return why the view cannot be colored by what is chosen, or ""."""
     what = session.view.color_by
-    if session.in_file and what in METRICS and not METRICS[what].alone:
+    if session.lacks_cells and what in METRICS and not METRICS[what].alone:
         return (
             f"The {METRICS[what].label} compares neighbouring cells, which stay in the file. The "
             "roles are shown."

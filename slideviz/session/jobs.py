@@ -394,7 +394,7 @@ def _frame_of(
     return frame
 
 
-def compute_in_file(
+def compute_streamed(
     case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
 ) -> None:
     """Deform a mesh from file to file; report the progress, and the last step as a `StepFrame`.

@@ -34,7 +34,7 @@ _REACHES = WeakCache()
 def reach_run(session: Session) -> Run | None:
     """Return the run that is shown, if it is known how far it may go and it is in memory."""
     run = session.run_shown
-    return run if run is not None and run.safe is not None and not session.in_file else None
+    return run if run is not None and run.safe is not None and not session.lacks_cells else None
 
 
 def reach_of(session: Session) -> Reach:

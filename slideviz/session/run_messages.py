@@ -108,7 +108,7 @@ def to_mend(session: Session) -> StepFrame | None:
     None where all its cells are proved valid and above the limit of the case.
     """
     frame = session.deformed or session.first
-    if frame is None or session.in_file:
+    if frame is None or session.lacks_cells:
         return None
     found = frame.quality
     bad = found.inverted + found.unproven or found.min < session.case.repair_below
@@ -219,7 +219,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         requirements.append(Requirement(text, "method"))
-    if session.in_file and case.method == "elastic":
+    if session.lacks_cells and case.method == "elastic":
         text = "Linear elasticity needs all of a mesh in memory, and this one stays in its file."
         requirements.append(Requirement(f"{text} Choose another method.", "method"))
     if not requirements:

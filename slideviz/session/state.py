@@ -150,9 +150,9 @@ class Session:
     newest: int = 0  # the highest number that a run had so far, removed ones too
 
     @property
-    def in_file(self) -> bool:
-        """Return whether only the boundary of the mesh is in memory, and its cells in the file."""
-        return isinstance(self.mesh, Skin)
+    def lacks_cells(self) -> str:
+        """Return why nothing can be done that needs all cells in memory; "" if they are there."""
+        return IN_FILE if isinstance(self.mesh, Skin) else ""
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the session was read from, with words for what each is."""

@@ -48,7 +48,7 @@ def add(stator, section):
 
 def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator, folder, answers):
     session, whole = stator.session, sv.read(folder / "mesh.su2b")
-    assert session.in_file
+    assert session.lacks_cells
     assert len(session.mesh.cells) < len(whole.cells)
     assert f"{len(whole.cells):,} cells" in stator.window.mesh_text.text()
     assert "boundary and sections only" in stator.window.mesh_text.text()
@@ -93,11 +93,11 @@ def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator,
 
 def test_a_small_mesh_and_other_formats_are_opened_whole(driver, folder, tmp_path, monkeypatch):
     driver.open(folder / "stator.cfg")
-    assert not driver.session.in_file
+    assert not driver.session.lacks_cells
     monkeypatch.setattr(large, "LARGE_CELLS", 100)
     write_sample("hexahedron", tmp_path, 8)
     driver.open(tmp_path / "hexahedron.cfg")
-    assert not driver.session.in_file
+    assert not driver.session.lacks_cells
 
 
 def test_little_memory_makes_a_mesh_large(folder, monkeypatch):
@@ -199,7 +199,7 @@ def test_all_zones_of_a_large_mesh_are_opened_and_run(driver, tmp_path, monkeypa
     sv.write(tmp_path / "stage.su2b", whole)
     driver.open(tmp_path / "stage.su2b")
     mesh, table = driver.session.mesh, driver.window.boundaries.table
-    assert driver.session.in_file
+    assert driver.session.lacks_cells
     assert mesh.marker_names == whole.marker_names
     half = len(mesh.markers) // 2
     assert [table.item(row, 0).text() for row in (0, half + 1)] == ["Zone 1", "Zone 2"]

@@ -30,7 +30,7 @@ from slideviz.session import changes
 from slideviz.session.motion_scale import can_scale, factor_of
 from slideviz.session.reach import reach_of, reach_run
 from slideviz.session.run_messages import Requirement
-from slideviz.session.state import IN_FILE, Session
+from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 KINDS = {
@@ -174,8 +174,8 @@ class CurvesPanel(Panel):
         """Return why the session has no plot of a kind; an empty text if it has one."""
         if session.mesh is None:
             return "Open a mesh first. Then this panel shows the curves of its runs."
-        if kind in ("span", "reach", "meridional", "gaps") and session.in_file:
-            return IN_FILE
+        if kind in ("span", "reach", "meridional", "gaps") and session.lacks_cells:
+            return session.lacks_cells
         if kind == "reach" and reach_run(session) is None:
             return "Run the case to see how far its motion may go."
         if kind == "steps" and not curves.step_runs(session):

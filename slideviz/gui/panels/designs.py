@@ -301,8 +301,8 @@ class DesignsPanel(Panel):
     def _sync(self) -> None:
         busy = self.runner.busy
         rows = bool(self.table.rows)
-        in_file = self.store.session.in_file
-        opened = self.store.session.mesh is not None and not in_file
+        lacking = self.store.session.lacks_cells
+        opened = self.store.session.mesh is not None and not lacking
         count = 0 if busy else len(self.table.rows) - len(self._with_valid_results().results)
         self.rows.show_table(self.table, editable=not busy)
         self.plot.show_table(self.table.filled(self.case), self.shown)
@@ -314,7 +314,7 @@ class DesignsPanel(Panel):
             (self.save, rows),
         ):
             widget.setEnabled(able)
-        if in_file:
+        if lacking:
             self._show_status("This mesh stays in its file: sweep it with `slideviz sweep`.")
         self.run.setText(f"Run {counted(count, 'design')}" if count else "Run")
         done = rows and not count
@@ -432,7 +432,7 @@ class DesignsPanel(Panel):
         session = self.store.session
         row = self.table.results.get(number)
         other = session.mesh is not (self.mesh or session.mesh)
-        if session.mesh is None or session.in_file or other:
+        if session.mesh is None or session.lacks_cells or other:
             return
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
@@ -474,7 +474,7 @@ class DesignsPanel(Panel):
     def start(self) -> None:
         session = self.store.session
         table = self._with_valid_results()
-        if self.runner.busy or session.mesh is None or session.in_file:
+        if self.runner.busy or session.mesh is None or session.lacks_cells:
             return
         if len(table.results) == len(table.rows) or not self._confirm_replacing(table):
             return

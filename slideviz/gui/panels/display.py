@@ -31,7 +31,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
 from slideviz.session.passages import Period
-from slideviz.session.state import IN_FILE, Session
+from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import (
     COLOR_BY,
@@ -220,9 +220,9 @@ class DisplayPanel(Panel):
         on = view.threshold is not None
         self.threshold.set_tip(low_high if on else "Switch on “Only cells” to choose a range.")
         self.only.setChecked(view.threshold is not None)
-        if session.in_file:
+        if session.lacks_cells:
             self.only.setEnabled(False)
-        self.only.setToolTip(wrapped(IN_FILE if session.in_file else ONLY))
+        self.only.setToolTip(wrapped(session.lacks_cells or ONLY))
         self.threshold.setEnabled(view.threshold is not None)
         self.threshold.show_value(view.threshold or _worse_half(session))
         self.points.show_value(view.points)

@@ -24,7 +24,7 @@ from slideviz.plots.session_plots import (
 )
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
-from slideviz.session.state import IN_FILE, Session, StepFrame
+from slideviz.session.state import Session, StepFrame
 from slideviz.session.store import Store
 from slideviz.terms import RATED, SIZE_SKEW, WALL_VALUES
 
@@ -183,8 +183,8 @@ class HistogramPanel(Panel):
                 "Open a mesh first. Then this panel shows how many cells have which quality."
             )
             return
-        self.canvas.locked = session.in_file
-        self.canvas.setToolTip(IN_FILE if session.in_file else BRUSH)
+        self.canvas.locked = bool(session.lacks_cells)
+        self.canvas.setToolTip(session.lacks_cells or BRUSH)
         self.area.plot()
         if is_seen(self):
             self._sync_words(session)

@@ -25,7 +25,7 @@ from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes, walls_table
-from slideviz.session.state import IN_FILE, Session
+from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.csv_table import write_csv
 
@@ -203,7 +203,7 @@ class LimitsPanel(Panel):
         self.words.setVisible(not known)
         if not known:
             self._walls_key = ()
-            opened = IN_FILE if session.in_file else "The walls of this mesh are not known."
+            opened = session.lacks_cells or "The walls of this mesh are not known."
             empty = "Open a mesh first. Then this panel has its limits and walls."
             self.words.setText(empty if session.mesh is None else opened)
             return

@@ -51,7 +51,7 @@ from slideviz.session.passages import Period
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import can_cut, first_section
-from slideviz.session.state import IN_FILE, Session
+from slideviz.session.state import Session
 
 STEPS = 1000  # positions of the slider
 FREE = "free"
@@ -425,8 +425,8 @@ class SectionsPanel(Panel):
         self.flat.setChecked(selected is not None and selected.flat)
         self.look.setToolTip(words.look)
         self.look.setVisible(bool(words.look))
-        self.picture.setEnabled(not session.in_file)
-        self.picture.setToolTip(wrapped(IN_FILE) if session.in_file else self._picture_tip)
+        self.picture.setEnabled(not session.lacks_cells)
+        self.picture.setToolTip(wrapped(session.lacks_cells) or self._picture_tip)
 
     # What is wanted --------------------------------------------------------------------
     def _add(self, kind: str, _checked: bool = False) -> None:

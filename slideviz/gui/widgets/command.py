@@ -15,7 +15,7 @@ from slideviz.session import changes
 from slideviz.session.motions import box_names, wheel_passages
 from slideviz.session.panes import choices, panes, show_in
 from slideviz.session.run_messages import to_mend
-from slideviz.session.state import IN_FILE, Session
+from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ def has_wheel(now: CommandState) -> bool:
 
 def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], bool]:
     """Return a condition that holds if ``able`` does and all cells are in memory."""
-    return lambda now: able(now) and not now.session.in_file
+    return lambda now: able(now) and not now.session.lacks_cells
 
 
 def why_not(able: Callable[[CommandState], bool], why: str) -> Callable[[CommandState], str]:
@@ -249,8 +249,7 @@ def why_not(able: Callable[[CommandState], bool], why: str) -> Callable[[Command
     def words(now: CommandState) -> str:
         if able(now):
             return ""
-        if now.session.in_file:
-            return IN_FILE
-        return wait if has_mesh(now) and now.busy else why
+        reason = wait if has_mesh(now) and now.busy else why
+        return now.session.lacks_cells or reason
 
     return words
