@@ -27,7 +27,7 @@ from slideviz.design.checks import (
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
-from slideviz.design.zones import Work, ZoneDesign, over_zones, zone_designs
+from slideviz.design.zone_designs import Work, ZoneDesign, over_zones, zone_designs
 from slideviz.errors import CaseError, DeformError, Note, not_one_of
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
 from slideviz.mesh.model import Assembly, FloatArray, Mesh, largest_coordinate
