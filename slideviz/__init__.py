@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from slideviz.case.motions.onto import Onto
     from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
     from slideviz.case.motions.span import SpanMotion
+    from slideviz.design.blade_gaps import Gap, gaps
     from slideviz.design.deformer import Constraint, Deformer
-    from slideviz.design.gap import Gap, gaps
     from slideviz.design.span_variables import SpanVariables
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.design.wheel import WheelQuality, wheel

@@ -14,7 +14,7 @@ from slideviz.cli.terminal import holding
 from slideviz.errors import CaseError
 
 if TYPE_CHECKING:
-    from slideviz.design.gap import Gap
+    from slideviz.design.blade_gaps import Gap
 
 LISTED = (0.1, 0.3, 0.5, 0.7, 0.9)  # the places that the summary has
 
@@ -92,7 +92,7 @@ def _gap(arguments: argparse.Namespace) -> int:
 def _lines(before: Gap, after: Gap | None) -> str:
     """Return the lines on a gap: its smallest distance, and a table of those by place."""
     from slideviz.cli.report import table
-    from slideviz.design.gap import TOUCHING
+    from slideviz.design.blade_gaps import TOUCHING
 
     measured = [one for one in (before, after) if one is not None]
     words = before.words

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from slideviz.design.gap import TOUCHING, Gap
+from slideviz.design.blade_gaps import TOUCHING, Gap
 from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.case.motion_words import deformation
-from slideviz.design.gap import gaps
+from slideviz.design.blade_gaps import gaps
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE
 from slideviz.plots.gap import Measured

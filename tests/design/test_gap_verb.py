@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.gap import PLACES
+from slideviz.design.blade_gaps import PLACES
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Origin
 from slideviz.plots.gap import draw_gaps
