@@ -13,7 +13,7 @@ from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.case.zone_cases import zone_cases
 from slideviz.errors import CaseError
-from slideviz.machine.gap import (
+from slideviz.machine.smallest_distances import (
     bodies,
     level_lines,
     nearest_on_segments,

@@ -24,7 +24,7 @@ from slideviz.case.values import read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
-from slideviz.machine.gap import bodies
+from slideviz.machine.smallest_distances import bodies
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh

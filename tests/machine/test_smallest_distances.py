@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from slideviz.errors import MeshError
-from slideviz.machine.gap import bodies, level_lines, nearest_on_segments, neighbours, smallest
+from slideviz.machine.smallest_distances import (
+    bodies,
+    level_lines,
+    nearest_on_segments,
+    neighbours,
+    smallest,
+)
 from slideviz.rbf.closest import ClosestPoints
 
 
