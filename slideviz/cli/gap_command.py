@@ -120,7 +120,7 @@ def _lines(before: Gap, after: Gap | None) -> str:
 
 def _draw(path: Path, before: tuple[Gap, ...], after: tuple[Gap, ...]) -> None:
     from slideviz.plots.figure_io import empty_figure, write_figure
-    from slideviz.plots.gap import draw_gaps
+    from slideviz.plots.gap_curves import draw_gaps
     from slideviz.plots.session_plots import UNDEFORMED
 
     plots = len({one.name for one in before})

@@ -13,7 +13,7 @@ from slideviz.case.motion_words import deformation
 from slideviz.design.blade_gaps import gaps
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE
-from slideviz.plots.gap import Measured
+from slideviz.plots.gap_curves import Measured
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_curve import CurveRow, curve_of

@@ -12,7 +12,7 @@ from slideviz.cli import run
 from slideviz.design.blade_gaps import PLACES
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Origin
-from slideviz.plots.gap import draw_gaps
+from slideviz.plots.gap_curves import draw_gaps
 from tests.builders import _renamed, grid, passage, ring, sector, stage
 
 ROLES = {"blade": "moving", "per1": "periodic", "per2": "periodic", "shroud": "sliding"}

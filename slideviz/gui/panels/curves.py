@@ -22,7 +22,7 @@ from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
-from slideviz.plots.gap import draw_gaps
+from slideviz.plots.gap_curves import draw_gaps
 from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
