@@ -10,27 +10,32 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, entries_of, listed, read_text, require_no_mesh
-from slideviz.case.model import Case, with_paths
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 _FEW = 3  # most lines without a key that a file may have and still be a case file
 _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
 
-def read_case(path: Path) -> Case:
-    """Return the case that a file describes; CaseError with a line for each mistake."""
+def read_case(path: Path, start: Case) -> Case:
+    """Return the case that a file describes; CaseError with a line for each mistake.
+
+    ``start``: the case of a file without keys.
+    """
     text, warnings = read_text(path, "case file")
-    case, problems, remarks = _parsed(path, text)
+    case, problems, remarks = _parsed(path, text, start)
     raise_all(listed(path, problems))
-    case = with_paths(case, lambda file: _from_folder(file, path.parent))
+    case = case.with_paths(lambda file: _from_folder(file, path.parent))
     if case.mesh_file is not None and case.mesh_file == case.mesh_out:
         remarks += (
             f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
@@ -46,10 +51,10 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     CaseError if the file cannot be written, or a value of the case has no form in a case file.
     """
     folder = Path(os.path.realpath(path.parent))
-    named = with_paths(case, lambda file: _to_folder(file, folder))
+    named = case.with_paths(lambda file: _to_folder(file, folder))
     text = "".join(f"% {remark}\n" for remark in remarks) + _text(named, path)
     # Whatever is saved can be opened again: better no file than one with mistakes.
-    again, problems, _ = _parsed(path, text)
+    again, problems, _ = _parsed(path, text, type(case)())
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:
         problems = [Message("a case file cannot hold some of its values; check points and motions")]
     raise_all(f"{path}: cannot be written: {problem}" for problem in problems)
@@ -86,8 +91,11 @@ def set_key(case: Case, key: str, value: str, option: str = "--set") -> Case:
     return changed
 
 
-def _parsed(path: Path, text: str) -> tuple[Case, list[Message], tuple[str, ...]]:
-    """Return the case of a text, its problems, and warnings; ``path`` is for messages only."""
+def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tuple[str, ...]]:
+    """Return the case of a text, its problems, and warnings; ``path`` is for messages only.
+
+    ``case``: that of a text without keys.
+    """
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
     names = {entry.key for entry in entries}
@@ -112,7 +120,6 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Message], tuple[str, ...]
             problems.append(Message(rule, line=entry.line))
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
-    case = Case()
     values = dict[str, Any]()
     remarks = list[str]()
     for name, key in KEYS.items():

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from slideviz.case.fields import CaseFields
 from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
-from slideviz.case.model import Case
 from slideviz.case.values import POINT, Kind
 from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
 from slideviz.errors import CaseError, Message, shown
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
@@ -64,7 +67,7 @@ def _integers(words: list[Word], least: int) -> Degrees:
 
 def _said_where_needed(row: Key) -> Key:
     """Return the row of a key, changed so that a file has the key only where it has an effect."""
-    usual = getattr(Case(), row.field)
+    usual = getattr(CaseFields(), row.field)
     needs_boxes = row.idle_reason is _without_definition
 
     def get(case: Case) -> Any:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from slideviz.case.model import Case
+from slideviz.case.fields import CaseFields
 from slideviz.case.values import YES_NO, Kind, one_of
 from slideviz.terms import METHODS, ROLES, Method, Role
 
-Put = Callable[[Case, Any], Case]
-Get = Callable[[Case], Any]
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+
+Put = Callable[["Case", Any], "Case"]
+Get = Callable[["Case"], Any]
 Form = Literal["main", "more"]
 NO_DEFAULT = "not set"
 FILES = "Files"
@@ -84,7 +87,7 @@ def setting(
     """Return the row of a key whose value is a field of ``Case``, as `field_row`."""
     field = field or name.lower()
     return field_row(
-        Case(),
+        CaseFields(),
         group,
         name,
         meaning,

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from slideviz.case.ffd_keys import FFD_ROWS
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, PERIODICITY, QUALITY, Key, role, setting
 from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
-from slideviz.case.model import Case
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.motions.file import FromFile
 from slideviz.case.values import (
@@ -33,6 +33,9 @@ from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.terms import PERIODIC_DIRECTIONS, PERIODIC_TYPES
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 
 def no_pair(case: Case) -> str:

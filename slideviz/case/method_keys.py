@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from slideviz import terms
 from slideviz.case.key import METHOD, REDUCTION, Key, field_row, other_method, setting
-from slideviz.case.model import Case
 from slideviz.case.values import MAX_STEPS, YES_NO, Kind, integer, one_of, real
 from slideviz.case.words import number
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 
 def _why_no_reduction(case: Case) -> str:

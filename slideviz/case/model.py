@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from slideviz import terms
-from slideviz.argument_types import CheckedFields, check_types
-from slideviz.case.limits import Limit, read_limits
-from slideviz.case.motions.motion import Motion
-from slideviz.errors import CaseError, nearest, not_one_of, raise_all
-from slideviz.formats.table import FILE_FORMATS
-from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG
-from slideviz.rbf.reduction import AUTO, Reduction
+from slideviz.argument_types import check_types
+from slideviz.case.cfg import read_case, write_case
+from slideviz.case.check import key_problems
+from slideviz.case.fields import CaseFields
+from slideviz.errors import CaseError, nearest, raise_all
 
 _NUMBERS = (
     "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
@@ -22,24 +20,13 @@ _NUMBERS = (
     "idw_fixed_weight", "deform_coeff",
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
-_ROLES = 'a role for each marker, e.g. {"blade": "moving"}'
-
-
-def with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
-    """Return the case with changed paths of its meshes and of the files of its motions."""
-    return case.change(
-        mesh_file=change(case.mesh_file) if case.mesh_file else None,
-        mesh_out=change(case.mesh_out) if case.mesh_out else None,
-        motions=tuple(motion.with_files(change) for motion in case.motions),
-    )
-
 
 NEW: dict[str, Any] = {"rims": "slide", "relax": "auto", "layers": "auto", "repair": "auto"}
 """Settings of new cases where those of a file without their keys are others, for its results."""
 
 
 @dataclass(frozen=True)
-class Case(CheckedFields):
+class Case(CaseFields):
     """A deformation case, the content of a ``.cfg`` file.
 
     Markers of the mesh that are not in ``roles`` are fixed. Paths are absolute, or relative to the
@@ -85,75 +72,12 @@ class Case(CheckedFields):
     5
     """
 
-    mesh_file: Path | None = None
-    mesh_out: Path | None = None
-    mesh_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
-    mesh_out_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
-    zone: int | None = None
-    roles: Annotated[Mapping[str, terms.Role], _ROLES] = field(default_factory=dict)
-    motions: Annotated[tuple[Motion, ...], "a tuple of motions, e.g. Translate(...)"] = ()
-    interfaces: tuple[str, ...] = ()
     zone_settings: tuple[Case, ...] = ()
-    ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    ffd_degrees: tuple[tuple[int, int, int], ...] = ()
-    ffd_blending: terms.FfdBlending = field(default="BEZIER", metadata=terms.FFD_BLENDINGS)
-    ffd_orders: tuple[int, int, int] = (2, 2, 2)
-    ffd_system: terms.FfdSystem = field(default="CARTESIAN", metadata=terms.FFD_SYSTEMS)
-    ffd_axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    method: terms.Method = field(default="rbf", metadata=terms.METHODS)
-    sliding: terms.Sliding = field(default="none", metadata=terms.SLIDING)
-    rims: terms.Rims = field(default="free", metadata=terms.RIMS)
-    periodic: terms.PeriodicMode = field(default="none", metadata=terms.PERIODIC_MODES)
-    periodic_type: terms.PeriodicType = field(default="auto", metadata=terms.PERIODIC_TYPES)
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    direction: int | None = None
-    span: tuple[str, str] | None = None
-    feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
-    curved: bool = False
-    steps: Annotated[int, 'a whole number, or "auto"'] = 1
-    steps_gain: float = 0.02
-    influence_factor: Annotated[float, 'a number, or "auto"'] = 0.0
-    support_radius: float | None = None
-    kernel: str = field(default="wendland-c2", metadata=terms.KERNELS)
-    reduction: Reduction | None = AUTO
-    polynomial: terms.Polynomial = field(default="auto", metadata=terms.POLYNOMIALS)
-    relax: terms.Relax = field(default="no", metadata=terms.RELAXES)
-    layers: terms.Layers = field(default="no", metadata=terms.LAYERS)
-    layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0
-    repair: terms.Repair = field(default="no", metadata=terms.REPAIRS)
-    repair_below: float = 0.1
-    repair_steps: bool = False
-    idw_power: float | None = None
-    idw_fixed_weight: float = 1.0
-    deform_stiffness_type: terms.StiffnessType = field(
-        default="INVERSE_VOLUME", metadata=terms.STIFFNESS_TYPES
-    )
-    deform_coeff: float = 0.3
-    quality_metric: terms.SkewMetric = field(default="knupp", metadata=terms.SKEW_METRICS)
-    generate_quality: bool = True
-    limits: Annotated[tuple[Limit, ...], 'limits, or a text as "min > 0.3, inverted = 0"'] = ()
-    source: Path | None = None
-    view: Mapping[str, Any] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("steps", "influence_factor", "layer_thickness"):
-            if str(getattr(self, name)).lower() == "auto":  # as in a case file
-                object.__setattr__(self, name, 0)
-        if isinstance(self.limits, str):
-            object.__setattr__(self, "limits", read_limits(self.limits))
         super().__post_init__()
-        for marker, role in self.roles.items():
-            if role not in terms.ROLES:
-                raise CaseError(f"roles: {marker!r}: {not_one_of(role, terms.ROLES)}")
-        for name in ("mesh_file", "mesh_out", "source"):
-            if (path := getattr(self, name)) is not None:
-                object.__setattr__(self, name, Path(path))
         usual = self.__dataclass_fields__
         if any(getattr(self, name) is not usual[name].default for name in _NUMBERS):
-            from slideviz.case.check import key_problems
-
             raise_all(key_problems(self))
 
     def change(self, **values: Any) -> Case:
@@ -193,6 +117,14 @@ class Case(CheckedFields):
         files = (path for motion in self.motions for path in motion.files)
         return inputs | dict.fromkeys(files, "a file of a motion")
 
+    def with_paths(self, change: Callable[[Path], Path]) -> Case:
+        """Return the case with changed paths of its meshes and of the files of its motions."""
+        return self.change(
+            mesh_file=change(self.mesh_file) if self.mesh_file else None,
+            mesh_out=change(self.mesh_out) if self.mesh_out else None,
+            motions=tuple(motion.with_files(change) for motion in self.motions),
+        )
+
     @classmethod
     @check_types
     def read(cls, path: str | Path) -> Case:
@@ -201,13 +133,9 @@ class Case(CheckedFields):
         Raises CaseError if the file cannot be read, or has mistakes: all of them, each with its
         line.
         """
-        from slideviz.case.cfg import read_case
-
-        return read_case(Path(path))
+        return read_case(Path(path), cls())
 
     @check_types
     def write(self, path: str | Path) -> None:
         """Write the ``.cfg`` file, with paths relative to its folder."""
-        from slideviz.case.cfg import write_case
-
         write_case(Path(path), self)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, Target, named
 from slideviz.mesh.model import Mesh, Skin
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 MOST_NAMED = 4  # most markers of a motion whose names are all in its words
 

@@ -6,17 +6,19 @@ Their values are in ``Case.view``, by key; `slideviz.session.saving` makes a vie
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.case.key import VIEW, Key
-from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.case.values import NAMES, Kind, choice, integer, vector_text
 from slideviz.case.words import list_of, number
 from slideviz.errors import CaseError, shown
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 HIDDEN = "hidden"  # the last word of a section that is not drawn
 

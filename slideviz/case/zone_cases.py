@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.motions.onto import Onto
 from slideviz.case.words import first_of
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import Assembly, Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 
 def with_marker_names(case: Case, mesh: Mesh) -> Case:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, with_paths
+from slideviz.case.model import Case
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
@@ -232,4 +232,4 @@ def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
     """Return the case of the sample ``name``, with files in a folder, meshes of ``ending``."""
     mesh = folder / f"mesh.{ending}"
     out = folder / f"{name}_deformed.{ending}"
-    return with_paths(case, folder.joinpath).change(mesh_file=mesh, mesh_out=out)
+    return case.with_paths(folder.joinpath).change(mesh_file=mesh, mesh_out=out)

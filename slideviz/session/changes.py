@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from slideviz.case.model import Case, with_paths
+from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motion_scale import scaled
@@ -346,7 +346,7 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
     def there(case: Case) -> Case:
         file = case.mesh_file
         out = case.mesh_out
-        case = with_paths(case, lambda path: moved.get(path, path))
+        case = case.with_paths(lambda path: moved.get(path, path))
         if file and out and file in moved and out.parent == file.parent:
             new = moved[file]
             case = case.change(mesh_out=new.with_name(f"{new.stem}_deformed{out.suffix}"))

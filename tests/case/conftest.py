@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.cfg import read_case
 from slideviz.case.model import Case
 from slideviz.mesh.model import Cells, Marker, Mesh
 
@@ -51,6 +50,6 @@ def read(tmp_path):
     def read(text: str | bytes) -> Case:
         path: Path = tmp_path / "a.cfg"
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_case(path)
+        return Case.read(path)
 
     return read

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.cfg import read_case
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 
@@ -139,7 +138,7 @@ def test_missing_file_and_folder(tmp_path):
     with pytest.raises(CaseError, match=r"no\.cfg: there is no such case file; check name"):
         Case.read(tmp_path / "no.cfg")
     with pytest.raises(CaseError, match=r"is a folder; expected a case file"):
-        read_case(tmp_path)
+        Case.read(tmp_path)
 
 
 def test_unreadable_file(tmp_path, monkeypatch):
@@ -148,7 +147,7 @@ def test_unreadable_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "read_bytes", fail)
     with pytest.raises(CaseError, match=r"a\.cfg: cannot be read: Permission denied"):
-        read_case(tmp_path / "a.cfg")
+        Case.read(tmp_path / "a.cfg")
 
 
 def test_all_problems_at_once_in_order(read):

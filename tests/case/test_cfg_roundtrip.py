@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from slideviz.case.cfg import read_case, write_case
+from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.case.motion import displacement_of
 from slideviz.case.motion_text import read_motions, write_motions
@@ -135,7 +135,7 @@ def test_read_gives_back_what_was_written(data, tmp_path):
     (tmp_path / folder).mkdir(parents=True, exist_ok=True)
     path = tmp_path / folder / "a.cfg"
     write_case(path, case)
-    again = read_case(path)
+    again = Case.read(path)
     assert repr(again.change(source=None, warnings=(), roles={})) == repr(case.change(roles={}))
     assert again.roles == case.roles
     assert [again.markers_with(role) for role in ROLES] == [
@@ -168,14 +168,14 @@ def test_paths_are_written_relative_and_survive_a_move(tmp_path):
     write_case(tmp_path / "old" / "cases" / "a.cfg", Case(mesh_file=mesh))
     assert "MESH_FILENAME= ../meshes/wing.su2\n" in (tmp_path / "old/cases/a.cfg").read_text()
     (tmp_path / "old").rename(tmp_path / "new")
-    assert read_case(tmp_path / "new/cases/a.cfg").mesh_file == tmp_path / "new/meshes/wing.su2"
+    assert Case.read(tmp_path / "new/cases/a.cfg").mesh_file == tmp_path / "new/meshes/wing.su2"
 
 
 def test_files_far_away_are_written_with_their_full_path(tmp_path):
     mesh = Path("/nowhere/near/wing.su2")
     write_case(tmp_path / "a.cfg", Case(mesh_file=mesh))
     assert "MESH_FILENAME= /nowhere/near/wing.su2\n" in (tmp_path / "a.cfg").read_text()
-    assert read_case(tmp_path / "a.cfg").mesh_file == mesh
+    assert Case.read(tmp_path / "a.cfg").mesh_file == mesh
 
 
 def test_paths_relative_to_the_current_folder(tmp_path, monkeypatch):
@@ -183,7 +183,7 @@ def test_paths_relative_to_the_current_folder(tmp_path, monkeypatch):
     (tmp_path / "sub").mkdir()
     write_case(Path("sub/a.cfg"), Case(mesh_file=Path("wing.su2")))
     assert "MESH_FILENAME= ../wing.su2\n" in Path("sub/a.cfg").read_text()
-    assert read_case(Path("sub/a.cfg")).mesh_file == Path("wing.su2")
+    assert Case.read(Path("sub/a.cfg")).mesh_file == Path("wing.su2")
 
 
 def test_links_lead_to_the_right_file(tmp_path):
@@ -194,7 +194,7 @@ def test_links_lead_to_the_right_file(tmp_path):
     for file in (mesh, decoy):
         file.write_text(file.as_posix())
     write_case(tmp_path / "link" / "a.cfg", Case(mesh_file=mesh, mesh_out=decoy))
-    case = read_case(tmp_path / "link" / "a.cfg")
+    case = Case.read(tmp_path / "link" / "a.cfg")
     assert case.mesh_file is not None
     assert case.mesh_out is not None
     assert case.mesh_file.read_text() == mesh.as_posix()

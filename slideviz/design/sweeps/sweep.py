@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.argument_types import check_types
-from slideviz.case.model import Case, with_paths
+from slideviz.case.model import Case
 from slideviz.case.motions.box import box_motions
 from slideviz.design.sweeps.processes import (
     Packed,
@@ -225,7 +225,7 @@ class _Tasks:
             output = self._folder / f"{name}{ending}"
         return Task(
             design.number,
-            with_paths(case, Path.absolute).change(view={}, warnings=()),
+            case.with_paths(Path.absolute).change(view={}, warnings=()),
             self.packed.name,
             packed=self.packed if with_mesh else None,
             output=output,
