@@ -14,9 +14,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.mesh import topology
 from slideviz.mesh.fans import Fans
 from slideviz.mesh.model import FloatArray, IntArray, ranges
-from slideviz.mesh.topology import Boundary, unit
+from slideviz.mesh.topology import Boundary
+from slideviz.rbf.tape import (
+    Array,
+    dot,
+    gather,
+    join,
+    multiply,
+    put,
+    recorded,
+    take,
+    unit,
+    value,
+)
 from slideviz.system.jit_cache import njit
 
 RANK_TOLERANCE = 0.02
@@ -201,7 +214,7 @@ def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
     dim = normals.shape[1]
     means = np.zeros((int(group[-1]) + 1, int(label.max()) + 1, dim))
     np.add.at(means, (group, label), normals)
-    means = unit(means)
+    means = topology.unit(means)
     opposite = (means @ means.swapaxes(1, 2)).min(axis=(1, 2)) < -1.0 + 1e-4
     found = np.sum(np.linalg.svd(means, compute_uv=False) > RANK_TOLERANCE, axis=1)
     return np.where(opposite, dim, found)
@@ -373,7 +386,7 @@ def _collect(
     )
 
 
-def directions(classes: Classes, normals: FloatArray) -> tuple[IntArray, FloatArray]:
+def directions(classes: Classes, normals: Array) -> tuple[IntArray, Array]:
     """Return the constraints of the sliding nodes: nodes (q,) and unit directions (q, d).
 
     The directions of one node are orthonormal and span the normals of its clusters. Periodic
@@ -381,17 +394,51 @@ def directions(classes: Classes, normals: FloatArray) -> tuple[IntArray, FloatAr
     the periodic boundary.
     ``normals`` (m, d): of all fans, in the working frame.
     """
-    total = np.zeros((len(classes.cluster_node), normals.shape[1]))
-    np.add.at(total, classes.row_cluster, normals[classes.row_fan])
-    total = unit(total)
     node = classes.cluster_node
+    total = unit(gather(take(normals, classes.row_fan), classes.row_cluster, len(node)))
     _, starts, size = np.unique(node, return_index=True, return_counts=True)
     first = starts[size == 2]
-    share = np.einsum("pd,pd->p", total[first + 1], total[first])
-    total[first + 1] = unit(total[first + 1] - share[:, None] * total[first])
+    if len(first):
+        one = take(total, first)
+        two = take(total, first + 1)
+        total = put(total, first + 1, unit(two - multiply(one, dot(two, one))))
     keep = np.ones(len(node), bool)
-    for start, count in zip(starts[size > 2], size[size > 2], strict=True):
-        # More than two normals of rank 2: the two leading right singular vectors.
-        total[start : start + 2] = np.linalg.svd(total[start : start + count])[2][:2]
+    several = size > 2
+    leading = []
+    for start, count in zip(starts[several].tolist(), size[several].tolist(), strict=True):
+        leading.append(_leading(take(total, np.arange(start, start + count))))
         keep[start + 2 : start + count] = False
-    return node[keep], total[keep]
+    if leading:
+        rows = np.add.outer(starts[several], np.arange(2)).ravel()
+        total = put(total, rows, join(*leading))
+    return node[keep], take(total, np.flatnonzero(keep))
+
+
+def _leading(rows: Array) -> Array:
+    """Return the two leading right singular vectors of rows (k, 3) of rank 2.
+
+    The derivative does not contain their rotation within the plane that they span: no result
+    depends on it.
+    """
+    a = value(rows)
+    vectors = np.linalg.svd(a)[2]
+    sizes = np.zeros(3)
+    found = np.linalg.svd(a, compute_uv=False)
+    sizes[: len(found)] = found**2
+    lead = vectors[:2]
+    rest = vectors[2]
+    gap = 1.0 / (sizes[:2] - sizes[2])
+
+    def there(t: FloatArray) -> FloatArray:
+        change = np.einsum("...kd,ke->...de", t, a)
+        change = change + np.swapaxes(change, -1, -2)
+        off = np.einsum("d,...de,ie->...i", rest, change, lead) * gap
+        return off[..., None] * rest
+
+    def back(g: FloatArray) -> FloatArray:
+        off = (g @ rest) * gap
+        change = np.einsum("...i,d,ie->...de", off, rest, lead)
+        change = change + np.swapaxes(change, -1, -2)
+        return np.einsum("...de,ke->...kd", change, a)
+
+    return recorded(lead, (rows, there, back))

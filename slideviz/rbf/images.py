@@ -22,6 +22,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.constraint_rows import refuse
 from slideviz.rbf.frames import Frame
+from slideviz.rbf.tape import value
 
 COINCIDENT = 1e-12  # nodes nearer than this part of the mesh's extent are in one place
 
@@ -119,7 +120,7 @@ def require_free(
     held = classes.fixed[np.isin(classes.fixed, nodes)]
     off[held] = np.abs(spread.at(held)).max(axis=1, initial=0.0)
     rows, across = directions(classes, normals)
-    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", spread.at(rows), across)))
+    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", spread.at(rows), value(across))))
     worst = int(nodes[np.argmax(off[nodes])])
     if off[worst] > allowed:
         refuse(worst, int(spread.source(np.array([worst]))[0]), float(off[worst]))

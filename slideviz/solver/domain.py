@@ -21,6 +21,7 @@ from slideviz.rbf.classify import Classes, classify, directions, fan_roles
 from slideviz.rbf.frames import Frame, hold_on_axis, make_frame, on_axis
 from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.images import COINCIDENT, find_images
+from slideviz.rbf.tape import value
 from slideviz.terms import Role
 
 
@@ -73,6 +74,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
     classes = find_classes(case, mesh, boundary, fans, frame, representative)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    sliding, along = directions(classes, normals)
     second = np.flatnonzero(representative != np.arange(len(representative)))
     images = np.stack([representative[second], second], axis=1)
     return Domain(
@@ -86,7 +88,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         axis=axis,
         normals=normals,
         classes=replace(classes, beyond=0 if mesh.halo is None else len(mesh.halo.outer)),
-        held=hold_on_axis(*directions(classes, normals), axis)[2],
+        held=hold_on_axis(sliding, value(along), axis)[2],
         images=images,
         same_as=_coinciding(mesh, boundary.nodes, images),
         halo=mesh.halo,

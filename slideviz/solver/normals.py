@@ -9,13 +9,13 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import TINY
+from slideviz.rbf.classify import directions
 from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.tape import (
     Array,
     Variable,
     add,
     cross,
-    dot,
     function,
     gather,
     inverse,
@@ -42,24 +42,12 @@ def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
     nodes, at = setup.constraints(value(coords))
     if not (setup.tracks.curved and isinstance(coords, Variable)) or not len(nodes):
         return nodes, at
-    directions = _directions(setup, _fan_normals(setup, coords))
-    owner = _owners(setup)
-    once = setup.once(owner)
+    owner, along = directions(setup.classes, _fan_normals(setup, coords))
     # Nodes on the axis have directions of their own, which do not turn.
-    turning = once & ~setup.axis[owner]
-    found = take(directions, np.flatnonzero(turning))
+    turning = setup.once(owner) & ~setup.axis[owner]
+    found = take(along, np.flatnonzero(turning))
     count = len(value(found))
     return nodes, join(found, at[count:]) if count < len(at) else found
-
-
-def _owners(setup: Setup) -> IntArray:
-    """Return the node of each direction that ``_directions`` returns."""
-    node = setup.classes.cluster_node
-    _, starts, size = np.unique(node, return_index=True, return_counts=True)
-    keep = np.ones(len(node), bool)
-    for start, count in zip(starts[size > 2], size[size > 2], strict=True):
-        keep[start + 2 : start + count] = False
-    return node[keep]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,52 +127,3 @@ def _fan_normals(setup: Setup, coords: Array) -> Array:
     near = inverse(function(gap, np.maximum(size, TINY), (size > TINY).astype(float)))
     weighted = multiply(take(unit(vectors), fans.facet), near)
     return unit(gather(weighted, fans.fan, len(fans.fan_node)))
-
-
-def _directions(setup: Setup, normals: Array) -> Array:
-    """Return the directions (q, d) that ``slideviz.rbf.classify.directions`` does, on a tape."""
-    classes = setup.classes
-    node = classes.cluster_node
-    total = unit(gather(take(normals, classes.row_fan), classes.row_cluster, len(node)))
-    _, starts, size = np.unique(node, return_index=True, return_counts=True)
-    first = starts[size == 2]
-    if len(first):
-        one = take(total, first)
-        two = take(total, first + 1)
-        total = put(total, first + 1, unit(two - multiply(one, dot(two, one))))
-    keep = np.ones(len(node), bool)
-    for start, count in zip(starts[size > 2].tolist(), size[size > 2].tolist(), strict=True):
-        rows = np.arange(start, start + count)
-        total = put(total, rows[:2], _leading(take(total, rows)))
-        keep[start + 2 : start + count] = False
-    return take(total, np.flatnonzero(keep))
-
-
-def _leading(rows: Array) -> Array:
-    """Return the two leading right singular vectors of rows (k, 3) of rank 2.
-
-    The derivative does not contain their rotation within the plane that they span: no result
-    depends on it.
-    """
-    a = value(rows)
-    vectors = np.linalg.svd(a)[2]
-    sizes = np.zeros(3)
-    found = np.linalg.svd(a, compute_uv=False)
-    sizes[: len(found)] = found**2
-    lead = vectors[:2]
-    rest = vectors[2]
-    gap = 1.0 / (sizes[:2] - sizes[2])
-
-    def there(t: FloatArray) -> FloatArray:
-        change = np.einsum("...kd,ke->...de", t, a)
-        change = change + np.swapaxes(change, -1, -2)
-        off = np.einsum("d,...de,ie->...i", rest, change, lead) * gap
-        return off[..., None] * rest
-
-    def back(g: FloatArray) -> FloatArray:
-        off = (g @ rest) * gap
-        change = np.einsum("...i,d,ie->...de", off, rest, lead)
-        change = change + np.swapaxes(change, -1, -2)
-        return np.einsum("...de,ke->...kd", change, a)
-
-    return recorded(lead, (rows, there, back))

@@ -31,7 +31,7 @@ from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.rims import Keep, Rims
-from slideviz.rbf.tape import Array, multiply, put, take
+from slideviz.rbf.tape import Array, multiply, put, take, value
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.layers import layer_zone, thickness_warnings
 from slideviz.solver.prepare import Prepared
@@ -219,7 +219,7 @@ class Setup(Domain):
         normals_of_fans = self.normals_at(coords) if self.tracks.curved else self.normals
         nodes, normals = directions(self.classes, normals_of_fans)
         once = self.once(nodes)
-        return hold_on_axis(nodes[once], normals[once], self.axis)[:2]
+        return hold_on_axis(nodes[once], value(normals)[once], self.axis)[:2]
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
         """Return the displacements (m, d) after which nodes are on their edge or surface.
