@@ -12,8 +12,8 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
 from slideviz.case.motions.rigid import Rotate, Translate
+from slideviz.case.moving_nodes import displacements
 from slideviz.cli import run as command
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.case.model import Case
-from slideviz.case.motion import ROUNDING
+from slideviz.case.moving_nodes import ROUNDING
 from slideviz.case.words import counted, wrong_by
 from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep, StepState

@@ -12,8 +12,8 @@ from slideviz.argument_types import check_types
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case
-from slideviz.case.motion import moving_nodes
 from slideviz.case.motions.rigid import Translate
+from slideviz.case.moving_nodes import moving_nodes
 from slideviz.design.checks import (
     Checks,
     facets_of,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.motion import ROUNDING
+from slideviz.case.moving_nodes import ROUNDING
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE

@@ -8,8 +8,8 @@ import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
 from slideviz.case.motions.span import SpanMotion, blades_of
+from slideviz.case.moving_nodes import displacements
 from slideviz.design.sweeps.columns import numbers_of
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh

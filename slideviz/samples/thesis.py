@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import displacement_of
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import Motion
 from slideviz.case.motions.rigid import Rotate, Translate
+from slideviz.case.moving_nodes import displacement_of
 from slideviz.errors import CaseError
 from slideviz.formats.table import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh

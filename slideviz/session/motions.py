@@ -15,11 +15,11 @@ from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements, moved_together, placed_displacements
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.kinds import IN_ZONES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
 from slideviz.case.motions.onto import Onto, is_laid
+from slideviz.case.moving_nodes import displacements, moved_together, placed_displacements
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair

@@ -14,7 +14,7 @@ from functools import reduce
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import ROUNDING
+from slideviz.case.moving_nodes import ROUNDING
 from slideviz.case.spans import span_ends
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution

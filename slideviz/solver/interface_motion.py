@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import moving_nodes
 from slideviz.case.motions.file import Prescribed
+from slideviz.case.moving_nodes import moving_nodes
 from slideviz.errors import Message, SlidevizError
 from slideviz.mesh.interfaces import (
     ROUNDING,

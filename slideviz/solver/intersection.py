@@ -9,7 +9,7 @@ from math import ceil, floor, pi
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import moving_nodes
+from slideviz.case.moving_nodes import moving_nodes
 from slideviz.errors import CaseError, Message
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of

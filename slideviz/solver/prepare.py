@@ -7,7 +7,7 @@ from functools import cached_property
 
 from slideviz.case.check import check_case
 from slideviz.case.model import Case
-from slideviz.case.motion import by_zone
+from slideviz.case.moving_nodes import by_zone
 from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.errors import raise_all
 from slideviz.mesh.model import Mesh

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import ROUNDING, moving_nodes, same
+from slideviz.case.moving_nodes import ROUNDING, moving_nodes, same
 from slideviz.errors import CaseError, DeformError, Message
 from slideviz.mesh.fans import components
 from slideviz.mesh.halo import without_halo

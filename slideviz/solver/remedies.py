@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motion import by_zone, displacements
+from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin

@@ -8,10 +8,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import motion_problems
-from slideviz.case.motion import displacements
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.motions.onto import is_laid
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError
 from tests.builders import airfoil, cube, sphere_in_box, square
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
-from slideviz.case.motion import displacement_of
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
+from slideviz.case.moving_nodes import displacement_of
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS

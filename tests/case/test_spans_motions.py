@@ -8,7 +8,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import check_case
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.case.spans import span_field
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import pair_up

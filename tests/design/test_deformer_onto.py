@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.samples.stator import stator_mesh
 from tests.builders import airfoil
 from tests.machine.test_onto import blade, reshaped, stator_onto, write_target

@@ -219,7 +219,7 @@ def test_rotation_in_3d_turns_about_its_line(here):
     Path("a.cfg").write_text("MESH_FILENAME= mesh.su2\n" + text)
     found = make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
     motion = sv.Rotate("", 40.0, (1.0, 2.0, 3.0), (1.0, -1.0, 1.0))
-    from slideviz.case.motion import displacement_of
+    from slideviz.case.moving_nodes import displacement_of
 
     expected = displacement_of([motion], found.mesh.points[found.nodes])
     np.testing.assert_allclose(found.displacement, expected, atol=1e-13)

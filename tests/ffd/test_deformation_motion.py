@@ -5,7 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import check_case
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes

@@ -7,9 +7,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.check import check_case
-from slideviz.case.motion import displacements
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.moving_nodes import displacements
 from slideviz.design.sweeps.columns import numbers_of
 from slideviz.design.sweeps.results import sources_of
 from slideviz.errors import CaseError

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.mesh.topology import facet_vectors
 from slideviz.samples.stator import CHORD, LEADING_EDGE, RADII, STACK, stator_case, stator_mesh
 from tests.builders import airfoil, sphere_in_box

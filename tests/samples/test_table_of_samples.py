@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.samples.passage import passage_mesh, smooth

@@ -8,11 +8,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
 from slideviz.case.motions import span as span_motions
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Translate
 from slideviz.case.motions.span import SpanMotion
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError, DeformError
 from slideviz.machine import span
 from slideviz.mesh.quality import quality

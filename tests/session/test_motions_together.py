@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from slideviz.case.check import check_case
 from slideviz.case.model import Case
-from slideviz.case.motion import by_zone, displacements
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import NewMotion, applies_to, named
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
+from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.zone_cases import zone_cases
 from slideviz.mesh.quality import quality
 from slideviz.mesh.zones import zones_of

@@ -5,9 +5,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.rigid import Rotate, Translate
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality

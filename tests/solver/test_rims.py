@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.cli import run
 from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.zones import join_zones

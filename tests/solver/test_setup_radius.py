@@ -5,7 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.keys import KEYS
-from slideviz.case.motion import displacements
+from slideviz.case.moving_nodes import displacements
 from slideviz.errors import ArgumentError
 from slideviz.solver.prepare import prepare
 from slideviz.solver.prescribed import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies

@@ -11,14 +11,14 @@ from hypothesis.extra.numpy import arrays
 
 from slideviz.case.check import contradictions
 from slideviz.case.model import Case
-from slideviz.case.motion import (
+from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.moving_nodes import (
     displacement_of,
     displacements,
     moved_together,
     required_displacements,
 )
-from slideviz.case.motions.file import FromFile
-from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.errors import CaseError
 
 coordinate = st.floats(-1e3, 1e3)
