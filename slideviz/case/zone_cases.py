@@ -86,8 +86,8 @@ def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...
     """Return the case of each zone of a mesh: its roles and motions, named as in the file.
 
     Raises CaseError if a motion of several zones together (`of_several_zones`) is to be
-    ``computed``: `slideviz.case.moving_nodes.by_zone` makes one of each zone. One that lays boundaries of
-    several zones onto one target is always refused.
+    ``computed``: `slideviz.case.moving_nodes.by_zone` makes one for each zone. One that lays
+    boundaries of several zones onto one target is always refused.
     """
     case = with_marker_names(case, mesh)
     if not isinstance(mesh, Assembly):

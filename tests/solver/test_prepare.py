@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 import slideviz as sv
-from slideviz.case import check, motion
+from slideviz.case import check, moving_nodes
 from slideviz.errors import CaseError
 from slideviz.mesh.zones import zones_of
 from slideviz.solver.prepare import prepare
@@ -23,7 +23,7 @@ def walked(monkeypatch):
         return original(case, mesh)
 
     monkeypatch.setattr(check, "motion_problems", counted)
-    monkeypatch.setattr(motion, "motion_problems", counted)
+    monkeypatch.setattr(moving_nodes, "motion_problems", counted)
     return counts
 
 
