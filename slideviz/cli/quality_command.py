@@ -143,15 +143,14 @@ def _report(
 def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
     """Return the boundaries without those that match and whose names say that they are periodic.
 
-    None, which means all, if there are none such or the mesh is in a file.
+    None, which means all, if there are none such.
     """
-    from slideviz.mesh.model import Skin
     from slideviz.mesh.periodic import find_pairs
     from slideviz.session.opening import guess_by_name
 
     guesses = {name: guess_by_name(name) for name in mesh.marker_names}
     hinted = {name for name, guess in guesses.items() if guess and guess.role == "periodic"}
-    if isinstance(mesh, Skin) or not hinted:
+    if not hinted:
         return None
     try:
         pairs = find_pairs(mesh)
@@ -164,10 +163,7 @@ def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
 def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> Walls | None:
     """Return the layers at the boundaries ``names`` of a mesh; None for one in a file."""
     from slideviz import walls
-    from slideviz.mesh.model import Skin
 
-    if isinstance(mesh, Skin):
-        return None
     try:
         return walls(mesh, reference, names)
     except MeshError:  # of a mesh with a mistake the quality is of use still

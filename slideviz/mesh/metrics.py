@@ -159,6 +159,11 @@ def metric_name(text: str) -> Metric:
     raise CaseError(f"metric: {not_one_of(text, METRICS)}")
 
 
+def is_known(mesh: Mesh, name: Metric) -> bool:
+    """Return whether a metric can be measured: not if it compares cells that stay in a file."""
+    return METRICS[name].alone or not isinstance(mesh, Skin)
+
+
 def rated_metric(
     mesh: Mesh, name: Metric, reference: Mesh | None, rated: Quality | None
 ) -> MetricValues:
@@ -175,7 +180,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     name = metric_name(name)
     if name in SIZE_SKEW:
         return rated_metric(mesh, name, reference, quality(mesh, reference))
-    if isinstance(mesh, Skin) and not METRICS[name].alone:
+    if not is_known(mesh, name):
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
     check_size(mesh)

@@ -40,7 +40,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, sealed
 from slideviz.mesh.quality import checked_reference
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
@@ -482,8 +482,8 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     Raises
     ------
     MeshError
-        A boundary is not there, an element of one is not a side of a cell, or the reference is
-        another mesh.
+        A boundary is not there, an element of one is not a side of a cell, the reference is another
+        mesh, or the cells of the mesh stay in its file.
 
     Examples
     --------
@@ -502,6 +502,8 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     >>> sv.walls(moved, reference=mesh).summary()["lower"]["first_height"]["ratio"]["mean"]
     0.5
     """
+    if isinstance(mesh, Skin):
+        raise MeshError(f"{mesh.name}: its walls need all cells in memory; read the whole mesh")
     base = mesh if reference is None else checked_reference(reference, mesh)
     chosen = mesh.marker_names if markers is None else tuple(markers)
     for name in chosen:

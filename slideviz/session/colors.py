@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slideviz.mesh.metrics import is_known
 from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes import second_view, set_view, undoable
 from slideviz.session.results import StepFrame
@@ -29,7 +30,8 @@ NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the ro
 def not_drawable(session: Session) -> str:
     """Return why the view cannot be colored by what is chosen, or ""."""
     what = session.view.color_by
-    if session.lacks_cells and what in METRICS and not METRICS[what].alone:
+    mesh = session.mesh
+    if mesh is not None and what in METRICS and not is_known(mesh, what):
         return (
             f"The {METRICS[what].label} compares neighbouring cells, which stay in the file. The "
             "roles are shown."

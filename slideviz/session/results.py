@@ -15,8 +15,8 @@ from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
 from slideviz.mesh.margin import SafeFraction
-from slideviz.mesh.metrics import metric
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
+from slideviz.mesh.metrics import is_known, metric
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import Walls, walls
 from slideviz.solver.steps import safe_fraction_of
@@ -83,10 +83,9 @@ class StepFrame:
             return every if cells is None else every[cells]
         names = {"size": self.quality.size, "skew": self.quality.skew}
         if what in METRICS and what not in SIZE_SKEW:
-            known = not isinstance(self.mesh, Skin) or METRICS[what].alone
             every = (
                 metric(self.mesh, what, self.base or undeformed).of_cells
-                if known
+                if is_known(self.mesh, what)
                 else np.full(len(self.mesh.cells), np.nan)
             )
         else:
@@ -108,9 +107,7 @@ class StepFrame:
         known = _AT_WALLS.setdefault(self, {})
         if name not in known:
             try:
-                layers = self.walls
-                if layers is None and not isinstance(self.mesh, Skin):
-                    layers = walls(self.mesh, undeformed)
+                layers = self.walls or walls(self.mesh, undeformed)
             except MeshError:
                 layers = None
             known.clear()  # one is enough, as they are large

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.errors import MeshError
 from slideviz.formats.su2.write import su2_blocks
+from slideviz.mesh.model import Assembly, Skin
 from slideviz.mesh.zones import join_zones
 from slideviz.streaming import output, repair
 from slideviz.streaming.run import stream
+from slideviz.streaming.skin import read_skin
 from tests.builders import grid, passage
 from tests.mesh.test_interfaces import zones as core_in_a_square
 from tests.solver.test_interface_motion import both, roles_of, turn
@@ -151,3 +154,16 @@ def test_zones_are_read_through_one_lock(tmp_path, monkeypatch):
     stream(both().change(mesh_file=rows(tmp_path)), tmp_path / "out.su2")
     assert len(files) == 2
     assert files[0] is files[1]
+
+
+def test_walls_need_all_cells(tmp_path):
+    sv.convert(rows(tmp_path), tmp_path / "rows.su2b")
+    skin = read_skin(tmp_path / "rows.su2b", 1)
+    assert isinstance(skin, Skin)
+    with pytest.raises(MeshError, match="walls need all cells in memory"):
+        sv.walls(skin)
+    both_zones = read_skin(tmp_path / "rows.su2b", None)
+    assert isinstance(both_zones, Skin)
+    assert isinstance(both_zones, Assembly)
+    assert len(both_zones.parts) == 2
+    assert both_zones.numbering.n_points == len(sv.read(tmp_path / "rows.su2b").points)
