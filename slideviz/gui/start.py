@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 
 from qtpy.QtCore import QDate, QEvent, QLocale, QSize, Qt, Signal
@@ -254,6 +255,7 @@ def _heading(text: str) -> QLabel:
     return label
 
 
+@lru_cache(maxsize=32)
 def card(name: str, line: str) -> QPixmap:
     """Return the picture of a sample by its name, with mesh lines in the color ``line``."""
     folder = Path(__file__).with_name("cards")

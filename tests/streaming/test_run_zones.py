@@ -15,6 +15,7 @@ from slideviz.streaming.run import stream
 from slideviz.streaming.skin import read_skin
 from tests.builders import grid, passage
 from tests.mesh.test_interfaces import zones as core_in_a_square
+from tests.slow import one_of_each_fast
 from tests.solver.test_interface_motion import both, roles_of, turn
 from tests.solver.test_interface_motion import stage as rows
 from tests.streaming.test_run import bits, require_same
@@ -84,8 +85,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("ending", ["su2", "su2b"])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(("name", "ending"), one_of_each_fast(tuple(CASES), ["su2", "su2b"]))
 def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
     make, case = CASES[name]
     path = make(tmp_path)
