@@ -91,11 +91,11 @@ COMMANDS = {
     "run": ["run", "square.cfg", "--steps", "50", "--picture", "a.png"],
 }
 MOMENTS = [
-    ("info", signal.SIGINT, 0.0),
+    pytest.param("info", signal.SIGINT, 0.0, marks=pytest.mark.slow),
     ("section", signal.SIGINT, 0.1),
     pytest.param("section", signal.SIGINT, 0.5, marks=pytest.mark.slow),
     pytest.param("run", signal.SIGINT, 0.9, marks=pytest.mark.slow),
-    ("film", signal.SIGTERM, 0.3),
+    pytest.param("film", signal.SIGTERM, 0.3, marks=pytest.mark.slow),
 ]
 MORE = [
     (name, number, 0.15 * k)
@@ -128,6 +128,7 @@ def test_a_signal_ends_a_command_at_any_moment(square, start, name, number, wait
     end(start, square, name, number, wait)
 
 
+@pytest.mark.slow
 def test_nothing_is_left_of_a_film_that_is_ended(square, start):
     child = start(*COMMANDS["film"][:-2], "--between", "50")
     wait_for(lambda: drafts(square) and children_of(child.pid))

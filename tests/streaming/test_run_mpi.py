@@ -186,6 +186,7 @@ def test_steps_are_found_by_all_and_inverted_cells_told_by_one(square):
     assert len(found[0][2][0]["tried"]) > 1
 
 
+@pytest.mark.slow
 @needs_mpi
 def test_an_error_of_one_rank_is_told_once_and_leaves_nothing(square):
     (square / "out.su2b").write_bytes(b"older")
