@@ -87,6 +87,13 @@ def test_a_blade_that_the_periodic_side_cuts_is_put_together():
     assert [len(one) for one in neighbours(alone, corners[:3], turn, (0,))] == [0]
 
 
+def test_a_blade_over_three_passages_is_put_together():
+    nodes = np.array([[0, 1], [1, 2], [4, 5], [5, 6], [8, 9]])
+    [body] = bodies(nodes, np.array([[0, 5], [4, 9]]))
+    assert body.facets.tolist() == [0, 1, 2, 3, 4]
+    assert body.turns.tolist() == [0, 0, -1, -1, -2]
+
+
 def test_a_boundary_that_goes_around_is_no_blade():
     with pytest.raises(
         MeshError, match="continues through the periodic side, so it is not a blade"

@@ -133,6 +133,8 @@ def test_wrong_wheels_are_refused(tmp_path):
     bent = mesh.with_points(mesh.points * [1.0, 1.0, 1.01])
     with pytest.raises(MeshError, match=r"passages 1 and 2 do not meet: .* need sides that stay"):
         Wheel([mesh, bent, mesh], pairs).require_meeting()
+    with pytest.raises(MeshError, match="passages 2 and 3 do not meet"):
+        Wheel([mesh, mesh, bent], pairs).require_meeting()
     assert Wheel([mesh] * 9, pairs).require_meeting() < 1e-15
     with pytest.raises(MeshError, match=r"end its name in \.su2 or \.su2b, and convert"):
         write_content(tmp_path / "wheel.vtu", [Wheel([mesh] * 9, pairs).content()])
