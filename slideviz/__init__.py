@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from slideviz.scene.overview import Detail
     from slideviz.sections.model import Section
     from slideviz.solver.deform import Step, deform
-    from slideviz.solver.repair import repair
+    from slideviz.solver.repair_stage import repair
     from slideviz.solver.safe_fraction import safe_fraction
     from slideviz.solver.steps import MeshRepair
     from slideviz.study.combinations import Combination, compare

@@ -362,7 +362,7 @@ def repair(
     ``mesh`` is the undeformed mesh; with its frame alone, that is mended, and all moving boundaries
     stay.
     """
-    from slideviz.solver.repair import mended_frame
+    from slideviz.solver.repair_stage import mended_frame
 
     *earlier, last = frames
     tick = _tick(f"Repair: {PHASES['repair']}", report, stopped)

@@ -124,7 +124,7 @@ def _steps_of_zone(
     require_memory(setup, case)
     mend = None
     if case.repair != "no" and not isinstance(mesh, Skin):
-        from slideviz.solver.repair import mended_step  # loads SciPy's sparse matrices
+        from slideviz.solver.repair_stage import mended_step  # loads SciPy's sparse matrices
 
         mend = partial(mended_step, case, mesh, setup, report)
     stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify, mend=mend)

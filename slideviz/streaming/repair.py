@@ -16,7 +16,12 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
 from slideviz.mesh.repair.repair import Region, mend_cells
 from slideviz.solver.deform import free_memory
-from slideviz.solver.repair import find_freedom, slide_advice, unmarked_sides, unmendable_words
+from slideviz.solver.repair_stage import (
+    find_freedom,
+    slide_advice,
+    unmarked_sides,
+    unmendable_words,
+)
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import MeshRepair
 from slideviz.streaming.source import CELLS, ZoneSource

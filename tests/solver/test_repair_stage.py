@@ -11,7 +11,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError, Note, UnsoundError
 from slideviz.mesh.quality import VALID
-from slideviz.solver.repair import find_freedom, repair_case
+from slideviz.solver.repair_stage import find_freedom, repair_case
 from slideviz.solver.steps import MeshRepair
 from tests import builders
 
