@@ -34,9 +34,9 @@ from slideviz.solver.steps import Progress, RunResult, Step, step_timer
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
 from slideviz.streaming.quality import RunCollector, folded_steps
-from slideviz.streaming.repair import mend_file
 from slideviz.streaming.skin import without_cells
 from slideviz.streaming.stream_input import open_for_run, require_su2
+from slideviz.streaming.streamed_repair import mend_file
 from slideviz.streaming.target_file import target_file
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
