@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
     from slideviz.case.motions.span import SpanMotion
     from slideviz.design.blade_gaps import Gap, gaps
+    from slideviz.design.deformed_wheel import WheelQuality, wheel
     from slideviz.design.deformer import Constraint, Deformer
     from slideviz.design.span_variables import SpanVariables
     from slideviz.design.sweeps.sweep import sweep
-    from slideviz.design.wheel import WheelQuality, wheel
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
     from slideviz.export.flat_section import section
     from slideviz.export.verbs import film, picture

@@ -30,7 +30,7 @@ from slideviz.terms import (
 
 if TYPE_CHECKING:
     from slideviz.case.limits import Limit
-    from slideviz.design.wheel import Count
+    from slideviz.design.deformed_wheel import Count
 
 
 def add_run(calls: argparse._SubParsersAction) -> None:

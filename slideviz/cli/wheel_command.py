@@ -10,7 +10,7 @@ from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
-    from slideviz.design.wheel import WheelQuality
+    from slideviz.design.deformed_wheel import WheelQuality
 
 MOST_NAMES = 20  # boundaries whose names are all printed
 

@@ -48,7 +48,7 @@ from slideviz.system.file_checks import require_regular_file
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
-    from slideviz.design.wheel import WheelQuality
+    from slideviz.design.deformed_wheel import WheelQuality
     from slideviz.solver.steps import Progress, Step
 
 _ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
@@ -461,9 +461,9 @@ def save_wheel(
 ) -> WheelQuality:
     """Write the wheel of the mesh of a frame, and return its quality; ``mesh`` is undeformed.
 
-    Other parameters and errors as of `slideviz.design.wheel.wheel`.
+    Other parameters and errors as of `slideviz.design.deformed_wheel.wheel`.
     """
-    from slideviz.design.wheel import write_wheel
+    from slideviz.design.deformed_wheel import write_wheel
 
     tick = _tick(f"Writing {path.name}", report, stopped)
     moved = [frame.mesh.points]

@@ -57,7 +57,7 @@ from slideviz.session.state import Session
 from slideviz.terms import SHOWN
 
 if TYPE_CHECKING:
-    from slideviz.design.wheel import WheelQuality
+    from slideviz.design.deformed_wheel import WheelQuality
 
 log = logging.getLogger("slideviz")
 COPIED_WIDTH = 1600  # least width of a picture on the clipboard, in pixels
