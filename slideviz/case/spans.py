@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from slideviz.errors import CaseError, SlidevizError, nearest
-from slideviz.machine.span import WHOLE, SpanField, find_span
+from slideviz.machine.span_field import WHOLE, SpanField, find_span
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.machine.span import SpanCurves, SpanField
+from slideviz.machine.span_field import SpanCurves, SpanField
 from slideviz.mesh.model import FloatArray, IntArray
 
 SECTIONS = 24  # sections of a blade, of which centroids and edges are found

@@ -19,7 +19,7 @@ from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.spans import WALLS_KEY, span_ends
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import CaseError
-from slideviz.machine.span import WHOLE, SpanCurves, SpanField, find_span
+from slideviz.machine.span_field import WHOLE, SpanCurves, SpanField, find_span
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import names_from

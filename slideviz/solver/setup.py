@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_field
 from slideviz.errors import Note
-from slideviz.machine.span import SpanField
+from slideviz.machine.span_field import SpanField
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.zones import require_one_zone

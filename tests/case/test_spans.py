@@ -13,7 +13,7 @@ from slideviz.case.check import check_case
 from slideviz.case.spans import span_ends, span_field
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError, SlidevizError
-from slideviz.machine.span import SpanCurves, find_span
+from slideviz.machine.span_field import SpanCurves, find_span
 from slideviz.sections.span import find_walls
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements

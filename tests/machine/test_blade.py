@@ -18,7 +18,7 @@ from slideviz.machine.blade import (
     change_of,
     curve_at,
 )
-from slideviz.machine.span import find_span
+from slideviz.machine.span_field import find_span
 from slideviz.mesh.cached_boundary import boundary_of
 from tests.builders import passage
 

@@ -5,7 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.errors import MeshError
-from slideviz.machine.span import SpanCurves, find_span
+from slideviz.machine.span_field import SpanCurves, find_span
 from slideviz.samples.impeller import impeller_mesh
 from tests.builders import passage, shuffled, square
 
