@@ -16,7 +16,7 @@ from slideviz.samples.stator import stator_case, stator_mesh
 from slideviz.samples.table import sample
 from slideviz.session.motions import Ghosts
 from tests.builders import cut_blade, passage, square
-from tests.machine.test_span import contoured
+from tests.machine.test_span_field import contoured
 
 TWIST = sv.SpanMotion("blade", "twist", (0.0, 0.5, 1.0), (0.0, 1.0, 5.0))
 LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.0, 0.02))

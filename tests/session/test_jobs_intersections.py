@@ -14,7 +14,7 @@ from slideviz.case.motions.rigid import Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.case.moving_nodes import displacements
 from slideviz.errors import CaseError, DeformError
-from slideviz.machine import span
+from slideviz.machine import span_field
 from slideviz.mesh.quality import quality
 from slideviz.sections import span as sections
 from slideviz.session import changes
@@ -117,8 +117,8 @@ def test_what_the_first_motion_and_section_over_the_span_need_is_computed_before
     case = Case(roles=roles, periodic="moving", sliding="ps")
     twist = case.change(motions=(SpanMotion("blade", "twist", (0.0, 1.0), (0.0, 3.0)),))
     find_intersection(case, mesh, lambda _: None, lambda: False)
-    monkeypatch.setattr(span, "_span_between", None)
-    monkeypatch.setattr(span, "SpanCurves", None)
+    monkeypatch.setattr(span_field, "_span_between", None)
+    monkeypatch.setattr(span_field, "SpanCurves", None)
     monkeypatch.setattr(span_motions, "BladeSections", None)
     assert np.abs(displacements(twist, mesh).vectors).max() > 1e-3
     walls = sections.find_walls(mesh, twist, find_periods(mesh, twist))

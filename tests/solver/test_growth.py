@@ -7,7 +7,7 @@ import pytest
 import slideviz as sv
 from slideviz.streaming.run import stream
 from tests.builders import cut_blade, passage
-from tests.machine.test_span import contoured
+from tests.machine.test_span_field import contoured
 
 ROLES = {"blade": "moving", "hub": "sliding", "shroud": "sliding", "per1": "periodic"}
 LEAN = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.08, 0.12))

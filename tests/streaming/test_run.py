@@ -23,7 +23,14 @@ from slideviz.formats.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample
 from slideviz.solver.deform import folded_at
 from slideviz.solver.steps import Progress
-from slideviz.streaming import interior, output, repair, resources, stream_input, target_file
+from slideviz.streaming import (
+    interior,
+    output,
+    resources,
+    stream_input,
+    streamed_repair,
+    target_file,
+)
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import SECONDS, stream
 from slideviz.streaming.skin import read_skin
@@ -98,7 +105,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
     steps = list(sv.deform(case, mesh, certify=True))
     for chunk in (37, 1 << 20):
         monkeypatch.setattr(output, "CHUNK", chunk)
-        monkeypatch.setattr(repair, "CELLS", chunk)
+        monkeypatch.setattr(streamed_repair, "CELLS", chunk)
         done = stream(case, tmp_path / "out.su2b")
         moved = sv.read(tmp_path / "out.su2b")
         assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
@@ -271,7 +278,7 @@ def test_bad_cells_stay_where_their_repair_does_not_fit_into_memory(tmp_path, mo
     sets = "STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none", "REPAIR=YES"
     case = made(tmp_path, "square", 25, sets)
     plain = stream(case.change(repair="no"), tmp_path / "plain.su2b")
-    monkeypatch.setattr(repair, "free_memory", lambda: 1e5)
+    monkeypatch.setattr(streamed_repair, "free_memory", lambda: 1e5)
     done = stream(case, tmp_path / "out.su2b")
     assert done.quality.summary() == plain.quality.summary()
     assert "bad cells stay as they are" in done.steps[-1].warnings[-1]

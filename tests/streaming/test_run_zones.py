@@ -10,7 +10,7 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.model import Assembly, Skin
 from slideviz.mesh.zones import join_zones
-from slideviz.streaming import output, repair
+from slideviz.streaming import output, streamed_repair
 from slideviz.streaming.run import stream
 from slideviz.streaming.skin import read_skin
 from tests.builders import grid, passage
@@ -98,7 +98,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
     sv.write(tmp_path / f"memory.{ending}", steps[-1].mesh)
     assert len(found.inverted_cells(100)) or name not in ("folded", "repaired")
     monkeypatch.setattr(output, "CHUNK", 37)
-    monkeypatch.setattr(repair, "CELLS", 37)
+    monkeypatch.setattr(streamed_repair, "CELLS", 37)
     done = stream(case.change(mesh_file=path), tmp_path / f"out.{ending}", worst=5)
     assert (done.mesh.zone, done.mesh.zones) == (None, 2)
     moved = sv.read(tmp_path / f"out.{ending}")
