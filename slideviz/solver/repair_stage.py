@@ -28,8 +28,7 @@ from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, Ski
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.repair import Impossible, quality_ratings
-from slideviz.mesh.repair.repair import repair as mend_cells
+from slideviz.mesh.repair.repair import Impossible, quality_ratings, repair_mesh
 from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
@@ -218,7 +217,9 @@ def mend(
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
-    done = mend_cells(domain, freedom, shapes, below=limit, metric=case.quality_metric, report=tick)
+    done = repair_mesh(
+        domain, freedom, shapes, below=limit, metric=case.quality_metric, report=tick
+    )
     points = done.points
     if now.halo is not None:
         beyond = np.flatnonzero(np.isin(now.halo.receivers, now.halo.outer))

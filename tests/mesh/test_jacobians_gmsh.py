@@ -7,7 +7,7 @@ from slideviz.mesh.jacobians import INVERTED, UNPROVEN, VALID
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import quality
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.repair import repair
+from slideviz.mesh.repair.repair import repair_mesh
 from tests.builders import grid
 from tests.mesh.test_margin import random_cells
 from tests.mesh.test_repair import SHAPES, held_boundary, scrambled
@@ -41,6 +41,6 @@ def test_repaired_cells_are_valid_for_gmsh(shape, kind):
     signs = reference_of(mesh)[1]
     before = signs * smallest_jacobians(gmsh, folded)
     assert ((before > 0) == (quality(folded, mesh).status == VALID)).mean() > 0.99
-    result = repair(folded, Freedom.within(mesh.dim, held), mesh)
+    result = repair_mesh(folded, Freedom.within(mesh.dim, held), mesh)
     theirs = signs * smallest_jacobians(gmsh, folded.with_points(result.points))
     assert (theirs > 0).all()

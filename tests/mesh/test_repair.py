@@ -16,9 +16,8 @@ from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import quality
 from slideviz.mesh.repair.energy import targets
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.lift import lift_energy
 from slideviz.mesh.repair.patches import Patch, find_patches
-from slideviz.mesh.repair.repair import WORTH, repair
+from slideviz.mesh.repair.repair import WORTH, lift_energy, repair_mesh
 from slideviz.samples.table import sample
 from slideviz.system.threads import core_limit
 from tests.builders import grid, shuffled
@@ -53,7 +52,7 @@ def test_scrambled_nodes_are_put_in_order(shape, kind):
     folded = scrambled(mesh, held)
     before = quality(folded, mesh)
     assert (before.status != VALID).mean() > 0.25
-    result = repair(folded, Freedom.within(mesh.dim, held), mesh)
+    result = repair_mesh(folded, Freedom.within(mesh.dim, held), mesh)
     after = quality(folded.with_points(result.points), mesh)
     assert (after.status == VALID).all()
     assert after.min >= 0.1
@@ -123,7 +122,7 @@ def pushed(mesh, far=0.14, at=0.5):
 def test_only_nodes_near_folded_cells_move():
     mesh = grid((30, 30), kind="mixed")
     folded = pushed(mesh)
-    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh)
+    result = repair_mesh(folded, Freedom.within(2, held_boundary(mesh)), mesh)
     assert len(result.bad_before)
     assert not len(result.bad_after)
     same = np.setdiff1d(np.arange(len(mesh.points)), result.moved)
@@ -141,7 +140,7 @@ def test_threads_do_not_change_bits():
     results = []
     for threads in (1, 3):
         with core_limit(threads):
-            results.append(repair(folded, Freedom.within(3, held), mesh).points)
+            results.append(repair_mesh(folded, Freedom.within(3, held), mesh).points)
     assert np.array_equal(*results)
 
 
@@ -150,7 +149,7 @@ def test_the_lowest_quality_is_lifted_above_the_limit():
     folded = pushed(mesh, 0.07)
     before = quality(folded, mesh)
     assert before.inverted == 0
-    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh, below=0.8)
+    result = repair_mesh(folded, Freedom.within(2, held_boundary(mesh)), mesh, below=0.8)
     assert before.min < 0.7
     assert quality(mesh.with_points(result.points), mesh).min >= 0.8
 
@@ -158,7 +157,7 @@ def test_the_lowest_quality_is_lifted_above_the_limit():
 def test_without_a_reference_cells_become_ideal():
     mesh = grid((8, 8, 8), kind="prism")
     folded = pushed(mesh, 0.2)
-    result = repair(folded, Freedom.within(3, held_boundary(mesh)))
+    result = repair_mesh(folded, Freedom.within(3, held_boundary(mesh)))
     after = quality(mesh.with_points(result.points), mesh)
     assert len(result.bad_before)
     assert after.valid == len(mesh.cells)
@@ -169,7 +168,7 @@ def test_cells_numbered_the_other_way_round_are_mended():
     turned = mesh.cells.connectivity.reshape(-1, 4)[:, ::-1].ravel()
     mesh = replace(mesh, cells=Cells.from_types(mesh.cells.types, turned), markers=())
     held = np.abs(mesh.points - 0.5).max(axis=1) == 0.5
-    result = repair(scrambled(mesh, held), Freedom.within(2, held), mesh)
+    result = repair_mesh(scrambled(mesh, held), Freedom.within(2, held), mesh)
     assert len(result.bad_before)
     assert quality(mesh.with_points(result.points), mesh).valid == len(mesh.cells)
 
@@ -212,7 +211,7 @@ def test_nodes_that_slide_stay_on_their_curved_boundary():
         [cos * at[:, 0] - sin * at[:, 1], sin * at[:, 0] + cos * at[:, 1], at[:, 2]], 1
     )
     folded = mesh.with_points(moved)
-    result = repair(folded, freedom, mesh)
+    result = repair_mesh(folded, freedom, mesh)
     assert len(result.bad_before)
     assert not len(result.bad_after)
     assert np.intersect1d(result.moved, slides).size
@@ -241,7 +240,7 @@ def test_periodic_images_move_as_one(angle):
     shift = np.where(held[:, None], 0.0, moves[place])
     shift[bound] = shift[bound] @ turn.T
     folded = mesh.with_points(mesh.points + shift)
-    result = repair(folded, freedom, mesh)
+    result = repair_mesh(folded, freedom, mesh)
     assert len(result.bad_before)
     assert not len(result.bad_after)
     move = result.points - folded.points
@@ -258,7 +257,7 @@ def test_cells_that_no_motion_mends_are_named():
     inner = int(np.argmin(np.linalg.norm(points - 0.5, axis=1)))
     points[inner] += 0.2
     folded = mesh.with_points(points)
-    result = repair(folded, Freedom.within(2, held), mesh)
+    result = repair_mesh(folded, Freedom.within(2, held), mesh)
     (cell,) = result.impossible
     assert corner in cell.nodes
     assert held[cell.nodes].all()
@@ -272,7 +271,7 @@ def test_a_side_that_folds_on_itself_is_named():
     points = np.array(mesh.points)
     node = int(np.argmin(np.linalg.norm(points - [1 / 3, 1 / 3, 0], axis=1)))
     points[node] = 0.6, 0.6, 0.0
-    result = repair(mesh.with_points(points), Freedom.within(3, held), mesh, below=0.0)
+    result = repair_mesh(mesh.with_points(points), Freedom.within(3, held), mesh, below=0.0)
     assert all(node in one.nodes for one in result.impossible)
     assert not points[[one.nodes for one in result.impossible], 2].any()
     assert {one.cell for one in result.impossible} == set(result.bad_after.tolist())
@@ -284,7 +283,7 @@ def test_a_patch_grows_where_three_rings_are_not_enough():
     inside = ~held_boundary(mesh)
     x = points[inside, 0]
     points[inside, 0] = np.where(x < 0.75, x / 3, 1 - 3 * (1 - x))  # all but the last quarter
-    result = repair(mesh.with_points(points), Freedom.within(2, ~inside), mesh, below=0.5)
+    result = repair_mesh(mesh.with_points(points), Freedom.within(2, ~inside), mesh, below=0.5)
     assert len(result.bad_after) < len(result.bad_before)
 
 
@@ -299,7 +298,7 @@ def test_a_report_may_cancel():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        repair(scrambled(mesh, held), Freedom.within(2, held), mesh, report=report)
+        repair_mesh(scrambled(mesh, held), Freedom.within(2, held), mesh, report=report)
     assert all(0 <= fraction <= 1 for fraction in seen)
     assert seen == sorted(seen)
 
@@ -322,7 +321,7 @@ def test_boundary_layers_keep_their_heights(dim):
     points = np.array(mesh.points)
     points[near & ~held & (row >= 2) & (row <= 4), 1] -= 1.3 * heights[4]
     folded = mesh.with_points(points)
-    result = repair(folded, Freedom.within(dim, held), mesh)
+    result = repair_mesh(folded, Freedom.within(dim, held), mesh)
     assert len(result.bad_before)
     assert not len(result.bad_after)
     first = np.flatnonzero((row == 1) & ~held)
@@ -356,7 +355,7 @@ def test_an_undeformed_mesh_that_is_folded_itself_makes_no_infinite_target(kind)
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         targets_folded = mesh.with_points(points[0])
-        result = repair(mesh.with_points(points[1]), Freedom.within(3, held), targets_folded)
+        result = repair_mesh(mesh.with_points(points[1]), Freedom.within(3, held), targets_folded)
     assert len(result.bad_after) < len(result.bad_before)
 
 

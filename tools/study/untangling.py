@@ -21,7 +21,7 @@ from slideviz.mesh.jacobians import VALID
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.repair.freedom import Freedom
-from slideviz.mesh.repair.repair import repair
+from slideviz.mesh.repair.repair import repair_mesh
 from tests.builders import grid
 
 SHAPES: dict[str, tuple[tuple[int, ...], str, float]] = {
@@ -67,7 +67,7 @@ def tangled(name: str) -> tuple[Mesh, Mesh, np.ndarray]:
 
 def ours(mesh: Mesh, shapes: Mesh, held: np.ndarray) -> FloatArray:
     """Return the points after repair."""
-    return repair(mesh, Freedom.within(mesh.dim, held), shapes).points
+    return repair_mesh(mesh, Freedom.within(mesh.dim, held), shapes).points
 
 
 def write_mfem(path: Path, mesh: Mesh) -> None:

@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import CORNERS, VALID
+from slideviz.mesh.jacobian_slopes import write_slopes
+from slideviz.mesh.jacobians import CORNERS, INVERTED, VALID
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, cell_quality, checked_reference, quality
 from slideviz.mesh.repair.descent import descend
-from slideviz.mesh.repair.energy import targets
+from slideviz.mesh.repair.energy import Targets, targets
 from slideviz.mesh.repair.freedom import Freedom, places
-from slideviz.mesh.repair.lift import lift_energy
 from slideviz.mesh.repair.patches import Patch, find_patches
+from slideviz.mesh.skew import EXPONENTS
 from slideviz.system.threads import cores, equal_shares
 from slideviz.terms import SkewMetric
 
@@ -138,7 +139,7 @@ class _Work:
     pool: ThreadPoolExecutor
 
 
-def repair(
+def repair_mesh(
     mesh: Mesh,
     freedom: Freedom,
     reference: Mesh | None = None,
@@ -608,3 +609,45 @@ IDEAL: dict[int, FloatArray] = {
     14: np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, np.sqrt(0.5)]]),
 }
 """Nodes (n, d) of the ideal cell with edges of length 1, by VTK identifier."""
+
+
+def lift_energy(
+    patch: Patch,
+    unknowns: FloatArray,
+    signs: NDArray[np.int8],
+    sums: FloatArray,
+    sized: bool,
+    metric: SkewMetric,
+    beta: float,
+) -> tuple[float, FloatArray]:
+    """Return the lift of a patch, which rises without bound as a cell comes near a limit.
+
+    It is the sum over the cells of Q / (beta - Q), with Q = 1 / quality and beta a little above the
+    largest Q, infinity beyond: as the worst-case metric of MFEM's TMOP. And its gradient (b, d).
+
+    ``signs``, ``sums`` (m,): of the patch's cells, in its order, as `reference_of` in
+    `slideviz.mesh.orientation` has them. ``sized``: whether the quality compares sizes: whether
+    there is an undeformed mesh.
+    """
+    points = patch.points(unknowns)
+
+    def work(part: Targets, here: slice, whole: slice, slopes: FloatArray) -> None:
+        cells = slice(whole.start + here.start, whole.start + here.stop)
+        nodes = part.nodes[here]
+        turn = signs[cells]
+        before = sums[cells]
+        size, skew, status = cell_quality(points, part.vtk, nodes, turn, before, metric)
+        with np.errstate(all="ignore"):
+            inverse = 1.0 / (np.sqrt(size) * skew if sized else skew)
+            good = (status != INVERTED) & (inverse < beta)
+            gap = beta - inverse
+            patch.values[cells] = np.where(good, inverse / gap, np.inf)
+            powers = np.array(EXPONENTS[metric][part.vtk], float)
+            compared = before if sized else np.full(len(nodes), np.inf)
+            write_slopes(
+                part.vtk, points, nodes, CORNERS[part.vtk], turn, powers, compared, slopes[here]
+            )
+            slopes[here] *= np.where(good, -beta * inverse / gap**2, 0.0)[:, None, None]
+
+    patch.of_cells(work)
+    return float(patch.values.sum()), patch.gathered()
