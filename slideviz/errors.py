@@ -10,6 +10,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Literal
+
+Level = Literal["warning", "note"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,7 @@ class Message:
     line: int = 0  # of the file, from 1; 0 for none
     value: str = ""  # in quotes; empty where the rule has it
     keys: tuple[str, ...] = ()  # of the case file, that contradict each other
+    level: Level = "warning"  # a note is harmless and asks for no change
 
     def __str__(self) -> str:
         return self.printed(printable)
@@ -39,6 +43,19 @@ class Message:
         return f"{sentence}; {self.remedy}" if self.remedy else sentence
 
 
+Remark = str | Message  # a text is a message without a place
+
+
+def note(text: str) -> Message:
+    """Return a harmless message, which asks for no change."""
+    return Message(text, level="note")
+
+
+def messages_of(remarks: Iterable[Remark]) -> tuple[Message, ...]:
+    """Return remarks as messages."""
+    return tuple(Message(one) if isinstance(one, str) else one for one in remarks)
+
+
 class SlidevizError(Exception):
     """An error that the user can correct, with a line for each message; the base of all others."""
 
@@ -48,7 +65,7 @@ class SlidevizError(Exception):
     @property
     def messages(self) -> tuple[Message, ...]:
         """Return the messages, one for each mistake."""
-        return tuple(Message(each) if isinstance(each, str) else each for each in self.args)
+        return messages_of(self.args)
 
     def within(self, *places: str | Path, line: int = 0) -> tuple[Message, ...]:
         """Return the messages with places around their own, and a line if it is not 0."""
@@ -66,7 +83,7 @@ class CaseError(SlidevizError):
     """The case is wrong: its file, a role, a motion, a setting or a displacement file."""
 
 
-def raise_all(problems: Iterable[str | Message]) -> None:
+def raise_all(problems: Iterable[Remark]) -> None:
     """Raise a CaseError of the problems, if there are any; equal ones count once."""
     if each := dict.fromkeys(problems):
         raise CaseError(*each)
@@ -107,15 +124,6 @@ class ArgumentError(SlidevizError, TypeError):
 
 class Cancelled(SlidevizError):
     """The user stopped the work; nothing is wrong."""
-
-
-class Note(str):
-    """A harmless remark on a run, which asks for no change.
-
-    It is a string among the warnings of a step; its type tells it from these.
-    """
-
-    __slots__ = ()
 
 
 def printable(path: str | Path) -> str:

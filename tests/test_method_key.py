@@ -47,14 +47,14 @@ def test_settings_that_the_method_does_not_use_are_told():
     assert idle_settings(Case(method="idw", sliding="ps", idw_power=2.0)) == ()
     assert idle_settings(Case(method="elastic", sliding="ds")) == ()
     case = Case(method="elastic", reduction=Reduction(), kernel="gaussian", influence_factor=1.0)
-    assert idle_settings(case) == (
+    assert tuple(map(str, idle_settings(case))) == (
         "METHOD= elastic does not use INFLUENCE_FACTOR, RBF_KERNEL, DATA_REDUCTION= YES",
     )
-    assert idle_settings(Case(idw_power=2.0, idw_fixed_weight=2.0)) == (
+    assert tuple(map(str, idle_settings(Case(idw_power=2.0, idw_fixed_weight=2.0)))) == (
         "METHOD= rbf does not use IDW_POWER, IDW_FIXED_WEIGHT",
     )
-    assert "acts like pseudo sliding" in idle_settings(Case(method="idw", sliding="ds"))[0]
-    assert "acts like direct sliding" in idle_settings(Case(method="elastic", sliding="ps"))[0]
+    assert "acts like pseudo sliding" in str(idle_settings(Case(method="idw", sliding="ds"))[0])
+    assert "acts like direct sliding" in str(idle_settings(Case(method="elastic", sliding="ps"))[0])
 
 
 @pytest.mark.parametrize("method", ["idw", "elastic"])
@@ -83,7 +83,7 @@ def test_stiffness_of_su2_is_read_written_and_only_for_elasticity(tmp_path):
         with pytest.raises(CaseError, match=r"below 0\.5, or above 1|not a number"):
             set_key(case, "DEFORM_COEFF", text)
     said = "METHOD= rbf does not use DEFORM_STIFFNESS_TYPE, DEFORM_COEFF"
-    assert idle_settings(case.change(method="rbf")) == (said,)
+    assert tuple(map(str, idle_settings(case.change(method="rbf")))) == (said,)
     assert idle_settings(case.change(sliding="ds")) == ()
 
 
@@ -105,7 +105,7 @@ def test_walls_are_moving_boundaries_and_fixed_ones_by_their_names():
 def test_settings_without_effect_are_told_and_change_no_result():
     made = sample("square", 6, "motion")
     given = made.case.change(curved=True, direction=1)
-    direction, curved = idle_settings(given)
+    direction, curved = map(str, idle_settings(given))
     assert curved.startswith("CURVED= YES has no effect")
     assert direction.startswith("PERIODIC_DIRECTION has no effect")
     assert effective(given) == effective(made.case) == made.case

@@ -15,7 +15,7 @@ from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.zone_cases import with_marker_names, zone_cases
-from slideviz.errors import CaseError, Message, Note, nearest
+from slideviz.errors import CaseError, Message, nearest, note
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
 from slideviz.terms import KERNELS, ROLES, SLIDES
@@ -297,7 +297,7 @@ def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     )
 
 
-def idle_settings(case: Case) -> tuple[str, ...]:
+def idle_settings(case: Case) -> tuple[Message, ...]:
     """Return a note for each setting of the case without effect: with its method, or with any."""
     usual = type(case)()
     idle = [
@@ -322,10 +322,10 @@ def idle_settings(case: Case) -> tuple[str, ...]:
         and case.reduction.auto
         and key.get(case) != key.get(usual)
     ]
-    return tuple(Note(text) for text in notes)
+    return tuple(map(note, notes))
 
 
-def file_before_motions(case: Case) -> tuple[Note, ...]:
+def file_before_motions(case: Case) -> tuple[Message, ...]:
     """Return a note for each sequence of motions that begins with a file for all boundaries."""
     sequences: dict[tuple[Motion, ...], list[str]] = {}
     for marker in case.markers_with("moving"):
@@ -333,7 +333,7 @@ def file_before_motions(case: Case) -> tuple[Note, ...]:
         if len(sequence) > 1:
             sequences.setdefault(sequence, []).append(marker)
     return tuple(
-        Note(
+        note(
             f"{first.files[0].name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), "
             f"and then MOTION does so: {'; '.join(map(describe, others))}; "
             "DEFORMATION_FILENAME= NONE leaves the file out"

@@ -15,7 +15,7 @@ import numpy as np
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
-from slideviz.errors import CaseError, Message, raise_all, shown
+from slideviz.errors import CaseError, Message, Remark, raise_all, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
@@ -51,7 +51,7 @@ class Displacements:
 
     nodes: IntArray  # (k,): node indices, sorted, each once
     vectors: FloatArray  # (k, d): Cartesian displacements, in the mesh's length unit
-    warnings: tuple[str, ...] = ()  # what the user should know about them
+    warnings: tuple[Remark, ...] = ()  # what the user should know about them
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", frozen_array(self.nodes, np.int64))

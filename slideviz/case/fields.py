@@ -11,7 +11,7 @@ from slideviz import terms
 from slideviz.argument_types import CheckedFields
 from slideviz.case.limits import Limit, read_limits
 from slideviz.case.motions.motion import Motion
-from slideviz.errors import CaseError, not_one_of
+from slideviz.errors import CaseError, Remark, not_one_of
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG
 from slideviz.rbf.reduction import AUTO, Reduction
@@ -73,7 +73,7 @@ class CaseFields(CheckedFields):
     limits: Annotated[tuple[Limit, ...], 'limits, or a text as "min > 0.3, inverted = 0"'] = ()
     source: Path | None = None
     view: Mapping[str, Any] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("steps", "influence_factor", "layer_thickness"):

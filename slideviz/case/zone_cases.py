@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.motions.onto import Onto
 from slideviz.case.words import first_of
-from slideviz.errors import CaseError, Note
+from slideviz.errors import CaseError, note
 from slideviz.mesh.model import Assembly, Mesh, ZonePart
 from slideviz.mesh.zones import names_in, spellings, zones_of
 
@@ -57,7 +57,7 @@ def _of_zone(case: Case, mesh: Mesh) -> Case:
         interfaces=() if others & set(case.interfaces) else case.interfaces,
         span=None if others & set(case.span or ()) else case.span,
         periodic="none" if idle else case.periodic,
-        warnings=(*case.warnings, Note(text)),
+        warnings=(*case.warnings, note(text)),
     )
 
 

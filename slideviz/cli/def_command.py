@@ -48,7 +48,9 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
             "first"
         )
     if not file.exists() and "MESH_FILENAME" not in config.present:
-        hints = [text for text in config.case.warnings if "did you mean MESH_FILENAME?" in text]
+        hints = [
+            text for text in map(str, config.case.warnings) if "did you mean MESH_FILENAME?" in text
+        ]
         raise CaseError(
             f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
             f"{hints[0] if hints else 'name the mesh to deform'}"
@@ -104,7 +106,7 @@ def run_def(arguments: argparse.Namespace) -> int:
             config, mesh, attempt, lambda each: each[1][-1].mesh
         )
     case = surface.case()
-    steps[-1] = replace(steps[-1], warnings=(*steps[-1].warnings, *said))
+    steps[-1] = replace(steps[-1], messages=(*steps[-1].messages, *said))
     seconds["quality"] = -time.perf_counter()
     measured = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)

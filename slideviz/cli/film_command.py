@@ -14,7 +14,7 @@ from slideviz.cli.options import (
     read_mesh,
     require_mesh_file,
 )
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Remark
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -106,7 +106,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     from slideviz.session.state import StepFrame
 
     frames = []
-    warnings = list[str]()
+    warnings = list[Remark]()
     cases = [("", case)]
     if arguments.designs is not None:
         table = read_designs(case, arguments.designs)
@@ -126,7 +126,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
             for step in steps[-1:] if label else steps:
                 measured = quality(step.mesh, reference=mesh, metric=one.quality_metric)
                 frames.append(StepFrame(step.mesh, measured, step, label=label))
-            warnings += step.warnings
+            warnings += step.messages
     print_remarks(dict.fromkeys(warnings), quiet=arguments.quiet)
     return tuple(frames)
 

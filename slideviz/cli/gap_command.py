@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.options import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import holding
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Remark
 
 if TYPE_CHECKING:
     from slideviz.design.blade_gaps import Gap
@@ -45,13 +45,13 @@ def _gap(arguments: argparse.Namespace) -> int:
             "nothing to measure; name boundaries, e.g. --between SHROUD,BLADE"
         )
     after: tuple[Gap, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
     inverted = 0
     if case.motions:
         with Bar(not arguments.quiet, begun=arguments.begun) as bar:
             *_, last = deform(case, mesh, bar)
         after = gaps(case, last.mesh, arguments.between, reference=mesh)
-        warnings = last.warnings
+        warnings = last.messages
         inverted = quality(last.mesh, mesh).inverted
     report = {
         "case": str(case.source or ""),

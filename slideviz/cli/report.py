@@ -18,7 +18,7 @@ from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.motions.onto import Remaining
 from slideviz.case.words import counted, first_of
-from slideviz.errors import CaseError, Note
+from slideviz.errors import CaseError, Remark, messages_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
@@ -113,12 +113,12 @@ def run_report(
             default=None,
         ),
         "relax": None if (relaxed := Relaxed.joined(each)) is None else asdict(relaxed),
-        "targets": [text.report for text in last.warnings if isinstance(text, Remaining)],
+        "targets": [one.report for one in last.messages if isinstance(one, Remaining)],
         "repair": None if (mended := _repaired(steps)) is None else mended.report(),
         "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
-        "warnings": [*last.warnings, *changed],
+        "warnings": [*last.messages, *changed],
         "convergence": [
             {"step": step.index, **_fields(cycle, CYCLE_KEYS)}
             for step in steps
@@ -305,20 +305,18 @@ def zone_words(zone: int | None, zones: int) -> str:
     return f", zone {zone} of {zones}" if zone else f", all {zones} zones"
 
 
-def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
+def print_remarks(remarks: Iterable[Remark], *, quiet: bool) -> None:
     """Print warnings to stderr, and notes too unless ``quiet``."""
-    for text in remarks:
-        if quiet and isinstance(text, Note):
-            continue
-        kind = "note" if isinstance(text, Note) else "warning"
-        print(f"slideviz: {kind}: {text}", file=sys.stderr)
+    for message in messages_of(remarks):
+        if not quiet or message.level != "note":
+            print(f"slideviz: {message.level}: {message}", file=sys.stderr)
 
 
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
     """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed."""
     if path is None:
         return False
-    text = json.dumps(report, indent=2) + "\n"
+    text = json.dumps(report, indent=2, default=str) + "\n"
     if str(path) == "-":
         print(text, end="")
         return True

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import read_case, read_mesh, require_mesh_file
 from slideviz.cli.progress import Bar
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Remark
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -219,7 +219,7 @@ def _counted(designs: Sequence[int]) -> str:
     return f"{len(designs)}  (design {first_of(designs, _LISTED)})"
 
 
-def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:
+def _warn(warnings: Sequence[Remark], rows: Sequence[DesignRow], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason with its designs."""
     from slideviz.case.words import first_of
     from slideviz.cli.report import print_remarks

@@ -131,18 +131,16 @@ def say(what: str, text: str) -> None:
 def holding() -> Iterator[Callable[..., None]]:
     """Context that delays the texts of `say` until its end, or until its function is called.
 
-    The yielded function leaves out texts that begin with its argument, if any. If an error ends the
-    context before, only the error is printed.
+    If an error ends the context before, only the error is printed.
     """
     held: list[tuple[str, str]] = []
     token = _HELD.set(held)
 
-    def release(*without: str) -> None:
+    def release() -> None:
         if _HELD.get() is held:
             _HELD.reset(token)
             for what, text in held:
-                if not text.startswith(without):
-                    say(what, text)
+                say(what, text)
 
     try:
         yield release

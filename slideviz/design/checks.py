@@ -18,9 +18,10 @@ from slideviz.errors import (
     ConditionWarning,
     DeformError,
     Message,
-    Note,
+    Remark,
     ToleranceWarning,
     UnsoundError,
+    note,
 )
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits
@@ -41,13 +42,13 @@ def largest_condition(steps: Sequence[FrozenStep]) -> float:
     return max((step.condition for step in steps), default=1.0)
 
 
-def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
+def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[Message, ...]:
     """Return a note about systems that are solved with twice the digits; empty if none is."""
     refined = max((step.refined for step in steps), default=0.0)
     if not refined:
         return ()
     return (
-        Note(
+        note(
             f"the system is nearly singular (condition number {largest_condition(steps):.0e}): "
             f"between the boundary nodes designs would be wrong by up to {100 * refined:.2g} % "
             "of the largest displacement, so all are solved with twice the digits; a "
@@ -56,7 +57,7 @@ def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
     )
 
 
-def without_repair(case: Case) -> tuple[Case, tuple[str, ...]]:
+def without_repair(case: Case) -> tuple[Case, tuple[Remark, ...]]:
     """Return the case without repair, and a note or, where it is asked for, a warning of that."""
     if case.repair == "no":
         return case, ()
@@ -64,7 +65,7 @@ def without_repair(case: Case) -> tuple[Case, tuple[str, ...]]:
         f"REPAIR= {case.repair.upper()} is ignored by a Deformer, because repaired positions are "
         "not differentiable; points and derivatives are those before the repair"
     )
-    return case.change(repair="no"), (said if case.repair == "yes" else Note(said),)
+    return case.change(repair="no"), (said if case.repair == "yes" else note(said),)
 
 
 def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
@@ -84,7 +85,7 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
         f"differently, {amount}; {REMEDY}"
     )
     little = TRUSTED < error_estimate <= NOTED
-    warnings.warn(Note(said) if little else said, ConditionWarning, stacklevel=3)
+    warnings.warn(ConditionWarning(note(said) if little else said), stacklevel=3)
 
 
 def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArray) -> bool:
@@ -102,7 +103,7 @@ def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArr
         f"have few correct digits, and displacements{of} between the boundary nodes may be wrong "
         f"by {wrong_by(worst, bounded=all(step.refined for step in steps))}; {REMEDY}"
     )
-    warnings.warn(said if worst > NOTED else Note(said), ConditionWarning, stacklevel=3)
+    warnings.warn(ConditionWarning(said if worst > NOTED else note(said)), stacklevel=3)
     return True
 
 

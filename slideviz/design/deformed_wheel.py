@@ -16,7 +16,7 @@ from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
 from slideviz.case.zone_cases import zone_cases
 from slideviz.design.sweeps.table import Table, read_designs
-from slideviz.errors import CaseError, MeshError, SlidevizError
+from slideviz.errors import CaseError, MeshError, Remark, SlidevizError
 from slideviz.formats.files import read
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
@@ -58,7 +58,7 @@ class WheelQuality:
     """Largest distance of nodes of neighboring passages that became one, in the mesh's unit."""
     limits: tuple[LimitResult, ...] = ()
     """The limits of the case, met or not, for each passage that moves in another way."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
     """What the runs of the passages warn of."""
     zones: tuple[WheelQuality, ...] = ()
     """The wheel of each zone, with the names of its file, where the mesh has several."""
@@ -141,13 +141,13 @@ def wheel(
     if len(rows) < max(counts):
         cases.append(case)
     points = []
-    warnings = list[str]()
+    warnings = list[Remark]()
     for each in cases:
         points.append(mesh.points)
         if each.motions:
             *_, last = deform(each, mesh, progress)
             points[-1] = last.mesh.points
-            warnings += last.warnings
+            warnings += last.messages
     made = write_wheel(Path(path), cases, mesh, points, counts, numbered, progress)
     return replace(made, warnings=tuple(dict.fromkeys(warnings)))
 

@@ -28,7 +28,7 @@ from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
 from slideviz.design.zone_designs import Work, ZoneDesign, over_zones, zone_designs
-from slideviz.errors import CaseError, DeformError, Note, not_one_of
+from slideviz.errors import CaseError, DeformError, Remark, SlidevizError, not_one_of, note
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
 from slideviz.mesh.model import Assembly, FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.quality import quality
@@ -179,7 +179,7 @@ class Deformer:
         references = designs.reshape(-1, *asked.vectors.shape)
         report = progress or (lambda _: None)
         self._zones: tuple[ZoneDesign, ...] = ()
-        self.warnings: tuple[str, ...]
+        self.messages: tuple[Remark, ...]
         """About case and mesh, zones that no longer fit at the reference, and systems that are
         solved with twice the digits (a note)."""
         if isinstance(mesh, Assembly):
@@ -187,9 +187,11 @@ class Deformer:
             self._zones = zone_designs(prepared, mesh, asked.nodes, references, make)
             points = self.deform(references[0])
             left_out = *left_out, *disjoint_interfaces(mesh, case.interfaces)
-            said = [f"zone {z.number}: {text}" for z in self._zones for text in z.deformer.warnings]
-            torn = torn_interfaces(mesh, points, case.interfaces)
-            self.warnings = (*prepared.alone.warnings, *left_out, *said, *torn)
+            self.messages = (*prepared.alone.warnings, *left_out)
+            for zone in self._zones:
+                said = SlidevizError(*zone.deformer.messages)
+                self.messages += said.within(f"zone {zone.number}")
+            self.messages += (*torn_interfaces(mesh, points, case.interfaces),)
             return
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
@@ -208,7 +210,7 @@ class Deformer:
         self._setup = setup
         self._input = known_node_map(mesh, setup, asked)
         self._references = references
-        self.warnings = (*case.warnings, *left_out, *setup.warnings)
+        self.messages = (*case.warnings, *left_out, *setup.warnings)
         targets = [value(self._input.target(reference)) for reference in references]
         self._steps: tuple[FrozenStep, ...]
         self._steps, points = choose_steps(case, mesh, setup, targets, report)
@@ -221,12 +223,17 @@ class Deformer:
         facets = facets_of(setup, value(states[-1].coords))
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
-        self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
-        self.warnings += (*wall_warnings(setup, case, mesh, points),)
+        self.messages += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
+        self.messages += (*wall_warnings(setup, case, mesh, points),)
         if not warn_of_error_estimate(
             self._steps, np.max([state.number("error_estimate") for state in states], axis=0)
         ):
             warn_of_condition(self._steps)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The texts of ``messages``."""
+        return tuple(map(str, self.messages))
 
     @check_types
     def deform(self, displacement: FloatArray | None = None) -> FloatArray:
@@ -364,7 +371,7 @@ class Deformer:
             return
         self._steps = (*before, replace(last, setup=last.setup.at_step(False)))
         text = "nothing is relaxed: the reference has no displacement; give `displacements`"
-        self.warnings += (Note(text),)
+        self.messages += (note(text),)
 
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.

@@ -20,13 +20,12 @@ from slideviz.session.jobs import compute_streamed
 from slideviz.session.run_messages import (
     inverted_words,
     limits_words,
-    notes_of,
+    remarks_of,
     remedy_for,
     repair_words,
     run_requirements,
     stopped_words,
     to_mend,
-    warnings_of,
     with_field_labels,
 )
 from slideviz.session.runs_words import method_words
@@ -213,9 +212,9 @@ class Running(QObject):
     @staticmethod
     def _log_remarks(run: Run) -> list[str]:
         """Write the notes and warnings of a run to the log; return its warnings."""
-        for note in notes_of(run):
+        for note in remarks_of(run, "note"):
             log.info("%s", note)
-        warnings = list(warnings_of(run))
+        warnings = list(remarks_of(run, "warning"))
         for warning in warnings:
             log.warning("%s", warning)
         return warnings

@@ -153,19 +153,14 @@ class DesignTable:
         """Return the designs, as `slideviz.sweep` takes them."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
-    def reason(self, number: int, mesh: Mesh | None) -> str:
-        """Return why the design ``number`` failed, without the mesh's name at the beginning."""
-        name = mesh.name if mesh is not None else ""
-        return self.results[number].problem.removeprefix(f"{name}: ")
-
-    def summary(self, mesh: Mesh | None) -> str:
+    def summary(self) -> str:
         """Return the results in words: counts, and a line for each reason why designs failed."""
         done = self.count_done()
         bad = sum(row.inverted > 0 for row in self.results.values())
         reasons: dict[str, list[int]] = {}
         for number in sorted(self.results):
-            if self.results[number].problem:
-                reasons.setdefault(self.reason(number, mesh), []).append(number)
+            if reason := self.results[number].problem:
+                reasons.setdefault(reason, []).append(number)
         failed = len(self.results) - done
         parts = [f"{counted(done, 'design')} done"]
         missing = sum(bool(row.limits.removesuffix(MET)) for row in self.results.values())

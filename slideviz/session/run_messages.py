@@ -12,7 +12,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import applies_to
 from slideviz.case.words import counted
-from slideviz.errors import Message, Note
+from slideviz.errors import Level, Message, messages_of
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
 from slideviz.session.motion_scale import moves_nothing
@@ -153,24 +153,19 @@ def _last_valid_words(run: Run) -> str:
     return f"Step {steps[-1].index} of {steps[-1].total} is the last without any." if steps else ""
 
 
-def warnings_of(run: Run) -> tuple[str, ...]:
-    """Return the warnings of a run, without its notes."""
-    return _remarks(run, notes=False)
-
-
-def notes_of(run: Run) -> tuple[str, ...]:
-    """Return the notes of a run: remarks that are harmless."""
-    return _remarks(run, notes=True)
-
-
-def _remarks(run: Run, notes: bool) -> tuple[str, ...]:
+def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
+    """Return the warnings of a run, or its notes."""
     if run.last is None or run.last_step is None:
         return ()
     layers = run.last.walls
-    texts = run.last_step.warnings
+    remarks = run.last_step.messages
     if layers is not None:
-        texts += tuple(height_warnings(run.case, layers, run.last.mesh))
-    return tuple(with_field_labels(text) for text in texts if isinstance(text, Note) == notes)
+        remarks += tuple(height_warnings(run.case, layers, run.last.mesh))
+    return tuple(
+        with_field_labels(str(message))
+        for message in messages_of(remarks)
+        if message.level == level
+    )
 
 
 @dataclass(frozen=True)

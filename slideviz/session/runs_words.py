@@ -10,7 +10,7 @@ from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.case.motion_words import deformation, describe, motion_labels
-from slideviz.session.run_messages import notes_of, warnings_of
+from slideviz.session.run_messages import remarks_of
 from slideviz.session.state import Run
 from slideviz.session.walls_table import angle_change, height_ratios
 from slideviz.terms import KERNELS, METHODS, PERIODIC_MODES, SLIDING
@@ -251,7 +251,7 @@ def describe_run(run: Run) -> str:
     """Return a line for each column with a run's value, and lines with its warnings and notes."""
     shown = [column for column in COLUMNS if column.title != "name" or run.name]
     lines = [f"{column.title}: {column.text(run)}" for column in shown]
-    warned = (*warnings_of(run), *notes_of(run))
+    warned = (*remarks_of(run, "warning"), *remarks_of(run, "note"))
     if warned:
         lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in warned)]
     return "\n".join(lines)

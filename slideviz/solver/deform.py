@@ -150,8 +150,8 @@ def _mended(stepping: Stepping, step: Step, before: Mesh, done: float) -> Step:
         step = replace(step, safe=step_safety(before, step.mesh, stepping.mesh, part, step.index))
     assert step.repaired is not None
     misfit, apart = stepping.misfit(step)
-    warnings = dict.fromkeys((*step.warnings, *step.repaired.warnings, *apart))
-    return replace(step, periodic_misfit=misfit, warnings=tuple(warnings))
+    messages = dict.fromkeys((*step.messages, *step.repaired.warnings, *apart))
+    return replace(step, periodic_misfit=misfit, messages=tuple(messages))
 
 
 def all_steps(stepping: Stepping) -> Iterator[Step]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.errors import MeshError, Note
+from slideviz.errors import MeshError, Message, Remark, note
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
@@ -46,7 +46,7 @@ class Domain:
     """(p, 2): pairs of periodic images, which move alike; the first represents the second."""
     same_as: IntArray  # (n,): for each node the one that represents all that coincide with it
     halo: Halo | None  # copies that follow their donors
-    warnings: tuple[str, ...]  # what the user should know of mesh and roles
+    warnings: tuple[Remark, ...]  # what the user should know of mesh and roles
 
     def once(self, nodes: IntArray) -> np.ndarray:
         """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
@@ -70,7 +70,6 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs, frame, coords, representative = find_period(case, mesh, boundary)
-    notes += _ambiguous_period(case, mesh, pairs)
     classes = find_classes(case, mesh, boundary, fans, frame, representative)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
@@ -92,7 +91,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         images=images,
         same_as=_coinciding(mesh, boundary.nodes, images),
         halo=mesh.halo,
-        warnings=(*mesh.remarks, *notes),
+        warnings=(*mesh.remarks, *notes, *_ambiguous_period(case, mesh, pairs)),
     )
 
 
@@ -162,7 +161,7 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
     return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
 
 
-def _ambiguous_period(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> tuple[str, ...]:
+def _ambiguous_period(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> tuple[Message, ...]:
     """Return a note where PERIODIC_TYPE= AUTO takes a translation, and a rotation fits as well."""
     if case.periodic == "none" or case.periodic_type != "auto":
         return ()
@@ -174,7 +173,7 @@ def _ambiguous_period(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> tuple[
         f"a rotation ({turned.describe()}); PERIODIC_TYPE= AUTO takes the translation: write "
         "TRANSLATIONAL or ROTATIONAL"
     )
-    return (Note(text),)
+    return (note(text),)
 
 
 def find_classes(

@@ -236,5 +236,5 @@ def joined_steps(motion: InterfaceMotion, runs: Runs) -> Iterator[Step]:
         last = leader is longest[-1]
         torn = torn_interfaces(mesh, now.points, motion.names) if last else ()
         step = Step.joined(mesh, now, steps, new, leader)
-        yield replace(step, warnings=(*motion.warnings, *step.warnings, *torn))
+        yield replace(step, messages=(*motion.warnings, *step.messages, *torn))
         before = steps

@@ -11,7 +11,7 @@ from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes, same
-from slideviz.errors import CaseError, DeformError, Message
+from slideviz.errors import CaseError, DeformError, Message, Remark
 from slideviz.mesh.fans import components
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
@@ -91,7 +91,7 @@ class BoundaryConditions:
     known: IntArray  # (a,): moving and fixed nodes
     target: FloatArray  # (a, d): their displacement in the frame after the last step
     moved: Displacements  # of moving nodes, as `displaced` returns it
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     @cached_property
     def largest(self) -> float:

@@ -181,13 +181,13 @@ def mended_frame(
     else:
         moving = dict.fromkeys(case.markers_with("moving"), "fixed")
         case = case.change(roles={**case.roles, **moving}, motions=())
-        step = Step(1, 1, mesh, 0, 0.0, nan, node_counts={}, seconds={}, warnings=())
+        step = Step(1, 1, mesh, 0, 0.0, nan, node_counts={}, seconds={}, messages=())
         timer = step_timer(report)
         with timer.phase("repair") as tick:
             mended = mend(case, mesh, mesh, None, tick)
         done = replace(step, mesh=mended.mesh, repaired=mended, seconds=timer.seconds)
     assert done.repaired is not None
-    return replace(done, warnings=tuple(dict.fromkeys((*done.warnings, *done.repaired.warnings))))
+    return replace(done, messages=tuple(dict.fromkeys((*done.messages, *done.repaired.warnings))))
 
 
 def mend(

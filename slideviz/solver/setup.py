@@ -14,7 +14,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_field
-from slideviz.errors import Note
+from slideviz.errors import Message, note
 from slideviz.machine.span_field import SpanField
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
@@ -359,21 +359,21 @@ def stiffness_of(case: Case, mesh: Mesh) -> Stiffness:
     return Stiffness(case.deform_stiffness_type, case.deform_coeff, nodes)
 
 
-def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
+def _not_relaxed(case: Case, mesh: Mesh) -> tuple[Message, ...]:
     """Return the note that RELAX= AUTO relaxes no such mesh."""
     if case.relax == "no":
         return ()
     if case.method != "rbf":
         return (
-            Note(
+            note(
                 f"METHOD= {case.method} is not relaxed; RELAX= AUTO relaxes with METHOD= rbf only"
             ),
         )
     if isinstance(mesh, Skin):
-        return (Note("RELAX= AUTO does not relax a streamed mesh"),)
+        return (note("RELAX= AUTO does not relax a streamed mesh"),)
     if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:
         return (
-            Note(
+            note(
                 f"RELAX= AUTO does not relax a mesh of more than {RELAXED_CELLS:,} cells; YES does"
             ),
         )

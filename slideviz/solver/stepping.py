@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.motions.box import moved_boxes
 from slideviz.case.words import wrong_by
-from slideviz.errors import DeformError, Note, UnsoundError
+from slideviz.errors import DeformError, Message, Remark, UnsoundError, note
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import torn_interfaces
@@ -63,9 +63,9 @@ class _Finding:
     error_estimate: float
     refined: float
     """`condition`, `max_error`, `error_estimate`, `refined`: as of `Solution`."""
-    short: list[str]  # that its data reduction ended too early, or []
-    dropped: list[str]  # that singular nodes were left out, or []
-    others: list[str]  # what is said of every step
+    short: list[Remark]  # that its data reduction ended too early, or []
+    dropped: list[Remark]  # that singular nodes were left out, or []
+    others: list[Remark]  # what is said of every step
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ class Stepping:
         if self.rate is None and self.case.method == "rbf":
             if setup.frame.cylindrical:
                 farthest = farthest_node(mesh.points, points)
-            step = replace(step, warnings=tuple(stray_warning(setup, mesh, points, farthest)))
+            step = replace(step, messages=tuple(stray_warning(setup, mesh, points, farthest)))
         if self.mend is not None and self.case.repair_steps:
             step = self.mend(step)
             coords = mended_coords(setup, step, coords)
@@ -183,14 +183,14 @@ class Stepping:
         left: list[str] = []
         if step.index == step.total:
             left = wall_warnings(self.setup, self.case, self.mesh, points)
-        warnings = (
+        messages = (
             *_run_warnings([*self.case.warnings, *self.setup.warnings], findings),
             *apart,
             *torn_interfaces(self.mesh, points),
-            *step.warnings,
+            *step.messages,
             *left,
         )
-        return replace(step, warnings=warnings, periodic_misfit=misfit)
+        return replace(step, messages=messages, periodic_misfit=misfit)
 
     def quality_of(self, steps: Sequence[Step]) -> Quality:
         """Return the quality after the last of some steps.
@@ -248,7 +248,7 @@ class Stepping:
             condition=solution.condition,
             node_counts=self.setup.classes.counts(),
             seconds=timer.seconds,
-            warnings=(),
+            messages=(),
             history=solution.history,
             control=solution.control,
             candidates=self.setup.candidates,
@@ -444,7 +444,7 @@ def with_halo_copies(
 
 
 def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Finding:
-    others = [f"step {step.index}: {text}" for text in solution.warnings]
+    others: list[Remark] = [f"step {step.index}: {text}" for text in solution.warnings]
     if step.repaired is not None:
         others += step.repaired.warnings
     if solution.relaxed is not None and solution.relaxed.limited:
@@ -462,7 +462,7 @@ def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Findi
     )
 
 
-def _run_warnings(before: Sequence[str], findings: Sequence[_Finding]) -> list[str]:
+def _run_warnings(before: Sequence[Remark], findings: Sequence[_Finding]) -> list[Remark]:
     """Return the warnings of a run after some steps, each once.
 
     Of the reductions that ended too early the one with the largest error is told, else the first
@@ -492,8 +492,8 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
     )
 
 
-def _limited_note(limited: int, nodes: int, index: int) -> Note:
-    return Note(
+def _limited_note(limited: int, nodes: int, index: int) -> Message:
+    return note(
         f"step {index}: the relaxation was held back at {limited} of {nodes} nodes, where it would "
         f"have made the worst cells worse{'; more STEPS may help' if index == 1 else ''}"
     )
@@ -501,7 +501,7 @@ def _limited_note(limited: int, nodes: int, index: int) -> Note:
 
 def _doubt_warning(
     error_estimate: float, refined: float, index: int, condition: float
-) -> list[str]:
+) -> list[Remark]:
     """Return the warning that a solution cannot be trusted, the note that it was refined, or []."""
     nearly = f"the system is nearly singular (condition number {condition:.0e})"
     if error_estimate > TRUSTED:
@@ -511,10 +511,10 @@ def _doubt_warning(
             "DATA_REDUCTION= YES, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
             "INFLUENCE_FACTOR"
         )
-        return [sentence if error_estimate > NOTED else Note(sentence)]
+        return [sentence if error_estimate > NOTED else note(sentence)]
     if refined:
         return [
-            Note(
+            note(
                 f"step {index}: {nearly}; between the boundary nodes its solution would be wrong "
                 f"by {100 * refined:.2g} % of the largest displacement, so it was refined with "
                 f"twice the digits, to {100 * error_estimate:.2g} %"
@@ -525,7 +525,7 @@ def _doubt_warning(
 
 def _dropped_warning(
     setup: Setup, solution: Solution, index: int, total: int, mesh: Mesh
-) -> list[str]:
+) -> list[Remark]:
     """Return the warning, or the note if negligible, that singular nodes were left out; or []."""
     if not len(solution.dropped):
         return []
@@ -557,4 +557,4 @@ def _dropped_warning(
         "neighbouring cells absorb it"
     )
     harmless = solution.dropped_error <= AGREE * mesh.extent
-    return [Note(sentence) if harmless else sentence]
+    return [note(sentence) if harmless else sentence]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.errors import Note
+from slideviz.errors import Remark, SlidevizError
 from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.margin import chain as chained_safety
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, sealed
@@ -220,7 +220,7 @@ class Step:
     """``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``."""
     seconds: Mapping[str, float] = made_by(metadata=by(_counted, new=True))
     """Spent in this step, by phase; ``classify`` only in the first."""
-    warnings: tuple[str, ...] = made_by(metadata=by(_chained))
+    messages: tuple[Remark, ...] = made_by(metadata=by(_chained))
     """What the user should know of case, mesh and all steps so far."""
     history: tuple[Cycle, ...] = made_by(default=(), metadata=by(_chained, new=True))
     """Convergence of the greedy selection in this step; empty without data reduction."""
@@ -299,17 +299,18 @@ class Step:
             label = names_from(mesh, part)
             walls = [(tuple(map(label.__getitem__, wall)), size) for wall, size in layers.walls]
             layers = replace(layers, walls=tuple(walls))
-        warnings = (
-            (Note if isinstance(text, Note) else str)(f"zone {zone + 1}: {text}")
-            for text in self.warnings
-        )
         return replace(
             self,
             control=self.control + part.points.start,
             safe=safe,
             kept_layers=layers,
-            warnings=tuple(warnings),
+            messages=SlidevizError(*self.messages).within(f"zone {zone + 1}"),
         )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The texts of ``messages``."""
+        return tuple(map(str, self.messages))
 
     @cached_property
     def limits(self) -> tuple[LimitResult, ...]:

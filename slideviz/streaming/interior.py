@@ -45,7 +45,7 @@ class InteriorDisplacer:
             last,
             mesh=last.mesh.with_points(sealed(points)),
             repaired=repair,
-            warnings=(*last.warnings, *repair.warnings),
+            messages=(*last.messages, *repair.warnings),
             periodic_misfit=largest_misfit(
                 self.setup.frame, self.setup.coords, points, self.setup.images
             ),

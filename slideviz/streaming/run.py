@@ -403,7 +403,7 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
     last = displacer.steps[-1]
     more = skin.numbering.n_points - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
-    steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
+    steps = (*displacer.steps[:-1], replace(last, messages=(*last.messages, *stray)))
     return [
         replace(
             step,

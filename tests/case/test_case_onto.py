@@ -64,7 +64,7 @@ def test_curves_and_surfaces_of_several_formats(shifted, tmp_path):
     for path in (shifted, tmp_path / "high.vtu"):
         moved = displacements(case(path), mesh)
         assert moved.at(nodes) == pytest.approx(np.tile([0.0, 0.2], (len(nodes), 1)), abs=0.01)
-        assert "airfoil lies on high" in moved.warnings[0]
+        assert "airfoil lies on high" in str(moved.warnings[0])
         assert moved.warnings[0].report["distance"] < 1e-12
     assert is_laid(case(shifted), mesh)
     sphere = sphere_in_box(4)

@@ -508,7 +508,7 @@ def test_held_planes_act_on_each_kind_in_its_way(fixed, here):
         points = both[1]
     after = boxes_of(found.boxed(found.mesh))[0]
     np.testing.assert_allclose(after.points, points, rtol=0, atol=1e-14)
-    said = " ".join(found.warnings)
+    said = " ".join(map(str, found.warnings))
     for places, effect in ((still, "do nothing"), (partly, "leave the control points there")):
         if places:
             assert f"{', '.join(map(str, places))} of DV_KIND will {effect}" in said

@@ -79,7 +79,7 @@ def test_no_tooltip_of_the_window_is_wider_than_it_can_be_read(driver, sample_fo
     window.start_run()
     driver.settle()
     (run,) = driver.session.runs
-    last = replace(run.last, step=replace(run.last.step, warnings=(warns,) * bool(warns)))
+    last = replace(run.last, step=replace(run.last.step, messages=(warns,) * bool(warns)))
     window.store.put(replace(driver.session, runs=(replace(run, frames=(last,)),)))
     found = [tip for widget in window.findChildren(QWidget) for tip in tips_of(widget)]
     assert any(warns[:20] in tip for tip in found)
@@ -110,7 +110,7 @@ def test_the_status_bar_follows_a_run_and_the_log_keeps_its_warnings(
 ):
     driver.open(sample_folder / "passage" / "passage.cfg")
     window, said = driver.window, []
-    monkeypatch.setattr(running, "warnings_of", lambda run: (LONG,))
+    monkeypatch.setattr(running, "remarks_of", lambda _, level: (LONG,) * (level == "warning"))
     window.statusBar().messageChanged.connect(said.append)
     window.store.change(changes.set_case, steps=2)
     window.start_run()

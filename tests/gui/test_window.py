@@ -14,7 +14,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 from slideviz import Case, read
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.errors import Message, Note
+from slideviz.errors import Message, note
 from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
@@ -805,7 +805,7 @@ def ended_badly(driver, texts=(), inverted=38):
     status = last.quality.status.copy()
     status[:inverted] = INVERTED
     bad = replace(last.quality, status=status)
-    frame = replace(last, quality=bad, step=replace(last.step, warnings=tuple(texts)))
+    frame = replace(last, quality=bad, step=replace(last.step, messages=tuple(texts)))
     ended = replace(session.runs[-1], frames=(frame,))
     driver.window.store.put(replace(session, runs=(*session.runs[:-1], ended)))
     driver.window.running._run_done(None)
@@ -862,8 +862,8 @@ def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):
 
 def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(ready, caplog):
     caplog.set_level("INFO")
-    note = Note("24 nodes are not control nodes, so this does no harm")
-    ended_badly(ready, [note], inverted=0)
+    said = note("24 nodes are not control nodes, so this does no harm")
+    ended_badly(ready, [said], inverted=0)
     assert not ready.window.banner.isVisible()
     assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
     assert "24 nodes are not control nodes" in describe_run(ready.session.runs[-1])
@@ -872,9 +872,9 @@ def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(rea
     assert text.text().endswith(" times as far.</a> <a href='notes'>1 note</a>")
     assert "24 nodes are not control nodes" in text.toolTip()
     text.linkActivated.emit("notes")
-    assert ready.window.banner.text.text() == f"Note: {note}"
+    assert ready.window.banner.text.text() == f"Note: {said}"
     ready.window.banner.hide()
-    ended_badly(ready, [note, "the solver stopped early"], inverted=0)
+    ended_badly(ready, [said, "the solver stopped early"], inverted=0)
     assert ready.window.banner.isVisible()
     assert ready.window.banner.property("calm")
     assert ready.window.banner.text.text() == "the solver stopped early"

@@ -81,7 +81,7 @@ def test_a_blade_is_laid_onto_itself_turned_bent_and_longer(noise, height, stato
     # The target's facets are coarse: their rims are not round.
     allowed = 1e-5 if height > 1.0 else 2e-3 if noise else 1e-4 + beyond
     assert far(moved[rim], triangles) < allowed
-    assert "its rim stays on HUB and SHROUD, at most" in laid.warnings[0]
+    assert "its rim stays on HUB and SHROUD, at most" in str(laid.warnings[0])
     areas, wanted = (facet_vectors(x, quads) for x in (moved, true))
     assert (np.einsum("fd,fd->f", areas, wanted) > 0.0).all()
     share = np.linalg.norm(areas, axis=1) / np.linalg.norm(wanted, axis=1)

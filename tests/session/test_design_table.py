@@ -174,13 +174,12 @@ def test_another_table_keeps_the_results_of_the_same_designs():
 
 def test_reasons_to_fail_are_told_once_with_their_designs(passage):
     table = DesignTable().crossed("STEPS", [str(k) for k in range(1, 11)])
-    name = passage.mesh.name
-    why = {n: DesignRow(n, problem=f"{name}: too far") for n in range(1, 8)}
-    rows = why | {3: DesignRow(3, problem=f"{name}: too near"), 8: DesignRow(8, inverted=2)}
-    assert table.with_results(rows.values()).summary(passage.mesh).splitlines() == [
+    why = {n: DesignRow(n, problem="a.su2: too far") for n in range(1, 8)}
+    rows = why | {3: DesignRow(3, problem="a.su2: too near"), 8: DesignRow(8, inverted=2)}
+    assert table.with_results(rows.values()).summary().splitlines() == [
         "1 design done; 7 failed; 1 with inverted cells",
-        "Designs 1, 2, 4, 5, 6 and 1 more: too far",
-        "Design 3: too near",
+        "Designs 1, 2, 4, 5, 6 and 1 more: a.su2: too far",
+        "Design 3: a.su2: too near",
     ]
 
 

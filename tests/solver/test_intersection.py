@@ -339,7 +339,7 @@ def test_a_run_warns_of_a_body_that_goes_through_itself():
     case = case.change(motions=(moved,), steps=1)
     assert any(
         text.startswith("sphere goes through itself near (") and text.endswith("move it less")
-        for text in make_setup(prepare(case, mesh)).warnings
+        for text in map(str, make_setup(prepare(case, mesh)).warnings)
     )
     less = case.change(motions=(Prescribed(nodes, 0.1 * vectors),))
     assert not make_setup(prepare(less, mesh)).warnings

@@ -18,7 +18,7 @@ from slideviz.cli import run
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.samples.table import sample
 from slideviz.session import jobs
-from slideviz.session.run_messages import warnings_of
+from slideviz.session.run_messages import remarks_of
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.prepare import prepare
 from slideviz.solver.remedies import remedies
@@ -364,7 +364,7 @@ def test_first_heights_that_changed_much_are_a_warning_with_wall_place_and_remed
     frames = []
     jobs.compute(case, mesh, frames.append, lambda: False)
     ended = Run(1, case, tuple(x for x in frames if isinstance(x, StepFrame)), "done")
-    shown = [text for text in warnings_of(ended) if "the first height" in text]
+    shown = [text for text in remarks_of(ended, "warning") if "the first height" in text]
     assert len(said) == len(shown) == (remedy is not None)
     if remedy is None:
         return

@@ -9,7 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.errors import CaseError, MeshError, Note, UnsoundError
+from slideviz.errors import CaseError, MeshError, UnsoundError, messages_of
 from slideviz.mesh.quality import VALID
 from slideviz.solver.repair_stage import find_freedom, repair_case
 from slideviz.solver.steps import MeshRepair
@@ -232,9 +232,8 @@ def test_a_deformer_leaves_repair_out_and_says_so():
     plain = sv.Deformer(mesh, case)
     for value, harmless in (("auto", True), ("yes", False)):
         deformer = sv.Deformer(mesh, case.change(repair=value))
-        assert [isinstance(text, Note) for text in deformer.warnings if "REPAIR" in text] == [
-            harmless
-        ]
+        said = [one for one in messages_of(deformer.messages) if "REPAIR" in str(one)]
+        assert [one.level == "note" for one in said] == [harmless]
         np.testing.assert_array_equal(deformer.deform(), plain.deform())
         assert deformer.as_run() is None
 

@@ -30,7 +30,7 @@ def test_every_field_of_a_step_survives_joining(tmp_path):
             condition=10.0 * k,
             node_counts={"moving": k},
             seconds={"solve": float(k)},
-            warnings=("late",),
+            messages=("late",),
             history=(k,),
             tried=(k,),
             control=np.array([k]),

@@ -26,7 +26,7 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, name_text, number
-from slideviz.errors import CaseError, Message, Note, SlidevizError
+from slideviz.errors import CaseError, Message, SlidevizError, note
 from slideviz.ffd.box import Box, Index
 from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
@@ -116,7 +116,7 @@ class BoxMotion(Motion):
                 moved = _moved(boxes[name], mesh, q, change, mine)
                 if moved is not None:
                     if not alone and any(b.name == name for b in boxes_of(mesh, system_of(case))):
-                        stays = Note(_STAYS.format(repr(name)))
+                        stays = note(_STAYS.format(repr(name)))
                         moved = replace(moved, warnings=(*moved.warnings, stays))
                     found[place] = moved
                 elif mine:

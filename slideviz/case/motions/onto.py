@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -16,7 +16,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
 from slideviz.case.words import Word, number
-from slideviz.errors import CaseError, MeshError, Message, Note, printable
+from slideviz.errors import CaseError, MeshError, Message, printable
 from slideviz.formats.files import read as read_mesh
 from slideviz.formats.files import read_surface
 from slideviz.machine.onto import AGREE, Laid, Nearest, Wall, find_edges, lay_onto
@@ -53,10 +53,12 @@ _LAID = WeakCache()
 _one_at_a_time = Lock()
 
 
-class Remaining(Note):
+@dataclass(frozen=True, eq=False)
+class Remaining(Message):
     """The note on how far boundaries remain from the target that they are laid onto."""
 
-    report: Mapping[str, object]  # what the report of a run has: boundaries, file, distances
+    report: Mapping[str, object] = field(default_factory=dict)
+    """What the report of a run has: boundaries, file, distances."""
 
 
 @dataclass(frozen=True)
@@ -285,15 +287,14 @@ def _checked(
     words = f"{of} lies on {motion.path.name}, at most {inner:.3g} away from it"
     if walls:
         words += f"; its rim stays on {' and '.join(walls)}, at most {at_rim:.3g} away from it"
-    note = Remaining(words)
-    note.report = {
+    report = {
         "boundaries": list(names),
         "file": str(motion.path),
         "distance": farthest,
         "rim_distance": at_rim,
         "farthest_move": float(np.linalg.norm(laid.vectors, axis=1).max()),
     }
-    return note
+    return Remaining(words, level="note", report=report)
 
 
 def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> tuple[TargetSurface, float]:

@@ -33,7 +33,7 @@ from slideviz.design.su2.variables import (
     read_variables,
     supported,
 )
-from slideviz.errors import CaseError, Message, Note, nearest, not_one_of, raise_all, shown
+from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, raise_all, shown
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
@@ -74,7 +74,7 @@ def radial_keys(rows: Mapping[str, Entry]) -> set[str]:
 
 
 def radial_settings(
-    case: Case, rows: Mapping[str, Entry], note: Callable[..., None], warnings: list[str]
+    case: Case, rows: Mapping[str, Entry], note: Callable[..., None], warnings: list[Remark]
 ) -> Case:
     """Return the case with SU2's settings of its method, where slideviz's own are not given.
 
@@ -85,7 +85,7 @@ def radial_settings(
         note(rows["DEFORM_KIND"], not_one_of(kind, ("ELASTIC", "RBF")))
     if kind == "ELASTIC" and "METHOD" not in rows:
         why = "DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; write METHOD="
-        warnings.append(Note(f"{why} elastic for elasticity"))
+        warnings.append(Message(f"{why} elastic for elasticity", level="note"))
     fields: dict[str, Any] = {}
     for name, form in {**READ_ALWAYS, **(READ_WITH_RBF if kind == "RBF" else {})}.items():
         if name in rows:
@@ -457,7 +457,7 @@ class _Reader:
         self.rows = rows
         self.problems = problems
         self.named: dict[str, str] = {}
-        self.warnings: list[str] = []
+        self.warnings: list[Remark] = []
 
     def word(self, key: str, default: str) -> str:
         """Return the value of a key, without quotes."""

@@ -20,7 +20,7 @@ from slideviz.design.su2.sensitivities import (
     read_sensitivities,
 )
 from slideviz.design.su2.surface import MovingSurface, convex_part, make_surface
-from slideviz.errors import ConditionWarning, ToleranceWarning
+from slideviz.errors import ConditionWarning, Remark, ToleranceWarning
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
@@ -46,7 +46,7 @@ class Gradients:
     at_design: bool
     """Whether the design is that of the configuration; else it is the undeformed mesh."""
     source: str  # path of the sensitivities
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
 
 def design_gradients(
@@ -106,7 +106,7 @@ def find_gradients(
         written.append(points)
         return points
 
-    messages: list[str] = []
+    messages: list[Remark] = []
     with _heard(messages):
         matched = match(sensitivities, mesh, surface.nodes, markers, design if moves else None)
         if moves and not matched.at_design:
@@ -126,7 +126,7 @@ def _gradients(
     matched: Matched,
     pulled: FloatArray,
     displacement: FloatArray,
-    said: Sequence[str],
+    said: Sequence[Remark],
 ) -> Gradients:
     """Return the gradients from that for each moving node, ``pulled`` (m, d)."""
     slopes = (
@@ -153,7 +153,7 @@ def _gradients(
 
 
 @contextmanager
-def _heard(said: list[str]) -> Iterator[None]:
+def _heard(said: list[Remark]) -> Iterator[None]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ConditionWarning)
         warnings.simplefilter("always", ToleranceWarning)
@@ -161,7 +161,7 @@ def _heard(said: list[str]) -> Iterator[None]:
     for one in caught:
         assert isinstance(one.message, Warning)
         if one.category is ConditionWarning:
-            said.append(one.message.args[0])  # a `Note`, where little
+            said.append(one.message.args[0])  # a `note`, where little
         elif one.category is ToleranceWarning:  # its remedy is one for Python
             said.append(f"{one.message.args[0].rule}; {INSUFFICIENT}")
         else:

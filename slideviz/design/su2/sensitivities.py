@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from slideviz.case.lines import read_text
 from slideviz.case.motions.airfoil import normals_at
 from slideviz.design.su2.config import Su2Config
-from slideviz.errors import CaseError, Note
+from slideviz.errors import CaseError, Remark, note
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.topology import unit
 from slideviz.system.file_checks import require_regular_file
@@ -132,7 +132,7 @@ class Matched:
     values: FloatArray  # (n, d)
     at_design: bool
     """Whether they were computed at the design's points; else at those of the undeformed mesh."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
 
 
 def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensitivities:
@@ -289,7 +289,7 @@ def match(
         place = np.arange(len(mesh.points))
         place[each.nodes[alone]] = each.partners[alone]
         rows = place[rows]
-    notes = []
+    notes = list[Remark]()
     if gap > CLOSE * unit:
         where = "this design" if at_design else mesh.name
         notes.append(
@@ -307,7 +307,7 @@ def match(
         of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
         sentence = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
         expected = np.array_equal(index, moving) or (normal_only and not lost)
-        notes.append(Note(sentence) if expected else sentence)
+        notes.append(note(sentence) if expected else sentence)
     at = design() if design is not None and at_design and normal_only else mesh.points
     return Matched(_vectors(values, mesh, at, moving, markers), at_design, tuple(notes))
 

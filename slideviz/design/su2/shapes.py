@@ -18,7 +18,7 @@ from slideviz.case.motions.airfoil import (
 )
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable, angle_notes
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Remark
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -41,7 +41,7 @@ class Displacer:
         return (False,) * len(self.config.variables)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Remark, ...]:
         """Return sentences for the user."""
         return ()
 

@@ -23,7 +23,7 @@ from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.on_mesh import joined, problems_of_markers, zone_of
 from slideviz.design.su2.shapes import Displacer, Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
-from slideviz.errors import CaseError, DeformError, Message, Note, SlidevizError, raise_all
+from slideviz.errors import CaseError, DeformError, Message, Remark, SlidevizError, note, raise_all
 from slideviz.ffd.box import Box
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
@@ -205,7 +205,7 @@ class ZoneDisplacers(Displacer):
         return tuple(all(self.zones[k].idle[at] for k, at in some) for some in self._owners)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Remark, ...]:
         """Return those of all zones, each once."""
         return tuple(dict.fromkeys(text for zone in self.zones for text in zone.warnings))
 
@@ -259,7 +259,7 @@ class MovingSurface:
     mesh: Mesh
     nodes: IntArray  # (m,): of all moving boundaries, or of the mesh (``*_GRID``), ascending
     displacer: Displacer
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
     zones: tuple[MovingSurface, ...] = ()  # that of each, with CONFIG_LIST
 
     @property
@@ -418,7 +418,7 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
         zones = enumerate(each_zone(case, mesh))
         steps = {k: at_rest(*each) for k, each in zones if each[0].markers_with("moving")}
         step = Step.joined(mesh, mesh, steps, steps, next(iter(steps.values())))
-        return replace(step, warnings=(*case.warnings, *step.warnings))
+        return replace(step, messages=(*case.warnings, *step.messages))
     setup = make_setup(prepare(case, mesh))
     return Step(
         index=1,
@@ -429,13 +429,13 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
         condition=np.nan,
         node_counts=setup.classes.counts(),
         seconds={},
-        warnings=(*case.warnings, *setup.warnings),
+        messages=(*case.warnings, *setup.warnings),
         candidates=setup.candidates,
         support_radius=setup.basis.radius if case.method == "rbf" else None,
     )
 
 
-def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
+def _left_behind(config: Su2Config, mesh: Mesh) -> list[Remark]:
     """Return a note if variables move the surface, but not the FFD boxes in the mesh; or none."""
     moving = [each for each in config.variables if not each.ignored and each.group != "nothing"]
     kinds = sorted({each.kind for each in moving})
@@ -445,5 +445,5 @@ def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
                 f"the FFD boxes in {config.case.mesh_out} follow their control points only, and "
                 f"not {', '.join(kinds)}; define them again to use them with that mesh"
             )
-            return [Note(sentence)]
+            return [note(sentence)]
     return []

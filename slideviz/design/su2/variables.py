@@ -13,7 +13,7 @@ from typing import Literal
 
 from slideviz.case.lines import Entry
 from slideviz.case.words import Word, counted, groups_of, list_of, number, words_of
-from slideviz.errors import CaseError, Message, Note, nearest
+from slideviz.errors import CaseError, Message, Remark, nearest, note
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
 """What SU2 does with a list of variables; the first kind decides it for all of them."""
@@ -136,7 +136,7 @@ def form(name: str) -> str:
 
 
 def read_variables(
-    rows: Mapping[str, Entry], problems: list[Message], warnings: list[str]
+    rows: Mapping[str, Entry], problems: list[Message], warnings: list[Remark]
 ) -> tuple[DesignVariable, ...]:
     """Return the design variables of ``DV_KIND``, ``DV_PARAM`` and ``DV_VALUE``.
 
@@ -194,7 +194,7 @@ def _strange(kinds: list[str]) -> list[str]:
 
 
 def _groups(
-    rows: Mapping[str, Entry], kinds: list[str], problems: list[Message], warnings: list[str]
+    rows: Mapping[str, Entry], kinds: list[str], problems: list[Message], warnings: list[Remark]
 ) -> list[list[Word]]:
     """Return the words of each variable's parameters; none where DV_PARAM is wrong."""
     entry = rows.get("DV_PARAM")
@@ -224,7 +224,7 @@ def _groups(
     most = len(KINDS[kinds[len(groups) - 1]].parameters)
     if most and len(last) > most:
         extra = ", ".join(word.text for word in last[most:])
-        warnings.append(Note(f"DV_PARAM: {extra} after the last variable is ignored"))
+        warnings.append(note(f"DV_PARAM: {extra} after the last variable is ignored"))
         groups[-1] = last[:most]
     return groups
 
@@ -254,7 +254,7 @@ def _with_values(
     rows: Mapping[str, Entry],
     variables: list[DesignVariable],
     problems: list[Message],
-    warnings: list[str],
+    warnings: list[Remark],
 ) -> list[DesignVariable]:
     entry = rows.get("DV_VALUE")
     needless = not variables or variables[0].group in WITHOUT_VALUE
@@ -302,7 +302,9 @@ def _contradictions(variables: list[DesignVariable]) -> list[str]:
     return []
 
 
-def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[DesignVariable, ...]:
+def _dispatched(
+    variables: list[DesignVariable], warnings: list[Remark]
+) -> tuple[DesignVariable, ...]:
     """Return the variables, those marked that do nothing in SU2 beside the first one."""
     reasons: dict[str, list[str]] = {}
     marked = []

@@ -36,7 +36,7 @@ from slideviz import __version__
 from slideviz.case.limits import check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import DesignRow
-from slideviz.errors import Note, SlidevizError
+from slideviz.errors import SlidevizError, messages_of
 from slideviz.formats.files import write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
@@ -160,7 +160,7 @@ def _result(task: Task, mesh: Mesh | None, begin: float) -> DesignRow:
 
 
 def _warnings(last: Step) -> tuple[str, ...]:
-    return tuple(text for text in last.warnings if not isinstance(text, Note))
+    return tuple(str(one) for one in messages_of(last.messages) if one.level != "note")
 
 
 def _worker_name() -> str:

@@ -436,9 +436,7 @@ class DesignsPanel(Panel):
             return
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
-            self._show_status(
-                f"Design {number}: {self.table.reason(number, self.mesh)}", wrong=True
-            )
+            self._show_status(f"Design {number}: {row.problem}", wrong=True)
             return
         try:
             values = self.table.designs()[number - 1]
@@ -495,5 +493,5 @@ class DesignsPanel(Panel):
 
     def _ended(self, text: str, wrong: bool) -> None:
         failed = self.table.count_done() < len(self.table.results)
-        self._show_status(text or self.table.summary(self.mesh), wrong or failed)
+        self._show_status(text or self.table.summary(), wrong or failed)
         self._sync()

@@ -25,8 +25,8 @@ from slideviz.session.run_messages import (
     exact_cost,
     inverted_words,
     limits_words,
-    notes_of,
     path_ending,
+    remarks_of,
     remedy_for,
     run_requirements,
 )
@@ -126,7 +126,7 @@ class RunPanel(Panel):
             if reach_run(session):
                 reach = f"<a href='{REACH}'>{reach}</a>"
             text = text + reach
-            notes = notes_of(run)
+            notes = remarks_of(run, "note")
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
@@ -162,7 +162,7 @@ class RunPanel(Panel):
         if target == NOTES:
             run = self.store.session.run_shown
             if run is not None:
-                text = "\n".join(f"Note: {note}" for note in notes_of(run))
+                text = "\n".join(f"Note: {note}" for note in remarks_of(run, "note"))
                 main_window(self).banner.show_message(text)
         elif target == REACH:
             self.requirement_clicked.emit(Requirement("", "curves"))
