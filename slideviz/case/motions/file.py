@@ -79,18 +79,18 @@ class FromFile(Motion):
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):
-            if type(motion) is not FromFile:
+            if not isinstance(motion, FromFile) or type(motion) is not cls:
                 continue
             moved = {name: nodes for name, nodes in on.items() if applies_to(motion, name)}
             if not moved and motion.marker:
                 continue
             try:
-                found[place] = motion._displacements(mesh, moved)
+                found[place] = motion.listed(case, mesh, moved)
             except CaseError as problem:
                 problems += problem.messages
         return found
 
-    def _displacements(self, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
+    def listed(self, case: Case, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
         """Return what the file lists for markers and their nodes; read again if it has changed."""
         nodes = np.unique(np.concatenate([*moved.values(), np.empty(0, np.int64)]))
         names = " or ".join(repr(name) for name in named(self.marker))

@@ -128,18 +128,8 @@ class Onto(FromFile):
                     "leaves before; put this one first"
                 )
 
-    @classmethod
-    def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
-    ) -> dict[int, Displacements]:
-        found: dict[int, Displacements] = {}
-        for place, motion in enumerate(case.motions):
-            if isinstance(motion, Onto) and any(applies_to(motion, name) for name in on):
-                try:
-                    found[place] = laid_displacements(motion, case, mesh, on)
-                except CaseError as problem:
-                    problems += problem.messages
-        return found
+    def listed(self, case: Case, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
+        return laid_displacements(self, case, mesh, moved)
 
 
 def laid_displacements(
