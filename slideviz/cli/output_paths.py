@@ -75,62 +75,64 @@ def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) ->
     from slideviz.system.atomic import require_writable
     from slideviz.system.file_checks import require_no_input
 
-    there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
-    for one in there:
-        assert one.path is not None
+    there = [output for output in outputs if output.path is not None and str(output.path) != "-"]
+    for output in there:
+        assert output.path is not None
         # First of all, whether an input would be overwritten: the worst mistake.
-        for path in _paths(one):
-            require_no_input(path, CaseError, one.replaces, one.remedy)
-    for one, other in combinations(there, 2):
-        if _overlap(one, other) or _overlap(other, one):
-            file = one.path if other.files else other.path
+        for path in _paths(output):
+            require_no_input(path, CaseError, output.replaces, output.remedy)
+    for output, other in combinations(there, 2):
+        if _overlap(output, other) or _overlap(other, output):
+            file = output.path if other.files else other.path
             raise CaseError(
-                f"{one.option} and {other.option} both name {file}; give each a file of its own"
+                f"{output.option} and {other.option} both name {file}; give each a file of its own"
             )
-    for one in there:
-        assert one.path is not None
-        if one.is_mesh:
-            _require_mesh_ending(one.path)
-        if one.files:
-            make_folder(one.path)
+    for output in there:
+        assert output.path is not None
+        if output.is_mesh:
+            _require_mesh_ending(output.path)
+        if output.files:
+            make_folder(output.path)
         else:
-            require_writable(one.path, CaseError, one.replaces)
+            require_writable(output.path, CaseError, output.replaces)
     if not getattr(arguments, "quiet", False):
-        _print_replaced([one for one in there if not one.named])
+        _print_replaced([output for output in there if not output.named])
 
 
 def _print_replaced(unnamed: list[OutputPath]) -> None:
     old_files = []
-    for one in unnamed:
-        old = [path for path in _paths(one) if path.exists()]
+    for output in unnamed:
+        old = [path for path in _paths(output) if path.exists()]
         if old:
             more = f" and {len(old) - 1} more" if len(old) > 1 else ""
-            old_files.append(f"{old[0]}{more} ({one.option})")
+            old_files.append(f"{old[0]}{more} ({output.option})")
     if old_files:
         say("note", f"there already, and replaced by this run: {', '.join(old_files)}")
 
 
-def _paths(one: OutputPath) -> Iterator[Path]:
-    assert one.path is not None
-    if not one.files:
-        yield one.path
-    elif one.path.is_dir():
-        yield from sorted(path for path in one.path.iterdir() if re.fullmatch(one.files, path.name))
+def _paths(output: OutputPath) -> Iterator[Path]:
+    assert output.path is not None
+    if not output.files:
+        yield output.path
+    elif output.path.is_dir():
+        yield from sorted(
+            path for path in output.path.iterdir() if re.fullmatch(output.files, path.name)
+        )
 
 
-def _overlap(one: OutputPath, other: OutputPath) -> bool:
-    """Return whether the file ``other`` is the same as ``one``, or would be one in that folder."""
+def _overlap(output: OutputPath, other: OutputPath) -> bool:
+    """Return whether the file ``other`` is ``output``, or would be one in that folder."""
     from slideviz.system.file_checks import same_file
 
-    assert one.path is not None
+    assert output.path is not None
     assert other.path is not None
     if other.files:
         return False
-    if not one.files or same_file(one.path, other.path):
-        return same_file(one.path, other.path)
+    if not output.files or same_file(output.path, other.path):
+        return same_file(output.path, other.path)
     folder, name = os.path.split(os.path.realpath(other.path))
-    inside = os.path.realpath(one.path) == folder and re.fullmatch(one.files, name)
-    return bool(inside) or any(same_file(path, other.path) for path in _paths(one))
+    inside = os.path.realpath(output.path) == folder and re.fullmatch(output.files, name)
+    return bool(inside) or any(same_file(path, other.path) for path in _paths(output))
 
 
 def _require_mesh_ending(file: Path) -> None:

@@ -34,22 +34,22 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
     none: then the derivative is that of ln f_skew.
     ``out`` (m, n, d): meaningless (possibly NaN) where a corner Jacobian is not positive.
     """
-    at = np.empty((points.shape[1], nodes.shape[1], LANES))
-    slope = np.empty_like(at)
+    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    slope = np.empty_like(coords)
     alpha = np.empty((len(table), LANES))
     spread = np.empty((len(table), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
-        gather(points, nodes, first, count, at)
-        corners(at, table, count, alpha)
-        spreads(vtk, at, table, count, spread)
+        gather(points, nodes, first, count, coords)
+        corners(coords, table, count, alpha)
+        spreads(vtk, coords, table, count, spread)
         here = slice(first, first + count)
         _weights(alpha, spread, turn[here], powers, sums[here])
         slope[:] = 0.0
         if points.shape[1] == 2:
-            _pull_plane(vtk, at, table, count, alpha, spread, slope)
+            _pull_plane(vtk, coords, table, count, alpha, spread, slope)
         else:
-            _pull_solid(vtk, at, table, count, alpha, spread, slope)
+            _pull_solid(vtk, coords, table, count, alpha, spread, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -86,7 +86,7 @@ def _power(base, exponent):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+def _pull_plane(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
 
     ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
@@ -96,10 +96,10 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
         i = table[k, 1]
         j = table[k, 2]
         for c in range(count):
-            ax = at[0, i, c] - at[0, o, c]
-            ay = at[1, i, c] - at[1, o, c]
-            bx = at[0, j, c] - at[0, o, c]
-            by = at[1, j, c] - at[1, o, c]
+            ax = coords[0, i, c] - coords[0, o, c]
+            ay = coords[1, i, c] - coords[1, o, c]
+            bx = coords[0, j, c] - coords[0, o, c]
+            by = coords[1, j, c] - coords[1, o, c]
             if vtk == 5:
                 aa = 2.0
                 ab = -1.0
@@ -122,7 +122,7 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
 
 
 @njit(**OPTIONS)
-def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+def _pull_solid(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
     for k in range(len(table)):
         o = table[k, 0]
@@ -130,9 +130,9 @@ def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
         j = table[k, 2]
         h = table[k, 3]
         for c in range(count):
-            x = edge(at, o, i, c)
-            y = edge(at, o, j, c)
-            z = edge(at, o, h, c)
+            x = edge(coords, o, i, c)
+            y = edge(coords, o, j, c)
+            z = edge(coords, o, h, c)
             yz = cross3(y, z)
             zx = cross3(z, x)
             xy = cross3(x, y)
@@ -193,16 +193,16 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
     ``weights`` (k, m): factors of the coefficients, in the order of `jacobians.write_coefficients`.
     ``out`` (m, n, d): written.
     """
-    at = np.empty((points.shape[1], nodes.shape[1], LANES))
-    slope = np.empty_like(at)
+    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    slope = np.empty_like(coords)
     part = np.zeros((len(weights), LANES))
     none = np.zeros((len(weights), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
-        gather(points, nodes, first, count, at)
+        gather(points, nodes, first, count, coords)
         part[:, :count] = weights[:, first : first + count]
         slope[:] = 0.0
-        pull_proof(vtk, at, table, count, part, none, slope)
+        pull_proof(vtk, coords, table, count, part, none, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -210,20 +210,20 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
 
 
 @njit(**OPTIONS)
-def pull_proof(vtk, at, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
+def pull_proof(vtk, coords, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
     """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES).
 
     ``none`` (k, LANES) are zeros.
     """
     if vtk == 12:
-        _pull_hexahedron(at, count, weights.reshape(3, 3, 3, LANES), slope)
+        _pull_hexahedron(coords, count, weights.reshape(3, 3, 3, LANES), slope)
     elif vtk == 13:
         weights = weights.reshape(3, 3, LANES)
-        _pull_heights(at, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
-    elif at.shape[0] == 2:
-        _pull_plane(5, at, table, count, weights, none, slope)
+        _pull_heights(coords, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
+    elif coords.shape[0] == 2:
+        _pull_plane(5, coords, table, count, weights, none, slope)
     else:
-        _pull_solid(14, at, table, count, weights, none, slope)
+        _pull_solid(14, coords, table, count, weights, none, slope)
 
 
 _U = NODE.transpose(1, 0, 2)
@@ -237,7 +237,7 @@ _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 
 
 @njit(**OPTIONS)
-def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
+def _pull_hexahedron(coords, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
     heights = NODE.reshape(4, 2)
     factors = np.empty((3, 4, LANES))
@@ -250,11 +250,11 @@ def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
                     for n in range(3):
                         for c in range(count):
                             factors[n, 2 * p + q, c] = weight * weights[i + p, j + q, n, c]
-            _pull_heights(at, count, _SIDES[i, j], heights, factors, slope)
+            _pull_heights(coords, count, _SIDES[i, j], heights, factors, slope)
 
 
 @njit(**OPTIONS)
-def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
+def _pull_heights(coords, count, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
     """Add derivatives of ``Σ_h w_h · (f0h u0 x v0 + f1h (u0 x v1 + u1 x v0) / 2 + f2h u1 x v1)``.
 
     ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cells, ``heights`` (h, 2) those
@@ -263,10 +263,10 @@ def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no
     products = np.empty((3, 3, LANES))
     total = np.zeros((3, 3, LANES))
     for c in range(count):
-        u0 = edge(at, sides[0, 0], sides[0, 1], c)
-        v0 = edge(at, sides[1, 0], sides[1, 1], c)
-        u1 = edge(at, sides[2, 0], sides[2, 1], c)
-        v1 = edge(at, sides[3, 0], sides[3, 1], c)
+        u0 = edge(coords, sides[0, 0], sides[0, 1], c)
+        v0 = edge(coords, sides[1, 0], sides[1, 1], c)
+        u1 = edge(coords, sides[2, 0], sides[2, 1], c)
+        v1 = edge(coords, sides[3, 0], sides[3, 1], c)
         low = cross3(u0, v0)
         top = cross3(u1, v1)
         middle = half_sum(cross3(u0, v1), cross3(u1, v0))
@@ -278,7 +278,7 @@ def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no
         one, two = heights[h]
         for axis in range(3):
             for c in range(count):
-                w = at[axis, two, c] - at[axis, one, c]
+                w = coords[axis, two, c] - coords[axis, one, c]
                 value = factors[0, h, c] * products[0, axis, c]
                 value += factors[1, h, c] * products[1, axis, c]
                 value += factors[2, h, c] * products[2, axis, c]
@@ -293,8 +293,8 @@ def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no
         across = 1 - k % 2
         own, other = (across, 2 + across) if upper == 0 else (2 + across, across)
         for c in range(count):
-            x = edge(at, sides[own, 0], sides[own, 1], c)
-            y = edge(at, sides[other, 0], sides[other, 1], c)
+            x = edge(coords, sides[own, 0], sides[own, 1], c)
+            y = edge(coords, sides[other, 0], sides[other, 1], c)
             far = total[2 * upper, 0, c], total[2 * upper, 1, c], total[2 * upper, 2, c]
             half = 0.5 * total[1, 0, c], 0.5 * total[1, 1, c], 0.5 * total[1, 2, c]
             if across == 1:

@@ -1,8 +1,8 @@
 """Corner Jacobians and Bernstein coefficients of the Jacobian determinant of cells, compiled.
 
 Arrays here have the cells last, ``(..., m)``, so that every inner loop runs over contiguous memory
-and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are in use. ``at`` is
-(d, n, m): the coordinates of the n nodes of m cells of one type. ``table`` is ``CORNERS[vtk]``.
+and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are in use. ``coords``
+(d, n, m) are the coordinates of the n nodes of m cells of one type. ``table`` is ``CORNERS[vtk]``.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ _HALVES = np.array(
 )
 
 
-def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
+def decide_unproven(vtk: int, coords: FloatArray, signs: NDArray[np.int8]) -> Status:
     """Return the status (m,) of cells with positive corner Jacobians, but not all coefficients.
 
-    They are prisms or hexahedra with nodes ``at`` (3, n, m). ``signs`` (m,) are 1, or -1 for a cell
-    that is numbered the other way round.
+    They are prisms or hexahedra with nodes ``coords`` (3, n, m). ``signs`` (m,) are 1, or -1 for a
+    cell that is numbered the other way round.
     """
     if vtk == 12:
-        return subdivide(coefficients(12, at).reshape(3, 3, 3, -1) * signs)
-    low, middle, top = coefficients(13, at).reshape(3, 3, -1) * signs
+        return subdivide(coefficients(12, coords).reshape(3, 3, 3, -1) * signs)
+    low, middle, top = coefficients(13, coords).reshape(3, 3, -1) * signs
     # A quadratic with these coefficients has minimum zero if middle = -√(low · top).
     product = low * top  # negative by rounding only
     positive = (product >= 0) & (middle + np.sqrt(np.maximum(product, 0.0)) > 0)
@@ -110,8 +110,8 @@ def check_cells(mesh: Mesh) -> None:
 
 
 @njit(**OPTIONS)
-def gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
-    """Write the coordinates of ``count`` cells, from number ``first`` on, into ``at``.
+def gather(points, nodes, first, count, coords):  # type: ignore[no-untyped-def]
+    """Write the coordinates of ``count`` cells, from number ``first`` on, into ``coords``.
 
     ``points`` are (N, d), ``nodes`` of the cells (m, n).
     """
@@ -119,16 +119,16 @@ def gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
         for j in range(nodes.shape[1]):
             node = nodes[first + c, j]
             for axis in range(points.shape[1]):
-                at[axis, j, c] = points[node, axis]
+                coords[axis, j, c] = points[node, axis]
 
 
 @njit(inline="always", **OPTIONS)
-def edge(at, start, stop, c):  # type: ignore[no-untyped-def]
+def edge(coords, start, stop, c):  # type: ignore[no-untyped-def]
     """Return the vector, a triple, from local node ``start`` to ``stop`` of cell ``c``."""
     return (
-        at[0, stop, c] - at[0, start, c],
-        at[1, stop, c] - at[1, start, c],
-        at[2, stop, c] - at[2, start, c],
+        coords[0, stop, c] - coords[0, start, c],
+        coords[1, stop, c] - coords[1, start, c],
+        coords[2, stop, c] - coords[2, start, c],
     )
 
 
@@ -163,7 +163,7 @@ def minus3(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
+def corners(coords, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
 
     They are the determinants of the edges that leave each corner. `jacobian_slopes` has their
@@ -173,22 +173,22 @@ def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
         o = table[k, 0]
         i = table[k, 1]
         j = table[k, 2]
-        if at.shape[0] == 2:
+        if coords.shape[0] == 2:
             for c in range(count):
-                ax = at[0, i, c] - at[0, o, c]
-                ay = at[1, i, c] - at[1, o, c]
-                bx = at[0, j, c] - at[0, o, c]
-                by = at[1, j, c] - at[1, o, c]
+                ax = coords[0, i, c] - coords[0, o, c]
+                ay = coords[1, i, c] - coords[1, o, c]
+                bx = coords[0, j, c] - coords[0, o, c]
+                by = coords[1, j, c] - coords[1, o, c]
                 alpha[k, c] = ax * by - ay * bx
         else:
             h = table[k, 3]
             for c in range(count):
-                normal = cross3(edge(at, o, i, c), edge(at, o, j, c))
-                alpha[k, c] = dot3(normal, edge(at, o, h, c))
+                normal = cross3(edge(coords, o, i, c), edge(coords, o, j, c))
+                alpha[k, c] = dot3(normal, edge(coords, o, h, c))
 
 
 @njit(**OPTIONS)
-def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
+def spreads(vtk, coords, table, count, spread):  # type: ignore[no-untyped-def]
     """Write the spread of each corner into ``spread`` (k, ...).
 
     The skew compares the corner Jacobian with it; `slideviz.mesh.skew` defines it for each type,
@@ -198,21 +198,21 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
         o = table[k, 0]
         i = table[k, 1]
         j = table[k, 2]
-        if at.shape[0] == 2:
+        if coords.shape[0] == 2:
             for c in range(count):
-                ax = at[0, i, c] - at[0, o, c]
-                ay = at[1, i, c] - at[1, o, c]
-                bx = at[0, j, c] - at[0, o, c]
-                by = at[1, j, c] - at[1, o, c]
+                ax = coords[0, i, c] - coords[0, o, c]
+                ay = coords[1, i, c] - coords[1, o, c]
+                bx = coords[0, j, c] - coords[0, o, c]
+                by = coords[1, j, c] - coords[1, o, c]
                 aa = ax * ax + ay * ay
                 bb = bx * bx + by * by
                 spread[k, c] = aa + bb - (ax * bx + ay * by) if vtk == 5 else np.sqrt(aa * bb)
             continue
         h = table[k, 3]
         for c in range(count):
-            x = edge(at, o, i, c)
-            y = edge(at, o, j, c)
-            z = edge(at, o, h, c)
+            x = edge(coords, o, i, c)
+            y = edge(coords, o, j, c)
+            z = edge(coords, o, h, c)
             xx = dot3(x, x)
             yy = dot3(y, y)
             zz = dot3(z, z)
@@ -228,26 +228,26 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def write_prism(at, count, found):  # type: ignore[no-untyped-def]
-    """Write the Bernstein coefficients of det J of prisms into ``found`` (3, 3, ...).
+def write_prism(coords, count, out):  # type: ignore[no-untyped-def]
+    """Write the Bernstein coefficients of det J of prisms into ``out`` (3, 3, ...).
 
     The determinant is linear over the triangle and quadratic along the height: the entry
     ``[c, i]`` is coefficient c of the quadratic above corner i. Entries 0 and 2 are the corner
     Jacobians, and the volume is the sum of all, divided by 18.
     """
     for c in range(count):
-        a = edge(at, 0, 1, c)
-        b = edge(at, 0, 2, c)
-        p = edge(at, 3, 4, c)
-        q = edge(at, 3, 5, c)
+        a = edge(coords, 0, 1, c)
+        b = edge(coords, 0, 2, c)
+        p = edge(coords, 3, 4, c)
+        q = edge(coords, 3, 5, c)
         low = cross3(a, b)
         top = cross3(p, q)
         middle = half_sum(cross3(a, q), cross3(p, b))
         for i in range(3):
-            height = edge(at, i, i + 3, c)
-            found[0, i, c] = dot3(low, height)
-            found[1, i, c] = dot3(middle, height)
-            found[2, i, c] = dot3(top, height)
+            height = edge(coords, i, i + 3, c)
+            out[0, i, c] = dot3(low, height)
+            out[1, i, c] = dot3(middle, height)
+            out[2, i, c] = dot3(top, height)
 
 
 NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
@@ -255,8 +255,8 @@ NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 
 
 @njit(**OPTIONS)
-def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
-    """Write the Bézier coefficients of det J of hexahedra into ``found`` (3, 3, 3, ...).
+def write_hexahedron(coords, count, out):  # type: ignore[no-untyped-def]
+    """Write the Bézier coefficients of det J of hexahedra into ``out`` (3, 3, 3, ...).
 
     The derivatives along u, v and w are bilinear, with the twelve edges as coefficients; so the
     coefficient (a, b, c) of their triple product, which is quadratic in each parameter, is the
@@ -265,14 +265,14 @@ def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
     coefficients are the corner Jacobians, and the mean of all is the volume (A. Johnen,
     J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
     """
-    found[:] = 0.0
+    out[:] = 0.0
     for i in range(2):
         for j in range(2):
             for c in range(count):
-                u0 = edge(at, NODE[0, j, 0], NODE[1, j, 0], c)
-                u1 = edge(at, NODE[0, j, 1], NODE[1, j, 1], c)
-                v0 = edge(at, NODE[i, 0, 0], NODE[i, 1, 0], c)
-                v1 = edge(at, NODE[i, 0, 1], NODE[i, 1, 1], c)
+                u0 = edge(coords, NODE[0, j, 0], NODE[1, j, 0], c)
+                u1 = edge(coords, NODE[0, j, 1], NODE[1, j, 1], c)
+                v0 = edge(coords, NODE[i, 0, 0], NODE[i, 1, 0], c)
+                v1 = edge(coords, NODE[i, 0, 1], NODE[i, 1, 1], c)
                 low = cross3(u0, v0)
                 top = cross3(u1, v1)
                 middle = half_sum(cross3(u0, v1), cross3(u1, v0))
@@ -280,20 +280,20 @@ def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
                     for q in range(2):
                         # 1 / binomial(2, a) for the sum of two linear Bernstein factors, each way.
                         weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
-                        w = edge(at, NODE[p, q, 0], NODE[p, q, 1], c)
-                        found[i + p, j + q, 0, c] += weight * dot3(low, w)
-                        found[i + p, j + q, 1, c] += weight * dot3(middle, w)
-                        found[i + p, j + q, 2, c] += weight * dot3(top, w)
+                        w = edge(coords, NODE[p, q, 0], NODE[p, q, 1], c)
+                        out[i + p, j + q, 0, c] += weight * dot3(low, w)
+                        out[i + p, j + q, 1, c] += weight * dot3(middle, w)
+                        out[i + p, j + q, 2, c] += weight * dot3(top, w)
 
 
 @njit(**OPTIONS)
 def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians of cells, ``nodes`` (m, n), into ``alpha`` (k, m)."""
-    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
-        gather(points, nodes, first, count, at)
-        corners(at, table, count, alpha[:, first : first + count])
+        gather(points, nodes, first, count, coords)
+        corners(coords, table, count, alpha[:, first : first + count])
 
 
 @njit(**OPTIONS)
@@ -308,22 +308,22 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
     ``UNPROVEN`` where another coefficient of a prism or a hexahedron is not, which
     `slideviz.mesh.jacobians.decide_unproven` is still to decide; else ``VALID``.
     """
-    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
     coefficients = np.empty((3, 3, 3, LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         here = slice(first, first + count)
-        gather(points, nodes, first, count, at)
-        corners(at, table, count, alpha[:, here])
-        spreads(vtk, at, table, count, spread[:, here])
+        gather(points, nodes, first, count, coords)
+        corners(coords, table, count, alpha[:, here])
+        spreads(vtk, coords, table, count, spread[:, here])
         sides = turn[here]
         states = status[here]
         states[:] = VALID
         if vtk == 12:
-            write_hexahedron(at, count, coefficients)
+            write_hexahedron(coords, count, coefficients)
             _mark(coefficients.reshape(27, LANES), sides, states, UNPROVEN)
         elif vtk == 13:
-            write_prism(at, count, coefficients[0])
+            write_prism(coords, count, coefficients[0])
             _mark(coefficients[0, 1], sides, states, UNPROVEN)
         for k in range(len(table)):
             for c in range(count):
@@ -342,21 +342,21 @@ def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def write_coefficients(vtk, at, table, count, found):  # type: ignore[no-untyped-def]
-    """Write the coefficients of the proof of validity of cells of one type into ``found`` (k, m).
+def write_coefficients(vtk, coords, table, count, out):  # type: ignore[no-untyped-def]
+    """Write the coefficients of the proof of validity of cells of one type into ``out`` (k, m).
 
     They are the 27 of a hexahedron, the 9 of a prism, else the corner Jacobians.
     """
     if vtk == 12:
-        write_hexahedron(at, count, found.reshape(3, 3, 3, found.shape[1]))
+        write_hexahedron(coords, count, out.reshape(3, 3, 3, out.shape[1]))
     elif vtk == 13:
-        write_prism(at, count, found.reshape(3, 3, found.shape[1]))
+        write_prism(coords, count, out.reshape(3, 3, out.shape[1]))
     else:
-        corners(at, table, count, found)
+        corners(coords, table, count, out)
 
 
-def coefficients(vtk: int, at: FloatArray) -> FloatArray:
-    """Return the coefficients (k, m) of the proof of validity of cells, ``at`` (d, n, m)."""
-    found = np.empty(({12: 27, 13: 9}.get(vtk, len(CORNERS[vtk])), at.shape[2]))
-    write_coefficients(vtk, np.ascontiguousarray(at), CORNERS[vtk], at.shape[2], found)
-    return found
+def coefficients(vtk: int, coords: FloatArray) -> FloatArray:
+    """Return the coefficients (k, m) of the proof of validity of cells, ``coords`` (d, n, m)."""
+    out = np.empty(({12: 27, 13: 9}.get(vtk, len(CORNERS[vtk])), coords.shape[2]))
+    write_coefficients(vtk, np.ascontiguousarray(coords), CORNERS[vtk], coords.shape[2], out)
+    return out

@@ -114,7 +114,7 @@ def _check_exponent(p: float) -> None:
     """Raise CaseError if the exponent of a smooth minimum is below 1 or no number."""
     if not 1 <= p < np.inf:
         raise CaseError(
-            f"the exponent of the smooth minimum, p = {p}, is too small; give p >= 1 (default 50)"
+            f"the exponent of the smooth minimum is p = {p}; give a finite p >= 1, e.g. 50"
         )
 
 

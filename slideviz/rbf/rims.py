@@ -50,10 +50,10 @@ class RimWall(Protocol):
     def bulge(self) -> float:
         """Return how far nodes on it may be off its facets."""
 
-    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
 
-    def across(self, at: FloatArray) -> FloatArray:
+    def across(self, positions: FloatArray) -> FloatArray:
         """Return the feet (k, d) of nodes at (k, d) on the planes that are tangent there."""
 
 
@@ -68,14 +68,14 @@ class FlatWall:
     """`point`, `normal` (d,): of the plane."""
     bulge: float = 0.0
 
-    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the feet of nodes at (k, d), and their derivatives (k, d, d)."""
         slopes = np.eye(len(self.normal)) - np.outer(self.normal, self.normal)
-        return self.across(at), np.broadcast_to(slopes, (len(at), *slopes.shape))
+        return self.across(positions), np.broadcast_to(slopes, (len(positions), *slopes.shape))
 
-    def across(self, at: FloatArray) -> FloatArray:
+    def across(self, positions: FloatArray) -> FloatArray:
         """Return the feet (k, d) of nodes at (k, d)."""
-        return at - ((at - self.point) @ self.normal)[:, None] * self.normal
+        return positions - ((positions - self.point) @ self.normal)[:, None] * self.normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +100,16 @@ class CurvedWall:
     def _surface(self) -> ClosestPoints:
         return ClosestPoints(self.simplices, self.shift, self.ends)
 
-    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
-        closest, which = self._surface.nearest(at)
-        return closest, projection_matrices(self._surface.simplices(which), at, closest)
+        closest, which = self._surface.nearest(positions)
+        return closest, projection_matrices(self._surface.simplices(which), positions, closest)
 
-    def across(self, at: FloatArray) -> FloatArray:
+    def across(self, positions: FloatArray) -> FloatArray:
         """Return the feet (k, d) of nodes at (k, d) on the planes of the facets closest to them."""
-        closest, which = self._surface.nearest(at)
+        closest, which = self._surface.nearest(positions)
         normals = unit(simplex_vectors(self._surface.simplices(which)))
-        return at - np.einsum("kd,kd->k", at - closest, normals)[:, None] * normals
+        return positions - np.einsum("kd,kd->k", positions - closest, normals)[:, None] * normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,9 +231,9 @@ class Rims:
         Of those that are on other walls, too, from the plane of the wall: where they leave
         another, this one ends.
         """
-        at = self.frame.coords(points)
+        positions = self.frame.coords(points)
         corner = self.walls_of[wall.rows] > 1
-        there = np.where(corner[:, None], wall.across(at), wall.closest(at)[0])
+        there = np.where(corner[:, None], wall.across(positions), wall.closest(positions)[0])
         return np.asarray(np.linalg.norm(self.frame.points(there) - points, axis=1))
 
     @property
@@ -241,14 +241,14 @@ class Rims:
         """Return the length up to which a correction is rounding."""
         return ROUNDING * largest_coordinate(self.start)
 
-    def projected(self, at: Array, keep: Keep | None = None) -> Array:
+    def projected(self, positions: Array, keep: Keep | None = None) -> Array:
         """Return the coordinates (..., m, d) of the moving nodes with their rims on the walls.
 
-        ``at`` (..., m, d): where they would be without. ``keep``: of derivatives.
+        ``positions`` (..., m, d): where they would be without. ``keep``: of derivatives.
         """
         if self.bodies is None:
-            return at
-        here = take(at, self.rim)
+            return positions
+        here = take(positions, self.rim)
         if keep is None:
             off: Array = self.closest(value(here))[0] - value(here)
         else:
@@ -260,14 +260,16 @@ class Rims:
         if isinstance(off, Variable):
             off = Variable(exact, off.tape, off.place)
         elif not exact.any():
-            return at
+            return positions
         else:
             off = exact
         more = self._spread(self.bodies, off)
-        x = value(at)
+        x = value(positions)
         by = value(more)
         # Adding zero would turn -0.0 into 0.0.
-        return recorded(np.where(by == 0.0, x, x + by), (at, _same, _same), (more, _same, _same))
+        return recorded(
+            np.where(by == 0.0, x, x + by), (positions, _same, _same), (more, _same, _same)
+        )
 
     def _spread(self, bodies: Bodies, of_rim: Array) -> Array:
         there = np.flatnonzero(self.place >= 0)
@@ -287,18 +289,18 @@ class Rims:
 
         return recorded(spread(value(of_rim)), (of_rim, spread, gathered))
 
-    def closest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the closest points (r, d) on the walls, and their derivatives (r, d, d).
 
-        ``at`` (r, d): the coordinates of the rim. Where several walls meet, Newton's method goes to
-        a point that is on all of them: each time to the closest one of their tangent planes.
+        ``positions`` (r, d): coordinates of the rim. Where several walls meet, Newton's method goes
+        to a point that is on all of them: each time to the closest one of their tangent planes.
         """
-        count, dim = at.shape
-        closest = at.copy()
+        count, dim = positions.shape
+        closest = positions.copy()
         slopes = np.zeros((count, dim, dim))
         for wall in self.walls:
             rows = wall.rows[self.walls_of[wall.rows] == 1]
-            closest[rows], slopes[rows] = wall.closest(at[rows])
+            closest[rows], slopes[rows] = wall.closest(positions[rows])
         corners = np.flatnonzero(self.walls_of > 1)
         enough = ENOUGH * largest_coordinate(self.start)
         for _ in range(ROUNDS if len(corners) else 0):
@@ -313,20 +315,20 @@ class Rims:
                 break
         return closest, slopes
 
-    def _across(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _across(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return for nodes of several walls the parts of a step across them, and those needed.
 
         They are (r, q, d) and (r, q), zero where a node has fewer walls than others, or one.
         """
-        count, dim = at.shape
+        count, dim = positions.shape
         across = np.zeros((count, int(self.walls_of.max()), dim, dim))
         ways = np.zeros(across.shape[:3])
         filled = np.zeros(count, np.int64)
         for wall in self.walls:
             rows = wall.rows[self.walls_of[wall.rows] > 1]
-            closest, slopes = wall.closest(at[rows])
+            closest, slopes = wall.closest(positions[rows])
             across[rows, filled[rows]] = np.eye(dim) - slopes
-            ways[rows, filled[rows]] = closest - at[rows]
+            ways[rows, filled[rows]] = closest - positions[rows]
             filled[rows] += 1
         return across.reshape(count, -1, dim), ways.reshape(count, -1)
 
@@ -340,12 +342,12 @@ class Rims:
         rows = np.flatnonzero(self.nodes[place] == nodes)[::-1]  # of images the first one counts
         shift = np.zeros_like(self.start)
         shift[self.representative[place[rows]]] = self.frame.difference(points[rows], vectors[rows])
-        at = self.start + shift[self.representative]
-        now = value(self.projected(at))
-        rows = rows[(now != at)[place[rows]].any(axis=1)]
+        positions = self.start + shift[self.representative]
+        now = value(self.projected(positions))
+        rows = rows[(now != positions)[place[rows]].any(axis=1)]
         out = vectors.copy()
         change = place[rows]
-        out[rows] += self.frame.points(now[change]) - self.frame.points(at[change])
+        out[rows] += self.frame.points(now[change]) - self.frame.points(positions[change])
         return out
 
 

@@ -149,7 +149,7 @@ class BoundaryLayer(Layer):
         self._enclosed = enclosing.inner
 
     def shapes(self) -> list[Any]:
-        return [one.shape for one in self.drawn.values()]
+        return [boundary.shape for boundary in self.drawn.values()]
 
     def _add(self, surface: Surface, points: FloatArray) -> DrawnBoundary:
         shape = actors.surface_shape(surface, points, 2 * self._lift)
@@ -180,16 +180,16 @@ class BoundaryLayer(Layer):
             new.view.color_by != "role" and new.mesh.dim == 3
         )
         if by_value and recolored(old, new):
-            for one in self.drawn.values():
-                one.shape.cell_data[VALUES] = self.stage.values_of(new, one.surface.owner)
+            for boundary in self.drawn.values():
+                boundary.shape.cell_data[VALUES] = self.stage.values_of(new, boundary.surface.owner)
         self.glass = self._glass(new)
         self._buried = self._hides_mark(new)
-        for name, one in self.drawn.items():
-            self._style(name, one, new, by_value)
+        for name, boundary in self.drawn.items():
+            self._style(name, boundary, new, by_value)
         # From outside, the back faces are invisible: culled, they cost no drawing time.
         culled = self._closed and not self.glass and seen_from_outside(new)
-        for one in self.drawn.values():
-            one.actor.prop.culling = "back" if culled else "none"
+        for boundary in self.drawn.values():
+            boundary.actor.prop.culling = "back" if culled else "none"
 
     def _glass(self, session: Session) -> frozenset[str]:
         """Return the names of boundaries that enclose moving ones, if colors show roles."""
@@ -206,31 +206,31 @@ class BoundaryLayer(Layer):
         hidden = session.view.hidden
         if mesh is None or mesh.dim == 2 or session.frame is None or not session.frame.has(cell):
             return False
-        shown = (one for name, one in self.drawn.items() if name not in hidden)
-        return not any((one.surface.owner == cell).any() for one in shown)
+        shown = (boundary for name, boundary in self.drawn.items() if name not in hidden)
+        return not any((boundary.surface.owner == cell).any() for boundary in shown)
 
     def _place(self, points: FloatArray) -> None:
-        for one in self.drawn.values():
-            at = points[one.surface.nodes]
-            actors.place(one.shape, at, 2 * self._lift)
-            if one.surface.name in self.bands:
-                actors.place(self.bands[one.surface.name].shape, at, self._lift)
+        for boundary in self.drawn.values():
+            positions = points[boundary.surface.nodes]
+            actors.place(boundary.shape, positions, 2 * self._lift)
+            if boundary.surface.name in self.bands:
+                actors.place(self.bands[boundary.surface.name].shape, positions, self._lift)
 
-    def _style(self, name: str, one: DrawnBoundary, session: Session, by_value: bool) -> None:
+    def _style(self, name: str, boundary: DrawnBoundary, session: Session, by_value: bool) -> None:
         view = session.view
         shown = name not in view.hidden
-        one.actor.visibility = shown
+        boundary.actor.visibility = shown
         lit = shown and name in view.selected
         if lit and name not in self.bands and session.frame is not None:
-            self.bands[name] = self._add_band(one.surface, session.frame.mesh.points)
+            self.bands[name] = self._add_band(boundary.surface, session.frame.mesh.points)
         if name in self.bands:
             self.bands[name].actor.visibility = lit
-        one.actor.prop.color = ROLES[session.role(name)].color
-        one.actor.mapper.scalar_visibility = by_value
-        if one.surface.flat:
-            one.actor.prop.line_width = 4.5 if view.color_by == "role" or by_value else 3.0
+        boundary.actor.prop.color = ROLES[session.role(name)].color
+        boundary.actor.mapper.scalar_visibility = by_value
+        if boundary.surface.flat:
+            boundary.actor.prop.line_width = 4.5 if view.color_by == "role" or by_value else 3.0
         else:
-            self.stage.edges(one.actor.prop, "edges" in view.drawn)
+            self.stage.edges(boundary.actor.prop, "edges" in view.drawn)
             inside = looks_inside(session)
             glass = name in self.glass
             opacity = SEE_THROUGH if self._buried else 1.0
@@ -238,9 +238,9 @@ class BoundaryLayer(Layer):
                 opacity = 0.12
             elif glass:
                 opacity = GLASS
-            see_through(one.actor, opacity)
+            see_through(boundary.actor, opacity)
             if inside or self._buried:
-                one.actor.prop.show_edges = False
+                boundary.actor.prop.show_edges = False
 
 
 def looks_inside(session: Session) -> bool:
@@ -385,9 +385,9 @@ class CoarseLayer(Layer):
         if on:
             self._draw()
             return True
-        for name, one in self.drawn.items():
-            self._boundaries.drawn[name].actor.visibility = one.actor.visibility
-            one.actor.visibility = False
+        for name, boundary in self.drawn.items():
+            self._boundaries.drawn[name].actor.visibility = boundary.actor.visibility
+            boundary.actor.visibility = False
         for prop in self._edged:
             prop.show_edges = True
         self._edged = []
@@ -398,23 +398,25 @@ class CoarseLayer(Layer):
         assert session.mesh is not None
         assert session.frame is not None
         if not self.drawn:
-            self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
+            self.drawn = {name: self._add(surface) for name, surface in self.surfaces.items()}
         made_of = session.frame, session.view.color_by, session.color_range
         again = made_of != self._made_of
         self._made_of = made_of
-        for name, one in self.drawn.items():
+        for name, boundary in self.drawn.items():
             full = self._boundaries.drawn[name].actor
             if again:
-                actors.place(one.shape, session.frame.mesh.points[one.surface.nodes])
+                actors.place(boundary.shape, session.frame.mesh.points[boundary.surface.nodes])
             if again and session.view.color_by != "role":
-                one.shape.cell_data[VALUES] = self.stage.values_of(session, one.surface.owner)
-            one.actor.prop.DeepCopy(full.prop)
-            one.actor.prop.show_edges = False
-            see_through(one.actor, full.prop.opacity)
-            one.actor.mapper.scalar_visibility = full.mapper.scalar_visibility
-            one.actor.visibility = full.visibility
+                boundary.shape.cell_data[VALUES] = self.stage.values_of(
+                    session, boundary.surface.owner
+                )
+            boundary.actor.prop.DeepCopy(full.prop)
+            boundary.actor.prop.show_edges = False
+            see_through(boundary.actor, full.prop.opacity)
+            boundary.actor.mapper.scalar_visibility = full.mapper.scalar_visibility
+            boundary.actor.visibility = full.visibility
             full.visibility = False
-        props = [one.actor.prop for one in self._sections.drawn.values()]
+        props = [boundary.actor.prop for boundary in self._sections.drawn.values()]
         self._edged = [prop for prop in props if prop.show_edges or prop in self._edged]
         for prop in self._edged:
             prop.show_edges = False

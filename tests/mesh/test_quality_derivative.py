@@ -379,7 +379,7 @@ def test_the_work_can_be_stopped():
 
 @pytest.mark.parametrize("p", [0.5, 0.0, -3.0, np.inf, np.nan])
 def test_the_exponent_must_be_one_or_more(p):
-    with pytest.raises(CaseError, match=r"exponent of the smooth minimum is .* 1 or more"):
+    with pytest.raises(CaseError, match=r"exponent of the smooth minimum is p = .* p >= 1"):
         quality(grid((2, 2)), derivative=True, p=p)
 
 

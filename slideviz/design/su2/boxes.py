@@ -84,7 +84,7 @@ def _meets(ends: FloatArray, corners: FloatArray, dim: int) -> bool:
     return _pierced(ends, corners[[0, 1, 2]]) or _pierced(ends, corners[[3, 2, 1]])
 
 
-def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
+def _crossed(ends: FloatArray, first: FloatArray, second: FloatArray) -> bool:
     def side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
         return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
             c[..., 0] - a[..., 0]
@@ -92,9 +92,9 @@ def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
 
     start = ends[:, 0]
     end = ends[:, 1]
-    across = side(one, other, start) * side(one, other, end) <= 0.0
+    across = side(first, second, start) * side(first, second, end) <= 0.0
     # Segments on the line itself do not cross it.
-    apart = (side(one, other, start) == 0.0) & (side(one, other, end) == 0.0)
+    apart = (side(first, second, start) == 0.0) & (side(first, second, end) == 0.0)
     return bool((across & ~apart).any())
 
 
@@ -108,10 +108,10 @@ def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
     rise = along @ normal
     # Whether it gets to the plane of the triangle; one within the plane pierces nothing.
     reaches = (np.abs(height) <= np.abs(rise)) & (height * rise <= 0.0) & (rise != 0.0)
-    at = start[reaches] - (height[reaches] / rise[reaches])[:, None] * along[reaches]
+    hits = start[reaches] - (height[reaches] / rise[reaches])[:, None] * along[reaches]
     area = float(normal @ normal)
-    a = np.cross(at, v) @ normal / area
-    b = np.cross(u, at) @ normal / area
+    a = np.cross(hits, v) @ normal / area
+    b = np.cross(u, hits) @ normal / area
     return bool(((a >= 0.0) & (b >= 0.0) & (a + b <= 1.0)).any())
 
 
@@ -159,10 +159,14 @@ def held_by_continuity(
         if asking:
             asked = asking[0].words["FFD_CONTINUITY"].upper()
             note = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
-            warnings += [f"{note}{places_words(at)} will {effect}" for at, effect in effects if at]
+            warnings += [
+                f"{note}{places_words(places)} will {effect}"
+                for places, effect in effects
+                if places
+            ]
         elif stuck or partly:
             done = " and ".join(
-                f"{places_words(at)} would {effect}" for at, effect in effects if at
+                f"{places_words(places)} would {effect}" for places, effect in effects if places
             )
             warnings.append(
                 f"SU2 would hold {_words(held)} of the box {name}, since the surface leaves it "
@@ -179,11 +183,11 @@ def _boxes_moved(config: Su2Config) -> set[str]:
 
 def _held_in(zones: list[Su2Config], mesh: Mesh, box: Box) -> Planes:
     """Return the planes of a box that any zone holds, by axis."""
-    each = [
+    held_by_zone = [
         held_planes(zone, mesh, box, zone.words["FFD_CONTINUITY"].upper() or SU2_CONTINUITY)
         for zone in zones
     ]
-    i, j, k = zip(*each, strict=True)
+    i, j, k = zip(*held_by_zone, strict=True)
     return frozenset().union(*i), frozenset().union(*j), frozenset().union(*k)
 
 
@@ -226,11 +230,13 @@ class MovedBoxes(Displacer):
     def _places(self) -> list[tuple[int, int]]:
         """Variable and number of the value, from 0, of each value."""
         variables = enumerate(self.config.variables)
-        return [(place, part) for place, each in variables for part in range(len(each.values))]
+        return [
+            (place, part) for place, variable in variables for part in range(len(variable.values))
+        ]
 
     def _moves(self, place: int) -> tuple[Move, ...]:
         variable = self.config.variables[place]
-        box = next(each for each in self.boxes if each.name == variable.box)
+        box = next(box for box in self.boxes if box.name == variable.box)
         return moves_of(box, request_of(self.config, variable), self.held[box.name])
 
     @cached_property
@@ -248,9 +254,9 @@ class MovedBoxes(Displacer):
         drives = []
         for value, (place, part) in enumerate(self._places):
             variable = self.config.variables[place]
-            one = len(variable.values) == 1
+            is_single = len(variable.values) == 1
             mine = self._moves(place)[part : part + 1]
-            drives += [DrivenMove(variable.box, move, value, one) for move in mine]
+            drives += [DrivenMove(variable.box, move, value, is_single) for move in mine]
         return BoxDeformation(
             self.boxes,
             self.embedded,
@@ -283,12 +289,12 @@ class MovedBoxes(Displacer):
     ) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return the surface points of a box with new parametric coordinates (k, 3) of nodes."""
         nodes = self.nodes[places]
-        found = {}
+        surfaces = {}
         for marker, (listed, before) in box.embedded.items():
-            at = np.minimum(np.searchsorted(nodes, listed), len(nodes) - 1)
-            moves = (nodes[at] == listed) & (marker in self.config.markers)
-            found[marker] = listed, np.where(moves[:, None], uvw[at], before)
-        return found
+            rows = np.minimum(np.searchsorted(nodes, listed), len(nodes) - 1)
+            moves = (nodes[rows] == listed) & (marker in self.config.markers)
+            surfaces[marker] = listed, np.where(moves[:, None], uvw[rows], before)
+        return surfaces
 
 
 def limits_of(config: Su2Config) -> Limits:
@@ -325,7 +331,9 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
                 f"{name!r}; correct the box or DV_MARKER"
             )
         if name in names:
-            warnings += [text for each in config.markers for text in off_points(box, mesh, each)]
+            warnings += [
+                text for marker in config.markers for text in off_points(box, mesh, marker)
+            ]
     held, stuck = held_by_continuity(config, mesh, {box.name: box for box in boxes})
     moved = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held)
     try:
@@ -336,13 +344,13 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
     return replace(moved, remarks=(*warnings, *stuck, *notes))
 
 
-def _without_effect(found: MovedBoxes) -> list[str]:
+def _without_effect(moved_boxes: MovedBoxes) -> list[str]:
     """Return sentences about variables that move nothing in SU2 either."""
     reasons: dict[str, list[int]] = {}
-    missed = {found._places[value][0] for value in found.at_design.missed}
-    for place, variable in enumerate(found.config.variables):
-        box = next(each for each in found.boxes if each.name == variable.box)
-        request = request_of(found.config, variable)
+    missed = {moved_boxes._places[value][0] for value in moved_boxes.at_design.missed}
+    for place, variable in enumerate(moved_boxes.config.variables):
+        box = next(box for box in moved_boxes.boxes if box.name == variable.box)
+        request = request_of(moved_boxes.config, variable)
         if place in missed:
             why = "its segment does not meet its plane of control points"
         elif any(map(reach, moves_of(box, request))) or variable.kind == "FFD_ANGLE_OF_ATTACK":
@@ -353,7 +361,8 @@ def _without_effect(found: MovedBoxes) -> list[str]:
             why = "three indices of -1 move nothing"
         reasons.setdefault(f"{variable.kind}: {why}", []).append(place + 1)
     return [
-        f"as in SU2, {places_words(at)} will have no effect; {why}" for why, at in reasons.items()
+        f"as in SU2, {places_words(places)} will have no effect; {why}"
+        for why, places in reasons.items()
     ]
 
 
@@ -368,7 +377,9 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
         on = {name: embedding(mesh, box, name)[0] for name in config.markers}
-        listed = {name: (found.nodes, found.uvw) for name, found in on.items() if len(found.nodes)}
+        listed = {
+            name: (inside.nodes, inside.uvw) for name, inside in on.items() if len(inside.nodes)
+        }
         boxes.append(replace(box, embedded=listed))
     if not boxes:
         raise CaseError(f"{config.source}: FFD_SETTING needs FFD_DEFINITION, which has no box")
@@ -415,9 +426,9 @@ def _embeddings(
     listed = [marker for marker in markers if marker in box.embedded]
     if not box.embedded:
         return on, []
-    known = np.concatenate([np.empty(0, np.int64), *(on[one][0].nodes for one in listed)])
+    known = np.concatenate([np.empty(0, np.int64), *(on[marker][0].nodes for marker in listed)])
     warnings = []
-    for marker in (one for one in markers if one not in listed):
+    for marker in (name for name in markers if name not in listed):
         stay = np.setdiff1d(on[marker][0].nodes, known)
         if len(stay):
             warnings.append(

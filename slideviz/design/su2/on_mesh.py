@@ -33,22 +33,23 @@ def read_mesh(config: Su2Config) -> Mesh:
     assert file is not None
     if config.words["MULTIZONE_MESH"].upper() == "YES" or not config.zones:
         raise_all(
-            f"{each.source}: MESH_FILENAME= {each.case.mesh_file}, and with MULTIZONE_MESH= "
-            f"YES all zones are in one file, {file}; leave the key out there, or write NO"
-            for each in config.zones
-            if each.case.mesh_file != file
+            f"{zone_config.source}: MESH_FILENAME= {zone_config.case.mesh_file}, and with "
+            f"MULTIZONE_MESH= YES all zones are in one file, {file}; leave the key out there, or "
+            "write NO"
+            for zone_config in config.zones
+            if zone_config.case.mesh_file != file
         )
         return read(file, zone=config.case.zone, file_format=form)
     meshes = []
-    for each in config.zones:
-        assert each.case.mesh_file is not None
-        mesh = read(each.case.mesh_file, file_format=each.case.mesh_format)
+    for zone_config in config.zones:
+        assert zone_config.case.mesh_file is not None
+        mesh = read(zone_config.case.mesh_file, file_format=zone_config.case.mesh_format)
         if mesh.zones > 1:
             raise CaseError(
-                f"{each.source}: {mesh.name} has {mesh.zones} zones, and with MULTIZONE_MESH= NO "
-                "it is one; write YES, or name a file for each zone"
+                f"{zone_config.source}: {mesh.name} has {mesh.zones} zones, and with "
+                "MULTIZONE_MESH= NO it is one; write YES, or name a file for each zone"
             )
-        meshes.append(replace(mesh, zone=each.zone, zones=len(config.zones)))
+        meshes.append(replace(mesh, zone=zone_config.zone, zones=len(config.zones)))
     return join_zones(meshes)
 
 
@@ -69,10 +70,12 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
         )
     if not isinstance(mesh, Assembly):
         return on_mesh(replace(config, zones=()), mesh)
-    zones = tuple(_without_missing(_in_zone(each, mesh), mesh) for each in config.zones)
+    zones = tuple(
+        _without_missing(_in_zone(zone_config, mesh), mesh) for zone_config in config.zones
+    )
     still = tuple(map(_as_still, zones))
-    asked = {each.variables[0].group for each in zones}
-    moves = {each.variables[0].group for each in still}
+    asked = {zone_config.variables[0].group for zone_config in zones}
+    moves = {zone_config.variables[0].group for zone_config in still}
     if moves == {"nothing"} != asked:
         raise CaseError(_NO_MARKER.format(config.source))
     return joined(replace(config, case=with_marker_names(config.case, mesh)), still)
@@ -84,7 +87,9 @@ def _renamed(
     """Return a configuration with other names of boundaries, and without some."""
     case = config.case.change(
         roles={name: role for name, role in config.case.roles.items() if name not in without},
-        limits=tuple(each for each in config.case.limits if each.marker not in without),
+        limits=tuple(
+            zone_config for zone_config in config.case.limits if zone_config.marker not in without
+        ),
     )
     return replace(
         config,
@@ -119,41 +124,57 @@ def joined(config: Su2Config, zones: tuple[Su2Config, ...]) -> Su2Config:
 
     Zones that have the same design variables share them, as in SU2.
     """
-    moving = [each for each in zones if each.variables[0].group != "nothing"] or [*zones[:1]]
-    groups = {each.variables[0].group: each for each in moving}
+    moving = [
+        zone_config for zone_config in zones if zone_config.variables[0].group != "nothing"
+    ] or [*zones[:1]]
+    groups = {zone_config.variables[0].group: zone_config for zone_config in moving}
     if len(groups) > 1 and groups.keys() & UNMIXED:
-        kinds = " and ".join(each.variables[0].kind for each in groups.values())
+        kinds = " and ".join(zone_config.variables[0].kind for zone_config in groups.values())
         raise CaseError(f"{config.source}: zones have {kinds}, which need a run each; make two")
-    checked = [each for each in moving if each.words["CONVEXITY_CHECK"].upper() == "YES"]
+    checked = [
+        zone_config
+        for zone_config in moving
+        if zone_config.words["CONVEXITY_CHECK"].upper() == "YES"
+    ]
     boxes = {
         box: degrees
-        for each in zones
-        for box, degrees in zip(each.case.ffd_boxes, each.case.ffd_degrees, strict=False)
+        for zone_config in zones
+        for box, degrees in zip(
+            zone_config.case.ffd_boxes, zone_config.case.ffd_degrees, strict=False
+        )
     }
     case = moving[0].case.change(
         source=config.source,
         mesh_file=config.case.mesh_file,
         mesh_out=config.case.mesh_out,
         interfaces=config.case.interfaces,
-        roles={name: role for each in zones for name, role in each.case.roles.items()},
-        limits=tuple(dict.fromkeys(limit for each in zones for limit in each.case.limits)),
+        roles={
+            name: role for zone_config in zones for name, role in zone_config.case.roles.items()
+        },
+        limits=tuple(
+            dict.fromkeys(limit for zone_config in zones for limit in zone_config.case.limits)
+        ),
         ffd_boxes=tuple(boxes),
         ffd_degrees=tuple(boxes.values()),
         warnings=tuple(
             dict.fromkeys(
-                (*config.case.warnings, *(text for each in zones for text in each.case.warnings))
+                (
+                    *config.case.warnings,
+                    *(text for zone_config in zones for text in zone_config.case.warnings),
+                )
             )
         ),
     )
     return replace(
         config,
         case=case,
-        markers=tuple(name for each in moving for name in each.markers),
-        variables=tuple(chain(*dict.fromkeys(each.variables for each in moving))),
+        markers=tuple(name for zone_config in moving for name in zone_config.markers),
+        variables=tuple(chain(*dict.fromkeys(zone_config.variables for zone_config in moving))),
         words=(checked or moving)[0].words,
-        named={name: key for each in zones for name, key in each.named.items()},
+        named={name: key for zone_config in zones for name, key in zone_config.named.items()},
         zones=tuple(
-            replace(each, beside=tuple(one for one in zones if one is not each)) for each in zones
+            replace(zone_config, beside=tuple(other for other in zones if other is not zone_config))
+            for zone_config in zones
         ),
     )
 

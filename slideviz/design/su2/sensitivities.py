@@ -146,19 +146,21 @@ def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensi
         return _unordered(paths, mesh)
     if not isinstance(mesh, Assembly):
         return _read(paths[0], mesh, moving)
-    each = [_read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.parts, strict=True)]
-    if len({one.values.shape[1] for one in each}) > 1:
+    zone_results = [
+        _read(path, p.mesh, moving[:0]) for path, p in zip(paths, mesh.parts, strict=True)
+    ]
+    if len({result.values.shape[1] for result in zone_results}) > 1:
         files = " and ".join(map(str, paths))
         raise CaseError(
             f"{files}: some have Sensitivity_x, ..., others Surface_Sensitivity only; write all "
             "with the same columns"
         )
-    points = [one.points for one in each if one.points is not None]
-    ordered = all(one.ordered for one in each) or len(points) < len(each)
+    points = [result.points for result in zone_results if result.points is not None]
+    ordered = all(result.ordered for result in zone_results) or len(points) < len(zone_results)
     return Sensitivities(
         paths[0],
-        np.concatenate([one.values for one in each]),
-        np.concatenate(points) if len(points) == len(each) else None,
+        np.concatenate([result.values for result in zone_results]),
+        np.concatenate(points) if len(points) == len(zone_results) else None,
         ordered,
     )
 
@@ -214,7 +216,7 @@ def sensitivity_files(config: Su2Config, mesh: Mesh) -> tuple[Path, ...]:
     """
     zones = [(config.of_zone(k), f"_{k}") for k in range(mesh.zones)]
     if _is_unordered(config):
-        names = (each.files["DV_UNORDERED_SENS_FILENAME"] for each, _ in zones)
+        names = (config_of_zone.files["DV_UNORDERED_SENS_FILENAME"] for config_of_zone, _ in zones)
         return tuple(dict.fromkeys(names))
     return tuple(starmap(_restart, zones)) if isinstance(mesh, Assembly) else (_restart(config),)
 
@@ -230,7 +232,7 @@ def _restart(config: Su2Config, zone: str = "") -> Path:
     endings = [".csv", ".dat"]
     if config.words["READ_BINARY_RESTART"].upper() == "YES":
         endings.reverse()
-    tried = [one.with_name(one.name + end) for one in (*stems, stem) for end in endings]
+    tried = [base.with_name(base.name + end) for base in (*stems, stem) for end in endings]
     if not zone:
         tried.append(adjoint_file)
     for path in tried:
@@ -243,7 +245,7 @@ def _restart(config: Su2Config, zone: str = "") -> Path:
 
 
 def match(
-    found: Sensitivities,
+    sensitivities: Sensitivities,
     mesh: Mesh,
     moving: IntArray,
     markers: tuple[str, ...],
@@ -257,59 +259,66 @@ def match(
     the nodes of the boundaries that move, ``markers``; a file may have these only. Raises
     CaseError if the points in the file are neither, or several rows are at one point.
     """
-    normal_only = found.values.shape[1] == 1
+    normal_only = sensitivities.values.shape[1] == 1
     if normal_only and not markers:
         raise CaseError(
-            f"{found.path}: has Surface_Sensitivity only, which covers the surfaces in DV_MARKER, "
-            "but the design variables move the whole mesh; give Sensitivity_x, Sensitivity_y, ..."
+            f"{sensitivities.path}: has Surface_Sensitivity only, which covers the surfaces in "
+            "DV_MARKER, but the design variables move the whole mesh; give Sensitivity_x, "
+            "Sensitivity_y, ..."
         )
     design = None if design is None else cache(design)
-    if found.points is None:
-        sentence = f"{found.path} has no coordinates: taken as those of this design"
-        at = mesh.points if design is None or not normal_only else design()
-        return Matched(_vectors(found.values, mesh, at, moving, markers), True, (sentence,))
+    if sensitivities.points is None:
+        sentence = f"{sensitivities.path} has no coordinates: taken as those of this design"
+        positions = mesh.points if design is None or not normal_only else design()
+        return Matched(
+            _vectors(sensitivities.values, mesh, positions, moving, markers), True, (sentence,)
+        )
     unit = largest_coordinate(mesh.points)
-    gap, rows = _nearest(found, mesh.points)
+    gap, rows = _nearest(sensitivities, mesh.points)
     at_design = design is None
     if design is not None and gap > EXACT * unit:
-        there, others = _nearest(found, design())
+        there, others = _nearest(sensitivities, design())
         if there <= gap:
             gap = there
             rows = others
             at_design = True
     if gap > SAME * unit:
         raise CaseError(
-            f"{found.path}: its points match neither {mesh.name} nor this design (they differ by "
-            f"{gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
+            f"{sensitivities.path}: its points match neither {mesh.name} nor this design (they "
+            f"differ by {gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
         )
-    for each in mesh.interfaces if isinstance(mesh, Assembly) else ():
+    for interface in mesh.interfaces if isinstance(mesh, Assembly) else ():
         # A place with one row of two nodes: the row is that of the node that moves.
-        alone = np.isin(each.nodes, rows) & ~np.isin(each.partners, rows)
-        alone &= np.isin(each.partners, moving) & ~np.isin(each.nodes, moving)
+        alone = np.isin(interface.nodes, rows) & ~np.isin(interface.partners, rows)
+        alone &= np.isin(interface.partners, moving) & ~np.isin(interface.nodes, moving)
         place = np.arange(len(mesh.points))
-        place[each.nodes[alone]] = each.partners[alone]
+        place[interface.nodes[alone]] = interface.partners[alone]
         rows = place[rows]
     notes = list[Remark]()
     if gap > CLOSE * unit:
         where = "this design" if at_design else mesh.name
         notes.append(
-            f"{found.path}: its points differ from {where} by {gap:.2g}: is the file older?"
+            f"{sensitivities.path}: its points differ from {where} by {gap:.2g}: is the file older?"
         )
-    values = np.zeros((len(mesh.points), found.values.shape[1]))
+    values = np.zeros((len(mesh.points), sensitivities.values.shape[1]))
     index, counts = np.unique(rows, return_counts=True)
     if (counts > 1).any():
         node = index[int(np.argmax(counts))]
-        raise CaseError(f"{found.path}: several rows are at the point {node}; one each is needed")
-    values[rows] = found.values
+        raise CaseError(
+            f"{sensitivities.path}: several rows are at the point {node}; one each is needed"
+        )
+    values[rows] = sensitivities.values
     missing = len(mesh.points) - len(index)
     if missing:
         lost = len(np.setdiff1d(moving, index))
         of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
-        sentence = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
+        sentence = (
+            f"{sensitivities.path}: {missing} points of the mesh are not in it{of}; taken as 0"
+        )
         expected = np.array_equal(index, moving) or (normal_only and not lost)
         notes.append(note(sentence) if expected else sentence)
-    at = design() if design is not None and at_design and normal_only else mesh.points
-    return Matched(_vectors(values, mesh, at, moving, markers), at_design, tuple(notes))
+    positions = design() if design is not None and at_design and normal_only else mesh.points
+    return Matched(_vectors(values, mesh, positions, moving, markers), at_design, tuple(notes))
 
 
 def _vectors(
@@ -329,18 +338,18 @@ def _vectors(
     return out
 
 
-def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
+def _nearest(sensitivities: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
     """Return the largest distance to a nearest point, and that point for each row of the file."""
-    assert found.points is not None
-    if found.ordered:
-        gap = np.abs(found.points - points)
+    assert sensitivities.points is not None
+    if sensitivities.ordered:
+        gap = np.abs(sensitivities.points - points)
         return float(gap.max(initial=0.0)), np.arange(len(points))
-    far, rows = map(np.asarray, cKDTree(points).query(found.points))
+    far, rows = map(np.asarray, cKDTree(points).query(sensitivities.points))
     # Nodes of several zones may be in one place: each has a row, or the first of them.
     again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
     left = np.setdiff1d(np.arange(len(points)), rows)
     if len(again) and len(left):
-        gaps, others = map(np.asarray, cKDTree(points[left]).query(found.points[again]))
+        gaps, others = map(np.asarray, cKDTree(points[left]).query(sensitivities.points[again]))
         near = gaps <= SAME * largest_coordinate(points)
         rows[again[near]] = left[others[near]]
         far[again[near]] = gaps[near]
@@ -349,7 +358,7 @@ def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarra
 
 def _unordered(paths: Sequence[Path], mesh: Mesh) -> Sensitivities:
     path = paths[0]
-    rows = [row for each in paths for row in _rows(each) if row]
+    rows = [row for file in paths for row in _rows(file) if row]
     dim = mesh.dim
     width = len(rows[0]) if rows else 0
     if width not in {6, 2 * dim} or any(len(row) != width for row in rows):

@@ -116,63 +116,63 @@ def ends(code):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
+def decimal(text, offset, bits, k):  # type: ignore[no-untyped-def]
     """Write the bits of the number that begins at ``text[at]`` to ``bits[k]``; return its end.
 
     The result is -1, and nothing is written, if it is not a plain number or `nearest_bits` is
     undecided.
     ``text`` (b,) uint8: the text; its last byte is a line break.
-    ``at``: index of the first byte of the number.
+    ``offset``: index of the first byte of the number.
     ``bits`` (v,) uint64: receives the bits of the float64.
     ``k``: the place in ``bits``.
     """
-    sign = np.uint64(text[at] == 45) << _U63
-    at += (text[at] == 45) | (text[at] == 43)
-    first = at
+    sign = np.uint64(text[offset] == 45) << _U63
+    offset += (text[offset] == 45) | (text[offset] == 43)
+    first = offset
     q = 0
     more = False
-    digits, at = _digits(text, at, _U0)
-    length = at - first
-    if text[at] == 46:
-        digits, stop = _digits(text, at + 1, digits)
-        q = at + 1 - stop
+    digits, offset = _digits(text, offset, _U0)
+    length = offset - first
+    if text[offset] == 46:
+        digits, stop = _digits(text, offset + 1, digits)
+        q = offset + 1 - stop
         length -= q
-        at = stop
+        offset = stop
     if length == 0:
         return -1
     if length > _DIGITS:
         digits, q, more = _first_digits(text, first)
-    code = text[at]
+    code = text[offset]
     if code == 101 or code == 69:
-        at, exponent = _exponent(text, at + 1)
-        if at < 0:
+        offset, exponent = _exponent(text, offset + 1)
+        if offset < 0:
             return -1
         q += exponent
-    if not ends(text[at]):
+    if not ends(text[offset]):
         return -1
     if digits == _U0:
         bits[k] = sign
-        return at
-    found = nearest_bits(digits, q)
-    if found == _ALL or (more and found != nearest_bits(digits + _U1, q)):
+        return offset
+    nearest = nearest_bits(digits, q)
+    if nearest == _ALL or (more and nearest != nearest_bits(digits + _U1, q)):
         return -1
-    bits[k] = found | sign
-    return at
+    bits[k] = nearest | sign
+    return offset
 
 
 @njit(inline="always", **OPTIONS)
-def _digits(text, at, value):  # type: ignore[no-untyped-def]
+def _digits(text, offset, value):  # type: ignore[no-untyped-def]
     """Append the digits from ``text[at]`` on to ``value``, modulo 2^64; return it and the end."""
-    digit = np.uint64(text[at]) - U48
+    digit = np.uint64(text[offset]) - U48
     while digit < U10:
         value = value * U10 + digit
-        at += 1
-        digit = np.uint64(text[at]) - U48
-    return value, at
+        offset += 1
+        digit = np.uint64(text[offset]) - U48
+    return value, offset
 
 
 @njit(**OPTIONS)
-def _first_digits(text, at):  # type: ignore[no-untyped-def]
+def _first_digits(text, offset):  # type: ignore[no-untyped-def]
     """Return the first 19 digits of a long number, its power of ten, and whether more follow.
 
     Leading zeros do not count. The number begins at ``text[at]``; its exponent is not read.
@@ -183,7 +183,7 @@ def _first_digits(text, at):  # type: ignore[no-untyped-def]
     point = False
     more = False
     while True:
-        digit = np.uint64(text[at]) - U48
+        digit = np.uint64(text[offset]) - U48
         if digit < U10 and count < _DIGITS:
             value = value * U10 + digit
             count += value != _U0
@@ -191,24 +191,24 @@ def _first_digits(text, at):  # type: ignore[no-untyped-def]
         elif digit < U10:
             more = True
             q += not point
-        elif text[at] == 46 and not point:
+        elif text[offset] == 46 and not point:
             point = True
         else:
             return value, q, more
-        at += 1
+        offset += 1
 
 
 @njit(inline="always", **OPTIONS)
-def _exponent(text, at):  # type: ignore[no-untyped-def]
+def _exponent(text, offset):  # type: ignore[no-untyped-def]
     """Return the end of the exponent at ``text[at]`` (-1: not 1 to 5 digits), and its value."""
-    down = text[at] == 45
-    if down or text[at] == 43:
-        at += 1
-    first = at
+    down = text[offset] == 45
+    if down or text[offset] == 43:
+        offset += 1
+    first = offset
     value = 0
-    while 48 <= text[at] <= 57 and at < first + 6:
-        value = value * 10 + (text[at] - 48)
-        at += 1
-    if at == first or at == first + 6:
+    while 48 <= text[offset] <= 57 and offset < first + 6:
+        value = value * 10 + (text[offset] - 48)
+        offset += 1
+    if offset == first or offset == first + 6:
         return -1, 0
-    return at, -value if down else value
+    return offset, -value if down else value

@@ -4,7 +4,8 @@ They read plain rows only. A row with anything else (a sign before a node, a wro
 is not a number, a number that is not finite) is *left*: only listed, so that `su2.numbers` reads it
 in Python.
 
-``text`` is an array of bytes, (b,) uint8, that ends with a line break; ``at`` is an index into it.
+``text`` is an array of bytes, (b,) uint8, that ends with a line break; ``offset`` is an index into
+it.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from slideviz.system.jit_cache import OPTIONS, njit
 
 
 @njit(inline="always", **OPTIONS)
-def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
-    stop = at + 1
+def _print_whole(value, out, offset):  # type: ignore[no-untyped-def]
+    stop = offset + 1
     quotient = value
     while quotient >= 10:
         quotient //= 10
         stop += 1
     quotient = np.uint64(value)
-    for k in range(stop - 1, at - 1, -1):
+    for k in range(stop - 1, offset - 1, -1):
         out[k] = np.uint8(quotient % U10 + U48)
         quotient //= U10
     return stop
@@ -39,32 +40,32 @@ def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-d
     ``first``: the index of the first element; if negative, rows get no index.
     ``out`` (b,) uint8: receives the text.
     """
-    at = 0
+    offset = 0
     k = 0
     for row in range(len(types)):
-        at = _print_whole(np.int64(types[row]), out, at)
+        offset = _print_whole(np.int64(types[row]), out, offset)
         for _ in range(offsets[row + 1] - offsets[row]):
-            out[at] = 32
-            at = _print_whole(nodes[k], out, at + 1)
+            out[offset] = 32
+            offset = _print_whole(nodes[k], out, offset + 1)
             k += 1
         if first >= 0:
-            out[at] = 32
-            at = _print_whole(first + row, out, at + 1)
-        out[at] = 10
-        at += 1
-    return at
+            out[offset] = 32
+            offset = _print_whole(first + row, out, offset + 1)
+        out[offset] = 10
+        offset += 1
+    return offset
 
 
 @njit(inline="always", **OPTIONS)
-def _copy_number(numbers, j, out, at):  # type: ignore[no-untyped-def]
+def _copy_number(numbers, j, out, offset):  # type: ignore[no-untyped-def]
     """Copy orjson's number at ``numbers[j]`` to ``out[at]``; return where each goes on."""
     while numbers[j] != 44 and numbers[j] != 93:
-        out[at] = numbers[j]
+        out[offset] = numbers[j]
         j += 1
-        at += 1
+        offset += 1
     while j < len(numbers) and (numbers[j] == 44 or numbers[j] == 91 or numbers[j] == 93):
         j += 1
-    return j, at
+    return j, offset
 
 
 @njit(**OPTIONS)
@@ -76,18 +77,18 @@ def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
     ``out`` (b,) uint8: receives the text.
     """
     j = 2
-    at = 0
+    offset = 0
     row = first
     while j < len(numbers):
         for _ in range(dim):
-            j, at = _copy_number(numbers, j, out, at)
-            out[at] = 32
-            at += 1
-        at = _print_whole(row, out, at)
-        out[at] = 10
-        at += 1
+            j, offset = _copy_number(numbers, j, out, offset)
+            out[offset] = 32
+            offset += 1
+        offset = _print_whole(row, out, offset)
+        out[offset] = 10
+        offset += 1
         row += 1
-    return at
+    return offset
 
 
 @njit(**OPTIONS)
@@ -103,38 +104,38 @@ def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
     """
     i = 0
     j = 2
-    at = 0
+    offset = 0
     row = 0
     while i < len(text):
         while text[i] <= 32 and text[i] != 10:
-            out[at] = text[i]
+            out[offset] = text[i]
             i += 1
-            at += 1
+            offset += 1
         if is_numeric(text[i]):
             if row == len(changed):
-                return -1, at
+                return -1, offset
             for axis in range(changed.shape[1]):
                 while text[i] <= 32 and text[i] != 10:
-                    out[at] = text[i]
+                    out[offset] = text[i]
                     i += 1
-                    at += 1
-                j, stop = _copy_number(numbers, j, out, at)
+                    offset += 1
+                j, stop = _copy_number(numbers, j, out, offset)
                 while not ends(text[i]):
                     if not changed[row, axis]:
-                        out[at] = text[i]
-                        at += 1
+                        out[offset] = text[i]
+                        offset += 1
                     i += 1
                 if changed[row, axis]:
-                    at = stop
+                    offset = stop
             row += 1
         while text[i] != 10:
-            out[at] = text[i]
+            out[offset] = text[i]
             i += 1
-            at += 1
-        out[at] = 10
+            offset += 1
+        out[offset] = 10
         i += 1
-        at += 1
-    return row, at
+        offset += 1
+    return row, offset
 
 
 SIZES = np.zeros(257, np.int64)
@@ -160,38 +161,38 @@ def is_numeric(code):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **OPTIONS)
-def _next_line(text, at):  # type: ignore[no-untyped-def]
-    while text[at] != 10:
-        at += 1
-    return at + 1
+def _next_line(text, offset):  # type: ignore[no-untyped-def]
+    while text[offset] != 10:
+        offset += 1
+    return offset + 1
 
 
 @njit(inline="always", **OPTIONS)
-def _first_word(text, at):  # type: ignore[no-untyped-def]
-    """Return where the first word, or comment, of the line from ``at`` on begins, or its end."""
+def _first_word(text, offset):  # type: ignore[no-untyped-def]
+    """Return where the first word, or comment, of the line from ``offset`` begins, or its end."""
     # Control characters stand before words like blanks, but not between numbers.
-    while text[at] <= 32 and text[at] != 10:
-        at += 1
-    return at
+    while text[offset] <= 32 and text[offset] != 10:
+        offset += 1
+    return offset
 
 
 @njit(inline="always", **OPTIONS)
-def _next_word(text, at):  # type: ignore[no-untyped-def]
-    """Return where the next word begins: ``at``, or behind the blanks there."""
-    while _is_blank(text[at]):
-        at += 1
-    return at
+def _next_word(text, offset):  # type: ignore[no-untyped-def]
+    """Return where the next word begins: ``offset``, or behind the blanks there."""
+    while _is_blank(text[offset]):
+        offset += 1
+    return offset
 
 
 @njit(inline="always", **OPTIONS)
-def _type_of(text, at):  # type: ignore[no-untyped-def]
+def _type_of(text, offset):  # type: ignore[no-untyped-def]
     """Return the number that a row begins with: 0 without digits, 256 if it is not a type."""
-    at += text[at] == 43
+    offset += text[offset] == 43
     value = np.int64(0)
-    while 48 <= text[at] <= 57:
-        value = value * 10 + np.int64(text[at]) - 48
+    while 48 <= text[offset] <= 57:
+        value = value * 10 + np.int64(text[offset]) - 48
         value = np.int64(256) if value > 256 else value
-        at += 1
+        offset += 1
     return value
 
 
@@ -203,13 +204,13 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
     ``runs`` (l, 5) int64: receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines
     counted from the start of the block; l is the number of lines. The first run may have no text.
     """
-    at = 0
+    offset = 0
     line = 0
     n = 0
-    while at < len(text):
-        begin = at
-        at = _first_word(text, at)
-        code = text[at]
+    while offset < len(text):
+        begin = offset
+        offset = _first_word(text, offset)
+        code = text[offset]
         empty = code == 10 or code == 37
         if not empty and not is_numeric(code):
             runs[n, 0] = begin
@@ -218,10 +219,10 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
             runs[n, 3] = 0
             runs[n, 4] = 0
             n += 1
-            while text[at] != 10 and text[at] != 37:
-                if text[at] == 61:
+            while text[offset] != 10 and text[offset] != 37:
+                if text[offset] == 61:
                     runs[n - 1, 2] = KEYWORD
-                at += 1
+                offset += 1
         else:
             if n == 0:
                 runs[n, 0] = 0
@@ -232,8 +233,8 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
                 n += 1
             if not empty:
                 runs[n - 1, 3] += 1
-                runs[n - 1, 4] += SIZES[_type_of(text, at)]
-        at = _next_line(text, at)
+                runs[n - 1, 4] += SIZES[_type_of(text, offset)]
+        offset = _next_line(text, offset)
         line += 1
     return n, line
 
@@ -241,45 +242,45 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def count_types(text, counts):  # type: ignore[no-untyped-def]
     """Add to ``counts`` (257,) the number of rows of each element type; the last is for others."""
-    at = 0
-    while at < len(text):
-        at = _first_word(text, at)
-        if is_numeric(text[at]):
-            counts[_type_of(text, at)] += 1
-        at = _next_line(text, at)
+    offset = 0
+    while offset < len(text):
+        offset = _first_word(text, offset)
+        if is_numeric(text[offset]):
+            counts[_type_of(text, offset)] += 1
+        offset = _next_line(text, offset)
 
 
 @njit(inline="always", **OPTIONS)
-def _whole_number(text, at):  # type: ignore[no-untyped-def]
-    """Return the whole number from ``at`` on, of plain digits, and where it ends.
+def _whole_number(text, offset):  # type: ignore[no-untyped-def]
+    """Return the whole number from ``offset`` on, of plain digits, and where it ends.
 
     The number is -1 if there are no digits or more than 18.
     """
-    first = at
+    first = offset
     value = np.int64(0)
-    digit = np.uint64(text[at]) - U48
+    digit = np.uint64(text[offset]) - U48
     while digit < U10:
         value = value * 10 + np.int64(digit)
-        at += 1
-        digit = np.uint64(text[at]) - U48
-    return -1 if at == first or at > first + 18 else value, at
+        offset += 1
+        digit = np.uint64(text[offset]) - U48
+    return -1 if offset == first or offset > first + 18 else value, offset
 
 
 @njit(inline="always", **OPTIONS)
-def _nodes(text, at, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
+def _nodes(text, offset, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
     """Write the ``size`` nodes of an element to ``nodes[k:]``; return where they end in the text.
 
     The result is -1 if one is not a whole number below ``n_points``, or is there twice.
     """
     for j in range(k, k + size):
-        node, at = _whole_number(text, _next_word(text, at))
+        node, offset = _whole_number(text, _next_word(text, offset))
         if node < 0 or node >= n_points:
             return -1
         for i in range(k, j):
             if nodes[i] == node:
                 return -1
         nodes[j] = node
-    return at
+    return offset
 
 
 @njit(**OPTIONS)
@@ -293,43 +294,43 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     ``odd`` (m, 3) int64: receives for each row left its number, the first byte of its line, and the
     index of its first node in ``nodes``.
     """
-    at = 0
+    offset = 0
     row = 0
     k = 0
     n = 0
-    while at < len(text):
-        line = at
-        begin = _first_word(text, at)
+    while offset < len(text):
+        line = offset
+        begin = _first_word(text, offset)
         if is_numeric(text[begin]):
             kind = _type_of(text, begin)
             size = SIZES[kind]
             if row == len(types) or k + size > len(nodes):
                 return -1, n
             types[row] = np.uint8(kind)
-            at = -1
+            offset = -1
             if DIMS[kind] == dim and _next_word(text, line) == begin:
-                at = _whole_number(text, begin)[1]
-                at = _nodes(text, at, size, n_points, nodes, k)
-            if at < 0 or not _ends_row(text, at):
+                offset = _whole_number(text, begin)[1]
+                offset = _nodes(text, offset, size, n_points, nodes, k)
+            if offset < 0 or not _ends_row(text, offset):
                 odd[n, 0] = row
                 odd[n, 1] = line
                 odd[n, 2] = k
                 n += 1
             row += 1
             k += size
-        at = _next_line(text, max(at, begin))
+        offset = _next_line(text, max(offset, begin))
     return row, n
 
 
 @njit(inline="always", **OPTIONS)
-def _ends_row(text, at):  # type: ignore[no-untyped-def]
-    """Return whether a row of whole numbers ends at ``at``, or after one more number."""
-    at = _next_word(text, at)
-    if text[at] == 10 or text[at] == 37:
+def _ends_row(text, offset):  # type: ignore[no-untyped-def]
+    """Return whether a row of whole numbers ends at ``offset``, or after one more number."""
+    offset = _next_word(text, offset)
+    if text[offset] == 10 or text[offset] == 37:
         return True
-    index, at = _whole_number(text, at)
-    at = _next_word(text, at)
-    return index >= 0 and (text[at] == 10 or text[at] == 37)
+    index, offset = _whole_number(text, offset)
+    offset = _next_word(text, offset)
+    return index >= 0 and (text[offset] == 10 or text[offset] == 37)
 
 
 @njit(**OPTIONS)
@@ -344,27 +345,27 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
     which is that number: perhaps its index, and a coordinate is missing.
     ``odd`` (m, 2) int64: receives for each row left its number and the first byte of its line.
     """
-    at = 0
+    offset = 0
     row = 0
     n = 0
     dim = points.shape[1]
     bits = np.zeros(1, np.uint64)
     value = bits.view(np.float64)
-    while at < len(text):
-        line = at
-        begin = _first_word(text, at)
+    while offset < len(text):
+        line = offset
+        begin = _first_word(text, offset)
         if is_numeric(text[begin]):
             if row == len(points):
                 return -1, n
-            at = begin if _next_word(text, line) == begin else -1
+            offset = begin if _next_word(text, line) == begin else -1
             words = 0
-            while at >= 0 and text[at] != 10 and text[at] != 37:
-                at = decimal(text, at, bits, 0) if words < dim + 2 else -1
+            while offset >= 0 and text[offset] != 10 and text[offset] != 37:
+                offset = decimal(text, offset, bits, 0) if words < dim + 2 else -1
                 if words < dim:
                     points[row, words] = bits[0]
                 words += 1
-                at = _next_word(text, at) if at >= 0 else -1
-            if at < 0 or words < dim:
+                offset = _next_word(text, offset) if offset >= 0 else -1
+            if offset < 0 or words < dim:
                 odd[n, 0] = row
                 odd[n, 1] = line
                 n += 1
@@ -373,5 +374,5 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
                 if words == dim and value[0] == first + row:
                     extra[1] = min(extra[1], first + row)
             row += 1
-        at = _next_line(text, max(at, begin))
+        offset = _next_line(text, max(offset, begin))
     return row, n

@@ -112,53 +112,55 @@ class BinaryFile:
         """Return the data type of a point: coordinates ``x`` (dim,) and its index ``i``."""
         return np.dtype([("x", f"{self.order}f8", (dim,)), ("i", self.conn)])
 
-    def error(self, at: int, message: str) -> MeshError:
+    def error(self, offset: int, message: str) -> MeshError:
         """Return the error ``file: byte n: message``."""
-        return MeshError(Message(message, place=(self.name, f"byte {at}")))
+        return MeshError(Message(message, place=(self.name, f"byte {offset}")))
 
-    def require(self, at: int, count: int, width: int, what: str) -> int:
-        """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``at``.
+    def require(self, offset: int, count: int, width: int, what: str) -> int:
+        """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``offset``.
 
         ``what`` names the items in the message. Raises MeshError if the file ends before that byte.
         """
-        end = at + count * width
+        end = offset + count * width
         if end > self.size:
             raise self.error(
-                at,
+                offset,
                 f"{what} ({count} times {width} bytes) should be here, but the file ends at byte "
                 f"{self.size}; it is cut off or the count is wrong, so write it again",
             )
         return end
 
-    def array(self, at: int, count: int, dtype: DTypeLike, what: str) -> NDArray:
-        """Return the ``count`` items of type ``dtype`` that begin at byte ``at``.
+    def array(self, offset: int, count: int, dtype: DTypeLike, what: str) -> NDArray:
+        """Return the ``count`` items of type ``dtype`` that begin at byte ``offset``.
 
         ``what`` names the items in the message. Raises MeshError if the file ends before the last
         item, or cannot be read.
         """
         kind = np.dtype(dtype)
-        self.require(at, count, kind.itemsize, what)
+        self.require(offset, count, kind.itemsize, what)
         try:
             with self._lock:
-                self._file.seek(at)
+                self._file.seek(offset)
                 array = np.fromfile(self._file, kind, count)
         except OSError as problem:
-            raise self.error(at, f"cannot be read: {problem}; check the disk") from problem
+            raise self.error(offset, f"cannot be read: {problem}; check the disk") from problem
         if len(array) != count:
-            raise self.error(at, f"{what}: the file became shorter while it was read; read again")
+            raise self.error(
+                offset, f"{what}: the file became shorter while it was read; read again"
+            )
         return array
 
     def bytes(self, begin: int, end: int) -> bytes:
         """Return the bytes ``begin`` to ``end - 1``."""
         return self.array(begin, end - begin, np.uint8, "the zones").tobytes()
 
-    def integer(self, at: int, what: str) -> int:
-        """Return the integer of four bytes at byte ``at``."""
-        return int(self.array(at, 1, f"{self.order}i4", what)[0])
+    def integer(self, offset: int, what: str) -> int:
+        """Return the integer of four bytes at byte ``offset``."""
+        return int(self.array(offset, 1, f"{self.order}i4", what)[0])
 
-    def count(self, at: int, what: str) -> int:
-        """Return the count or index, of ``width`` bytes, at byte ``at``."""
-        return int(self.array(at, 1, self.conn, what)[0])
+    def count(self, offset: int, what: str) -> int:
+        """Return the count or index, of ``width`` bytes, at byte ``offset``."""
+        return int(self.array(offset, 1, self.conn, what)[0])
 
 
 def find_zones(source: BinaryFile, number: int | None = None) -> tuple[ZonePlace, ...]:
@@ -168,15 +170,15 @@ def find_zones(source: BinaryFile, number: int | None = None) -> tuple[ZonePlace
     last zone, or there is no zone of that number.
     """
     zones: list[ZonePlace] = []
-    at = 2 * _INT
+    offset = 2 * _INT
     while len(zones) < source.zones:
-        zones.append(_zone(source, at, len(zones) + 1))
-        at = zones[-1].end
-    if at != source.size:
+        zones.append(_zone(source, offset, len(zones) + 1))
+        offset = zones[-1].end
+    if offset != source.size:
         raise source.error(
-            at,
-            f"{source.size - at} bytes follow the last of the {source.zones} zones, where the file "
-            "should end; correct the number of zones (byte 4) or write the mesh again",
+            offset,
+            f"{source.size - offset} bytes follow the last of the {source.zones} zones, where the "
+            "file should end; correct the number of zones (byte 4) or write the mesh again",
         )
     return tuple(zones[k - 1] for k in chosen_zones(source.name, number, len(zones)))
 
@@ -202,27 +204,29 @@ def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     if dim not in (2, 3):
         raise source.error(begin + _INT, f"the dimension is {dim}, but must be 2 or 3; correct it")
     cells = _elements(source, begin + 2 * _INT, "elements", dim + 3, numbered=True)
-    at = cells.entries + cells.length * source.width
-    n_points = source.count(at, "the number of points")
-    points = at + source.width
-    at = source.require(points, n_points, source.point(dim).itemsize, "the points")
-    count = source.integer(at, "the number of markers")
+    offset = cells.entries + cells.length * source.width
+    n_points = source.count(offset, "the number of points")
+    points = offset + source.width
+    offset = source.require(points, n_points, source.point(dim).itemsize, "the points")
+    count = source.integer(offset, "the number of markers")
     if count < 0:
-        raise source.error(at, f"the number of markers is {count}, but must not be negative")
-    at += _INT
-    source.require(at, count, NAME_BYTES + 2 * source.width, "the markers")
+        raise source.error(offset, f"the number of markers is {count}, but must not be negative")
+    offset += _INT
+    source.require(offset, count, NAME_BYTES + 2 * source.width, "the markers")
     markers: dict[str, MarkerPlace] = {}
     for _ in range(count):
-        marker = _marker(source, at, dim)
+        marker = _marker(source, offset, dim)
         if marker.name in markers:
-            raise source.error(at, f"marker {marker.name} occurs a second time; rename one of them")
+            raise source.error(
+                offset, f"marker {marker.name} occurs a second time; rename one of them"
+            )
         markers[marker.name] = marker
-        at = marker.elements.entries + marker.elements.length * source.width
-    return ZonePlace(number, begin, at, dim, cells, n_points, points, tuple(markers.values()))
+        offset = marker.elements.entries + marker.elements.length * source.width
+    return ZonePlace(number, begin, offset, dim, cells, n_points, points, tuple(markers.values()))
 
 
-def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
-    raw = source.array(at, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
+def _marker(source: BinaryFile, offset: int, dim: int) -> MarkerPlace:
+    raw = source.array(offset, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
     text, end, _ = raw.partition(b"\0")
     try:
         name = text.decode()
@@ -231,28 +235,29 @@ def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
     if not name or not end or not name.isprintable():
         what = "is not ended by a zero" if not end else "is empty or not printable UTF-8 text"
         raise source.error(
-            at,
+            offset,
             f"the marker name {text.decode('utf-8', 'backslashreplace')!r} {what}; {NAME_BYTES} "
             "bytes are for it, padded with zeros, so correct it or write the mesh again",
         )
     if name.upper() == SEND_RECEIVE:
         raise source.error(
-            at, f"SU2 binary meshes cannot have {name} markers (halos); write the mesh without them"
+            offset,
+            f"SU2 binary meshes cannot have {name} markers (halos); write the mesh without them",
         )
     what = f"elements of marker {name}"
-    elements = _elements(source, at + NAME_BYTES, what, dim + 1, numbered=False)
+    elements = _elements(source, offset + NAME_BYTES, what, dim + 1, numbered=False)
     return MarkerPlace(name, raw, elements)
 
 
 def _elements(
-    source: BinaryFile, at: int, what: str, fewest: int, *, numbered: bool
+    source: BinaryFile, offset: int, what: str, fewest: int, *, numbered: bool
 ) -> ElementTable:
-    """Return the table of elements that begins at byte ``at``, or raise MeshError.
+    """Return the table of elements that begins at byte ``offset``, or raise MeshError.
 
     ``what`` names the elements in messages, ``fewest`` is the least count of numbers of an element.
     """
-    count = source.count(at, f"the number of {what}")
-    offsets = at + source.width
+    count = source.count(offset, f"the number of {what}")
+    offsets = offset + source.width
     entries = source.require(offsets, count + 1, source.width, f"the offsets of the {what}")
     last = entries - source.width
     length = source.count(last, f"the last offset of the {what}")
