@@ -88,7 +88,7 @@ def _print(report: dict[str, Any], words: str, found: Quality, before: Quality) 
     from slideviz.cli.report import quality_lines
 
     print(f"{report['mesh']}: {words}")
-    print(quality_lines(found, before).replace("undeformed", "before"))
+    print(quality_lines(found, before, "before"))
     print(f"  {report['seconds']['total']:.2f} s")
     print(f"mesh: {report['output']}")
 

@@ -372,13 +372,15 @@ def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:
     return table(rows)
 
 
-def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
-    """Return minimum, mean and counts of cells as a text table, beside those before if given."""
+def quality_lines(
+    quality: Quality, reference: Quality | None = None, named: str = "undeformed"
+) -> str:
+    """Return minimum, mean and counts of cells as a text table, beside a ``named`` reference."""
 
     def beside(value: float) -> tuple[str, ...]:
-        return () if undeformed is None else (f"undeformed {_cell(value)}",)
+        return () if reference is None else (f"{named} {_cell(value)}",)
 
-    before = undeformed or quality
+    before = reference or quality
     rows: list[tuple[object, ...]] = [
         ("minimum quality", quality.min, *beside(before.min)),
         ("mean quality", quality.mean, *beside(before.mean)),

@@ -33,8 +33,6 @@ from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity
 
-_SHOWN = "shown: "  # begin of the note about a threshold
-
 
 @dataclass(frozen=True)
 class PageFormat:
@@ -75,10 +73,10 @@ def save_section(
     report(JobProgress(f"Cutting for {path.name}"))
     views = shown_views(session)
     shown = [_shown(*one, section) for one in zip(views, pair_names(views), strict=True)]
-    if not any(one.drawn for one in shown) and shown[0].note:
-        words = shown[0].note.removeprefix(_SHOWN)
+    only = _choice(views[0], section)
+    if only is not None and not any(one.drawn for one in shown):
         raise CaseError(
-            f"{section.describe()}: it cuts no cell that is shown ({words}), so there is "
+            f"{section.describe()}: it cuts no cell that is shown ({only.words}), so there is "
             "nothing to draw; show all cells, or a wider range of them"
         )
     raise_if_cancelled(stopped)
@@ -107,7 +105,7 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
         surroundings(cutter, points, every),
         name,
         f"step {min(at, len(session.frames) - 1)}" if at else "",
-        "" if only is None else _SHOWN + only.words,
+        "" if only is None else f"shown: {only.words}",
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING
 from slideviz.case.spans import span_ends
+from slideviz.errors import Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
 from slideviz.solver.remedies import KEEPS_RIMS
@@ -173,7 +174,7 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     return [sentence]
 
 
-def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> list[str]:
+def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> list[Message]:
     """Return warnings that nodes left a wall that they should be on.
 
     These are nodes of moving boundaries that they share with other ones; and, where blades move
@@ -186,9 +187,12 @@ def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> l
         if off.distance > known.distance:
             farthest[off.boundary, off.wall] = off
     return [
-        f"node {mesh.number(off.node)} of {off.boundary} at "
-        f"({', '.join(f'{value:.6g}' for value in points[off.node])}) has left {off.wall} by "
-        f"{off.distance:.3g}{off.why}"
+        Message(
+            f"node {mesh.number(off.node)} of {off.boundary} at "
+            f"({', '.join(f'{value:.6g}' for value in points[off.node])}) has left {off.wall} by "
+            f"{off.distance:.3g}{off.why}",
+            off.remedy,
+        )
         for off in farthest.values()
     ]
 
@@ -201,17 +205,18 @@ class _OffWall:
     boundary: str  # that has it
     wall: str
     distance: float  # in the mesh's length unit
-    why: str  # the rest of the sentence, with the remedy
+    why: str  # the rest of the sentence
+    remedy: str
 
 
 def _off_walls(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
     """Yield for each wall with a rim the node of that which is farthest off."""
-    remedy = f"; {KEEPS_RIMS}"
+    free = "", KEEPS_RIMS
     if case.rims == "slide":
-        remedy = ", to which it cannot be brought back; move it less"
+        free = ", to which it cannot be brought back", "move it less"
     fixed = find_rims(case.change(rims="free"), mesh, setup, ("fixed",))
-    of_fixed = ", which is fixed; let that boundary slide, with RIMS= SLIDE, or move it less"
-    for rims, why in ((setup.rims, remedy), (fixed, of_fixed)):
+    of_fixed = ", which is fixed", "let that boundary slide, with RIMS= SLIDE, or move it less"
+    for rims, words in ((setup.rims, free), (fixed, of_fixed)):
         if rims is None:
             continue
         least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
@@ -222,7 +227,7 @@ def _off_walls(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iter
             if off[k] > least and off[k] > least + wall.bulge:
                 names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
                 who = " and ".join(names)
-                yield _OffWall(int(nodes[k]), who, " and ".join(wall.names), float(off[k]), why)
+                yield _OffWall(int(nodes[k]), who, " and ".join(wall.names), float(off[k]), *words)
 
 
 def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
@@ -252,9 +257,12 @@ def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Itera
         if off[k] > allowed:
             far = abs(float(field.distances(coords[[k]])[end][0][0]))
             remedy = f"refine {name}" if field.revolved else "let no periodic side cut the blade"
-            why = f"its shape is not known where the blade stood; move the blade less, or {remedy}"
-            why = f", {off[k]:.2%} of the span (its facets: {allowed:.2%}): {why}"
-            yield _OffWall(int(nodes[k]), name, "this boundary", far, why)
+            remedy = f"move the blade less, or {remedy}"
+            why = (
+                f", {off[k]:.2%} of the span (its facets: {allowed:.2%}): its shape is not known "
+                "where the blade stood"
+            )
+            yield _OffWall(int(nodes[k]), name, "this boundary", far, why, remedy)
 
 
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:

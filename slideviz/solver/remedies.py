@@ -10,14 +10,14 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.zone_cases import each_zone
-from slideviz.errors import SlidevizError
+from slideviz.errors import SlidevizError, messages_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.steps import Step
 from slideviz.terms import SLIDES
 
-KEEPS_RIMS = "RIMS= SLIDE keeps such nodes on it"  # the end of a warning of nodes that left a wall
+KEEPS_RIMS = "RIMS= SLIDE keeps such nodes on it"  # the remedy where nodes left a wall
 MOST_NAMES = 2  # most boundaries that a remedy names; of more it has the number
 
 
@@ -50,7 +50,7 @@ def remedies(
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if case.layers != "no" and case.layer_thickness:
         found.append(Remedy("LAYER_THICKNESS= AUTO", "an automatic thickness of the layers"))
-    if step and any(text.endswith(KEEPS_RIMS) for text in step.warnings):
+    if step and any(each.remedy == KEEPS_RIMS for each in messages_of(step.messages)):
         found.append(Remedy("RIMS= SLIDE", "“stay on walls” for nodes on walls"))
     if step and step.layers:
         given = case.reduction or Reduction()

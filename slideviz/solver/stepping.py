@@ -180,7 +180,7 @@ class Stepping:
         """Return a step with all its warnings; ``findings``: of the steps up to this one."""
         misfit, apart = self.misfit(step)
         points = step.mesh.points
-        left: list[str] = []
+        left: list[Message] = []
         if step.index == step.total:
             left = wall_warnings(self.setup, self.case, self.mesh, points)
         messages = (

@@ -265,7 +265,7 @@ def test_a_rim_that_cannot_be_brought_back_has_another_remedy():
     setup = make_setup(prepare(case, mesh))
     after = mesh.points + np.array([0.0, 0.1, 0.0])
     (text, *_) = wall_warnings(setup, case, mesh, after)
-    assert text.endswith(", to which it cannot be brought back; move it less")
+    assert str(text).endswith(", to which it cannot be brought back; move it less")
 
 
 DERIVATIVES = {
