@@ -851,3 +851,15 @@ def test_a_library_that_finds_no_memory_is_told_as_that(problem, monkeypatch, ca
     assert run(["info", "a.su2"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("slideviz: there is not enough memory to load the libraries that this")
+
+
+@pytest.mark.parametrize("limit_kb", [300_000, 600_000])
+def test_a_command_with_too_little_memory_ends_with_one_line(square, limit_kb):
+    """OpenBLAS waits for memory without an end, even at a signal."""
+    call = f"ulimit -v {limit_kb}; exec {sys.executable} -m slideviz run {square}/square.cfg -q"
+    done = subprocess.run(
+        ["sh", "-c", call], cwd=Path(sv.__file__).parents[1], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("slideviz: there is not enough memory")
+    assert done.stderr.count("\n") == 1

@@ -14,6 +14,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from mmap import mmap
 from typing import TYPE_CHECKING
 
 from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, holding, terminal_streams
@@ -54,6 +55,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         from slideviz.system.file_checks import protected
 
         arguments = parse(argv)
+        mmap(-1, LEAST_BYTES).close()
         arguments.inputs = input_paths(arguments)
         arguments.ranks = ranks
         with (
@@ -108,6 +110,8 @@ PACKAGES = {
 """What pip installs for a module: packages of another name, or all that pictures or the window
 need."""
 
+LEAST_BYTES = 1 << 30
+"""Address space without which OpenBLAS may wait for memory without an end."""
 NO_MEMORY = (
     "there is not enough memory to load the libraries that this needs; close other programs, or "
     "raise the limit (ulimit -v)"
