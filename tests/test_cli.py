@@ -498,7 +498,7 @@ def test_interrupt_leaves_nothing_half_written(square, tmp_path):
     made = tmp_path / "steps"
     argv = [sys.executable, "-m", "slideviz", "run", str(square / "square.cfg")]
     child = subprocess.Popen(
-        [*argv, "--set", "STEPS=100000", "--steps-dir", str(made)],
+        [*argv, "--set", "STEPS=9999", "--steps-dir", str(made)],
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),

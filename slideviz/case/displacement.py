@@ -41,7 +41,9 @@ class Columns:
 
 
 MOST_APART = 5.0
-"""Largest difference of displacements in a file, over the mesh's extent."""
+LITTLE = 1e-4
+"""Largest difference of displacements in a file, and a suspiciously small largest one, over the
+extent of what moves."""
 DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 
@@ -73,14 +75,21 @@ def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Disp
     """
     text, warnings = read_text(path, "displacement file")
     read = parsed_displacements(text, path, mesh, nodes, of)
+    size = float(np.ptp(mesh.points[nodes], axis=0).max(initial=0.0))
     apart = float(np.ptp(read.vectors, axis=0).max(initial=0.0))
-    if 0.0 < MOST_APART * mesh.extent < apart:
+    if 0.0 < MOST_APART * size < apart:
         raise CaseError(
-            f"{path}: displacements differ by {apart / mesh.extent:,.3g} times the extent of "
-            f"{mesh.name}, {mesh.extent:.4g}: are they in another unit, such as millimetres for "
-            "metres? Multiply them by 0.001 then"
+            f"{path}: displacements differ by {apart / size:,.3g} times the extent of {of}, "
+            f"{size:.4g}: are they in another unit, such as millimetres for metres? Multiply them "
+            "by 0.001 then"
         )
-    return replace(read, warnings=tuple(dict.fromkeys((*warnings, *read.warnings))))
+    remarks = (*warnings, *read.warnings)
+    largest = np.abs(read.vectors).max(initial=0.0)
+    if 0.0 < largest < LITTLE * size:
+        rule = f"displacements are up to {largest:.3g}, and the extent of {of} is {size:.4g}"
+        remedy = "multiply them by 1000 if they are in metres, and the mesh in millimetres"
+        remarks = (*remarks, Message(rule, remedy, (path,), level="note"))
+    return replace(read, warnings=tuple(dict.fromkeys(remarks)))
 
 
 def parsed_displacements(

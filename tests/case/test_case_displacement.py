@@ -148,15 +148,16 @@ def test_displacements_in_another_unit_are_told_as_that(scale, tmp_path):
     mesh = builders.square(6)
     mesh = mesh.with_points(scale * mesh.points)
     nodes = mesh.marker("BLOCK").nodes
-    moved = 0.1 * mesh.points[nodes]
-    for factor in (1.0, 1000.0):
+    moved = 0.08 * (mesh.points[nodes] - mesh.points[nodes].mean(axis=0))
+    for factor in (1.0, 1e-3, 100.0, 1000.0):
         rows = np.column_stack([nodes, factor * moved])
         np.savetxt(tmp_path / "d.txt", rows, fmt=["%d", "%.17g", "%.17g"])
         case = sv.Case(
             roles={"BLOCK": "moving"}, motions=(sv.FromFile(tmp_path / "d.txt", "BLOCK"),)
         )
-        if factor == 1.0:
-            next(sv.deform(case, mesh))
+        if factor <= 1.0:
+            said = "\n".join(map(str, next(sv.deform(case, mesh)).warnings))
+            assert ("multiply them by 1000 if they are in metres" in said) == (factor < 1.0)
             continue
         with pytest.raises(CaseError, match=r"times the extent of .*: are they in another unit"):
             next(sv.deform(case, mesh))

@@ -129,6 +129,9 @@ def test_it_comes_before_other_motions(shifted):
         (39.37, "inches for metres"),
         (25.4, "millimetres for inches"),
         (1 / 25.4, "inches for millimetres"),
+        (100.0, "centimetres for metres"),
+        (10.0, "millimetres for centimetres"),
+        (0.1, "centimetres for millimetres"),
     ],
 )
 def test_a_target_in_another_unit_says_so_first(factor, said, tmp_path):

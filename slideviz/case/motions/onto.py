@@ -43,6 +43,7 @@ UNITS = {
     100.0: ("metres", "centimetres"),
     39.37: ("metres", "inches"),
     25.4: ("inches", "millimetres"),
+    10.0: ("centimetres", "millimetres"),
 }
 """The larger and the smaller of two units, by how many of the smaller the larger is."""
 NEAR = 1.24  # largest ratio of sizes over such a factor; 25.4 and 39.37 stay apart
