@@ -161,7 +161,7 @@ def roles(window: MainWindow, place: Path) -> None:
     view = window.view
     menu = boundary_menu(window, store, ("INFLOW",))
     menu.popup(view.mapToGlobal(QPoint(view.width() * 7 // 10, view.height() * 2 // 3)))
-    menu.setActiveAction(next(act for act in menu.actions() if act.text() == "Sliding"))
+    menu.setActiveAction(next(act for act in menu.actions() if act.text() == "&Sliding"))
 
 
 def quality(window: MainWindow, place: Path) -> None:

@@ -16,6 +16,7 @@ from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.case.moving_nodes import displacement_of
+from slideviz.case.values import MAX_STEPS
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS
@@ -119,7 +120,7 @@ def cases(draw: st.DrawFn, folder: Path) -> Case:
         origin=draw(st.tuples(finite, finite, finite)),
         feature_angle_deg=draw(st.floats(0, 180, exclude_min=True)),
         curved=draw(st.booleans()),
-        steps=draw(whole),
+        steps=draw(st.integers(1, MAX_STEPS)),
         influence_factor=draw(st.floats(1e-6, 1e6, exclude_min=True, exclude_max=True)),
         reduction=draw(st.none() | reductions),
         quality_metric=draw(st.sampled_from(["knupp", "rbf-slide"])),
