@@ -263,11 +263,11 @@ def _paired(
             try:
                 pair = match(mesh, rest[0], second, kind, axis, origin)
             except MeshError as problem:
-                reasons.append(problem)
+                unmatched.append(problem)
                 continue
             if model is not None and not agree(model, pair):
                 names = (f"{p.first!r}, {p.second!r} ({p.describe()})" for p in (model, pair))
-                reasons.append(
+                several_periods.append(
                     MeshError(
                         f"{mesh.name}: the periodic pairs {' and '.join(names)} differ; only one "
                         "period is possible, so give the others another role"
@@ -279,11 +279,13 @@ def _paired(
                 return (pair, *others)
         return None
 
-    reasons: list[MeshError] = []
+    unmatched: list[MeshError] = []
+    several_periods: list[MeshError] = []
     pairs = pairs_of(list(names), None)
     if pairs is None:
-        period = next((reason for reason in reasons if "one period" in str(reason)), None)
-        raise period or _left_over(mesh, names, reasons[0], kind=kind, axis=axis, origin=origin)
+        if several_periods:
+            raise several_periods[0]
+        raise _left_over(mesh, names, unmatched[0], kind=kind, axis=axis, origin=origin)
     return pairs
 
 
