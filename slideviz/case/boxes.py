@@ -124,8 +124,8 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     """Return a warning where the nodes of a marker in a box are off (`embedding`); else []."""
     _, off = embedding(mesh, box, marker)
     sentence = (
-        f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
-        f"the mesh, by up to {off:.1g} of the box; if the mesh was moved without it, define the "
-        f"box again; if it is in other coordinates, set FFD_COORD_SYSTEM"
+        f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} differ from the "
+        f"mesh by up to {off:.1g} of the box; if the mesh was moved without it, define the box "
+        "again; if it is in other coordinates, set FFD_COORD_SYSTEM"
     )
     return [sentence] if off > OFF else []

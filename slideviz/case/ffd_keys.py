@@ -140,8 +140,8 @@ _ROWS = (
     ),
     _setting(
         "FFD_COORD_SYSTEM",
-        "The coordinates in which boxes are straight, also those of the mesh; their axis is along "
-        "x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
+        "The coordinates in which boxes are straight, also the boxes of the mesh; their axis is "
+        "along x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
         field="ffd_system",
         label="FFD coordinates",
     ),

@@ -222,8 +222,8 @@ _ROWS = (
         QUALITY,
         LIMITS,
         "What the deformed mesh must meet; if it does not, `run` ends with exit code 4. A number "
-        "that each cell or wall has must be within its limit everywhere. Numbers of walls are "
-        "those of all boundaries with layers, or of one, e.g. growth@blade < 1.5.",
+        "that each cell or wall has must be within its limit everywhere. Numbers of walls cover "
+        "all boundaries with layers, or one, e.g. growth@blade < 1.5.",
         lambda case, limits: case.change(limits=limits),
         lambda case: case.limits or None,
         field="limits",

@@ -285,9 +285,9 @@ METHOD_ROWS = (
         "closest point, and the nodes beside them follow smoothly.",
         label="Nodes on walls",
         form="main",
-        tip="Whether nodes that what moves shares with a sliding or internal boundary, such as "
-        "those of a blade on its hub, stay on that wall whatever the motion is; the nodes beside "
-        "them follow smoothly.",
+        tip="Whether nodes that a moving boundary shares with a sliding or internal boundary, such "
+        "as nodes of a blade on its hub, stay on that wall whatever the motion is; the nodes "
+        "beside them follow smoothly.",
         run_label="rims {}",
         idle_reason=_no_walls,
     ),
@@ -401,11 +401,11 @@ METHOD_ROWS = (
     _setting(
         "REPAIR",
         "Mend cells that are inverted, not proved valid, or of a quality below REPAIR_BELOW (and "
-        "lower than before): nodes near them move, never those of moving and fixed boundaries. "
-        "The mesh is never worse after it. AUTO is the same as YES.",
+        "lower than before): nodes near them move, never nodes of moving and fixed boundaries. The "
+        "mesh is never worse after it. AUTO is the same as YES.",
         form="main",
         tip="Whether inverted and poor cells are then mended, by moving the nodes near them: never "
-        "those of moving and fixed boundaries.",
+        "nodes of moving and fixed boundaries.",
         run_label="repair {}",
     ),
     _setting(

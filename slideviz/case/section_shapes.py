@@ -95,7 +95,7 @@ class ShapeTerms:
 _CURVE = "Show the quality of the cells along the section beside the view."
 _AXIS = (
     "then the axis: x, y, z, or its direction ax,ay,az, and after it {point} cx,cy,cz if not 0; "
-    "without axis that of the rotational period, else z"
+    "without axis the axis of the rotational period, else z"
 )
 
 SECTION_SHAPES = {

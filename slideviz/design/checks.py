@@ -122,7 +122,7 @@ def warn_of_errors(
     worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
     chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
     of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
-    why = f": {chosen} are those of another displacement"
+    why = f": {chosen} belong to another displacement"
     remedy = "renew them with `deformer = deformer.refresh(displacement)`"
     if reference[worst]:
         why = f", with {chosen} chosen for this displacement"

@@ -353,8 +353,8 @@ def regular_box(
     # The box may be left-handed, and sides may shrink to an edge.
     if volume.min() < 0.0 < volume.max() or not volume.any():
         raise CaseError(
-            "the corners enclose no volume in their order; expected those of the bottom "
-            "counter-clockwise, then those above them"
+            "the corners enclose no volume in their order; expected the bottom corners "
+            "counter-clockwise, then the corners above them"
         )
     return box
 

@@ -227,7 +227,7 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
         deformer = sv.Deformer(mesh, case.change(reduction=None, influence_factor=2.5))
     with pytest.warns(ToleranceWarning, match="nodes slide on chosen for this displacement; use"):
         deformer.deform()
-    with pytest.warns(ToleranceWarning, match="are those of another displacement; renew"):
+    with pytest.warns(ToleranceWarning, match="belong to another displacement; renew"):
         deformer.deform(1.01 * deformer.displacement)
     both = np.stack([0.5 * deformer.displacement, deformer.displacement])
     with pytest.warns(ToleranceWarning, match=r"of 2 designs .* nodes slide on chosen for this"):

@@ -791,7 +791,7 @@ def test_set_changes_su2s_keys(here, capsys):
     for given, said in (
         ("DV_VALUE=( )", "a.cfg: DV_VALUE has 0 values for 1 variable; give one each"),
         ("DV_VALU=1", "unknown key 'DV_VALU'; did you mean DV_VALUE?"),
-        ("MACH_NUMBER=1", "unknown key 'MACH_NUMBER'; `slideviz keys` lists those of slideviz"),
+        ("MACH_NUMBER=1", "unknown key 'MACH_NUMBER'; `slideviz keys` lists slideviz's keys"),
         ("DV_VALUE", "--set 'DV_VALUE' is not of the form KEY=VALUE"),
     ):
         assert run([*call, given]) == 1
@@ -914,7 +914,7 @@ def test_boxes_that_the_surface_leaves_behind_are_told(here, capsys):
     Path("out.su2").rename("mesh.su2")
     config("DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, 0, 0, 1)\nDV_VALUE= 0.02\n")
     assert run(["def", "a.cfg", "-q"]) == 0
-    assert "'BOX' on low are not those of the mesh, by up to 0.07" in capsys.readouterr().err
+    assert "'BOX' on low differ from the mesh by up to 0.07" in capsys.readouterr().err
 
 
 ZONES = """MESH_FILENAME= stage.su2

@@ -308,7 +308,10 @@ def test_sensitivities_without_coordinates_are_those_of_the_design(case, capsys)
     table = [row.split(", ") for row in Path("adj_cd.csv").read_text().splitlines()]
     Path("adj_cd.csv").write_text("\n".join(", ".join([r[0], *r[4:]]) for r in table) + "\n")
     assert run(["dot", "dot.cfg"]) == 0
-    assert "adj_cd.csv has no coordinates: taken as those of this design" in capsys.readouterr().err
+    assert (
+        "adj_cd.csv has no coordinates; its rows are taken at this design's points"
+        in capsys.readouterr().err
+    )
     np.testing.assert_array_equal(gradient(), expected)
 
 
@@ -539,14 +542,14 @@ def test_a_badly_conditioned_system_is_told_by_the_command_itself(case, capsys, 
     monkeypatch.setattr(gradients, "CLOSE", -1.0)
     code, lines = heard(extra, "0.05, 0.02", points, weights, capsys)
     assert code == 0
-    assert any("of a deformation whose points differ by up to" in line for line in lines)
+    assert any("to a deformation whose points differ by up to" in line for line in lines)
 
 
 def test_points_that_differ_from_those_written_are_told():
     points = np.array([[2.0, 0.0], [0.0, 1.0]])
     assert gradients._difference(points + 0.4 * gradients.CLOSE, points) == []
     (said,) = gradients._difference(points + 3.0 * gradients.CLOSE, points)
-    assert "whose points differ by up to 3e-08 from those that `slideviz def` writes" in said
+    assert "whose points differ by up to 3e-08 from the points that `slideviz def` writes" in said
 
 
 def test_control_nodes_that_do_not_suffice_are_told(case, capsys):

@@ -210,7 +210,7 @@ def test_markers_that_differ_in_capitals_alone():
         ),
         (["airfoi.rotate.angle_deg"], r"did you mean airfoil.rotate.angle_deg\?$"),
         (["zzz"], r"the motions have airfoil.rotate.angle_deg, .*airfoil.translate.y"),
-        (["MESH_FILENAME"], "files and the view are those of the case"),
+        (["MESH_FILENAME"], "files and the view come from the case"),
         (["STEPS", "steps"], "means the same as column STEPS"),
         (["motion2.y", "airfoil.translate.dy"], "means the same as column motion2.y"),
         (["motion2.y", "MOTION"], "replaces motions whose numbers"),

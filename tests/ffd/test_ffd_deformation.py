@@ -227,7 +227,7 @@ def test_bound_does_twice_what_has_several_values_and_lasts():
     assert "variables with several values are applied twice" in held.notes[0]
     one = ("OUT", "FFD_GULL", (1,), (), 0.2)
     after = deformed([inner(), outer()], [three, one], bound=0.05)
-    assert "those of OUT get -" in after.notes[0]
+    assert "the variables of OUT get -" in after.notes[0]
     assert "for OPT_RELAX_FACTOR" in after.notes[0]
 
 

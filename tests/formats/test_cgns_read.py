@@ -398,8 +398,8 @@ def test_nodes_that_lie_apart_are_not_joined(tmp_path):
     mesh = read_cgns(path)
     assert len(mesh.points) == 18
     assert mesh.remarks[0].startswith(
-        "/Base/left/ZoneGridConnectivity/ab is not joined: its nodes lie up to 0.001 from those "
-        "of right, more than 2e-06 (1e-06 of the extent). Its faces are a boundary 'ab'."
+        "/Base/left/ZoneGridConnectivity/ab is not joined: its nodes lie up to 0.001 from the "
+        "nodes of right, more than 2e-06 (1e-06 of the extent). Its faces are a boundary 'ab'."
     )
     near = two_squares(tmp_path / "b.cgns", 1e-7, lambda a, b: lists(a, "ab", "right", EDGE, OTHER))
     assert len(read_cgns(near).points) == 15
@@ -536,7 +536,10 @@ MISTAKES = [
     (put(f"{GRID}/CoordinateY", np.full(80, np.nan)), "CoordinateY: is nan at vertex 1, which is"),
     (put(f"{GRID}/CoordinateY", np.ones(80), kind="i4"), "is of type int32; expected R4 or R8"),
     (put(f"{BC}/in/PointRange", 1, 1, 1, 9, 5, 4), "goes from (1, 1, 1) to (9, 5, 4), which is no"),
-    (put(f"{BC}/in/PointRange", 9, 1, 1, 9, 5, 4), "names the vertex (9, 1, 1), but those of blk"),
+    (
+        put(f"{BC}/in/PointRange", 9, 1, 1, 9, 5, 4),
+        "names the vertex (9, 1, 1), but the vertices of blk",
+    ),
     (put(f"{BC}/tip/PointRange", 1, 1, 4, 4, 2, 4), "ends at (4, 2, 4), but the zone has 3 x 4 x"),
     (put(f"{BC}/in/PointRange", 1, 1), "has 2 numbers of shape (2,); expected n x 3: expo"),
     (delete(f"{BC}/in/PointRange"), "/ZoneBC/in: has no PointRange, PointList, ElementRange or"),
@@ -641,7 +644,7 @@ def test_lists_of_different_lengths(tmp_path):
     path = two_squares(
         tmp_path / "a.cgns", joined=lambda a, b: lists(a, "ab", "right", EDGE, [[9, 9]] * 3)
     )
-    with pytest.raises(MeshError, match=r"names the vertex \(9, 9\), but those of right are num"):
+    with pytest.raises(MeshError, match=r"names the vertex \(9, 9\), but the vertices of right"):
         read_cgns(path)
 
 

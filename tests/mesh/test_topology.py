@@ -175,7 +175,7 @@ def test_a_facet_that_is_no_side_of_a_cell_is_refused():
     mesh = builders.square(4, block=False)
     across = Marker("odd", Cells.from_blocks([(3, [[0, 6]])]))
     wrong = Mesh(mesh.points, mesh.cells, (*mesh.markers, across), name="a.su2")
-    with pytest.raises(MeshError, match=r"a\.su2: marker 'odd' .* nodes 0, 6 .* no side"):
+    with pytest.raises(MeshError, match=r"a\.su2: marker 'odd' .* nodes 0, 6 .* not a side"):
         find_boundary(wrong)
 
 
@@ -183,7 +183,7 @@ def test_a_triangle_on_half_of_a_quadrilateral_is_no_side():
     mesh = builders.cube(2, block=False)
     quad = mesh.marker("z_m").cells.by_type[9][1][0]
     half = Marker("half", Cells.from_blocks([(5, [quad[:3]])]))
-    with pytest.raises(MeshError, match=r"marker 'half'.*no side of any cell"):
+    with pytest.raises(MeshError, match=r"marker 'half'.*not a side of any cell"):
         find_boundary(Mesh(mesh.points, mesh.cells, (half,)))
 
 

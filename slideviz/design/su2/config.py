@@ -268,7 +268,7 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
             found[key] = value.strip()
             continue
         if sign and key not in {*known, *KEYS}:
-            hint = nearest(key, (*known, *KEYS)) or "; `slideviz keys` lists those of slideviz"
+            hint = nearest(key, (*known, *KEYS)) or "; `slideviz keys` lists slideviz's keys"
             raise CaseError(f"--set {text}: unknown key {shown(key)}{hint}")
         others.append(text)
     return found, others

@@ -29,7 +29,7 @@ DIRECTIONS = 16  # most displacements for which control nodes are chosen at a de
 REACH = 1e-3  # size of these displacements, as a part of the mesh's extent
 
 INSUFFICIENT = (
-    "boundary nodes still get exactly their displacement, and the gradient is that of such a "
+    "boundary nodes still get exactly their displacement, and the gradient belongs to such a "
     "deformation; see what `slideviz def` warns of"
 )
 
@@ -169,12 +169,12 @@ def _heard(said: list[Remark]) -> Iterator[None]:
 
 
 def _difference(found: FloatArray, written: FloatArray) -> list[str]:
-    """Return a messages if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
+    """Return a message if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
     gap = float(np.abs(found - written).max(initial=0.0))
     if gap <= CLOSE * largest_coordinate(written):
         return []
-    messages = f"the gradient is that of a deformation whose points differ by up to {gap:.2g} from"
-    return [f"{messages} those that `slideviz def` writes"]
+    messages = f"the gradient belongs to a deformation whose points differ by up to {gap:.2g} from"
+    return [f"{messages} the points that `slideviz def` writes"]
 
 
 def _deformer(

@@ -268,7 +268,9 @@ def match(
         )
     design = None if design is None else cache(design)
     if sensitivities.points is None:
-        sentence = f"{sensitivities.path} has no coordinates: taken as those of this design"
+        sentence = (
+            f"{sensitivities.path} has no coordinates; its rows are taken at this design's points"
+        )
         positions = mesh.points if design is None or not normal_only else design()
         return Matched(
             _vectors(sensitivities.values, mesh, positions, moving, markers), True, (sentence,)

@@ -169,7 +169,7 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
         return TIME
     if key in KEYS:
         if KEYS[key].group in (FILES, VIEW):
-            raise CaseError("files and the view are those of the case for all designs")
+            raise CaseError("files and the view come from the case for all designs")
         return key
     wanted = _normalized_name(name)
     if wanted in known:

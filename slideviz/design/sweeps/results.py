@@ -189,8 +189,8 @@ class SweepResults:
             if not _means_same(value, now):
                 raise CaseError(
                     f"{self.path}:{line}: design {row.design} was made with {name}= "
-                    f"{value or '(that of the case)'}, and the table of designs has "
-                    f"{now or '(that of the case)'} now; {_REMEDY}"
+                    f"{value or '(the value of the case)'}, and the table of designs has "
+                    f"{now or '(the value of the case)'} now; {_REMEDY}"
                 )
         return replace(row, values=rows[row.design - 1].values, earlier=True)
 

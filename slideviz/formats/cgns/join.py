@@ -130,7 +130,7 @@ def _interface(
     if gap <= tolerance:
         return interface
     why = (
-        f"its nodes lie up to {gap:.3g} from those of {zones[donor].node.name}, more than "
+        f"its nodes lie up to {gap:.3g} from the nodes of {zones[donor].node.name}, more than "
         f"{tolerance:.3g} ({JOINED:g} of the extent)"
     )
     return Interface(node, zone, donor, None, why=why)

@@ -212,8 +212,9 @@ class CgnsZone:
         bad = ((indices < 1) | (indices > self.shape)).any(axis=1)
         if bad.any():
             raise node.fault(
-                f"names the vertex {tuple(indices[bad][0].tolist())}, but those of {self.node.name}"
-                f" are numbered from 1 to {' x '.join(map(str, self.shape))}; export the mesh again"
+                f"names the vertex {tuple(indices[bad][0].tolist())}, but the vertices of "
+                f"{self.node.name} are numbered from 1 to {' x '.join(map(str, self.shape))}; "
+                "export the mesh again"
             )
         return np.asarray((indices - 1) @ np.cumprod([1, *self.shape[:-1]]), np.int64)
 
