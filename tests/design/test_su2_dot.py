@@ -10,7 +10,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.su2 import gradients
-from tests.builders import cube, square
+from tests.builders import cube, passage, square
 
 DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
 CORNERS = [(-0.1, 0.3), (1.1, 0.3), (1.1, 0.8), (-0.1, 0.8)]
@@ -136,6 +136,49 @@ def test_gradient_is_that_of_central_differences(kinds, setting, here):
     assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
     np.testing.assert_allclose(gradient(), expected, rtol=2e-6, atol=1e-8)
     assert json.loads(Path("dot.json").read_text())["at"] == "design"
+
+
+RIMS = {
+    "flat": (
+        lambda: cube(4, block=False),
+        "z_m",
+        "x_m, x_p, y_m, y_p",
+        "(0, 1, 0.2)",
+        "0.3, 0, 0.1, 0.4, 1, 0",
+    ),
+    "curved": (
+        lambda: passage((3, 8, 6)),
+        "blade",
+        "hub, shroud",
+        "(0.2, 0.1, 1)",
+        "0, 0, 0, 1, 0, 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("wall", RIMS)
+@pytest.mark.parametrize("steps", [1, 3])
+def test_gradient_where_rims_stay_on_their_walls(wall, steps, here, capsys):
+    make, moving, walls, direction, axis = RIMS[wall]
+    mesh = make()
+    sv.write("mesh.su2", mesh)
+    config = (
+        f"MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nSOLUTION_ADJ_FILENAME= adj.dat\n"
+        f"OBJECTIVE_FUNCTION= DRAG\nDV_MARKER= ({moving})\nMARKER_SYM= ({walls})\n"
+        f"DV_KIND= TRANSLATION, ROTATION\nDV_PARAM= {direction}; ({axis})\nDV_VALUE= VALUES\n"
+        f"RIMS= SLIDE\nSTEPS= {steps}\nSLIDING_MODE= ps\n"
+    )
+    values = [0.02, 1.5]
+    weights = np.random.default_rng(3).normal(size=mesh.points.shape)
+    expected = differences(config, values, weights, [1e-5, 1e-4])
+    text = config.replace("VALUES", values_text(values))
+    write_csv("adj_cd.csv", written(text), weights)
+    assert "has left" not in capsys.readouterr().err
+    free = written(text.replace("RIMS= SLIDE", "RIMS= FREE"))
+    assert np.abs(free - written(text)).max() > 1e-3
+    Path("dot.cfg").write_text(text)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    np.testing.assert_allclose(gradient(), expected, rtol=1e-6, atol=1e-8)
 
 
 def test_gradient_in_3d_with_splines(here):
