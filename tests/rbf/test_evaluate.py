@@ -151,6 +151,9 @@ def test_the_tick_hears_all_fractions_and_may_stop():
         patch.setattr(module, "CHUNK", 500)
         evaluate(Basis(1.0), x, x, np.ones((50, 1)), heard.append)
         assert heard == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+        heard.clear()
+        evaluate(Basis(1.0), x[:, :24], x, np.ones((50, 1)), heard.append)
+        assert heard == pytest.approx([10 / 24, 20 / 24, 1.0]), "the last part is smaller"
 
         def stop(fraction):
             raise KeyboardInterrupt

@@ -2,9 +2,11 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.solver.growth import Farthest, farthest_node
 from slideviz.streaming.run import stream
 from tests.builders import cut_blade, passage
 from tests.machine.test_span_field import contoured
@@ -59,3 +61,16 @@ def test_a_curved_wall_may_be_left_as_far_as_its_facets_are_off():
 
     row = sample("impeller", 3000)
     assert not off_wall(row.case, row.mesh)
+
+
+def test_of_nodes_that_went_as_far_the_lowest_is_the_farthest():
+    near, far, lower = (Farthest(*one, np.zeros(2)) for one in ((1.0, 4), (2.0, 7), (2.0, 3)))
+    assert near.further(far) is far.further(near) is far
+    assert far.further(lower) is lower.further(far) is lower
+    before = np.zeros((40_000, 2))
+    after = before.copy()
+    after[[9, 20_000, 30_000]] = 1.0
+    found = farthest_node(before, after)
+    assert (found.node, found.length) == (9, pytest.approx(2.0**0.5))
+    after[30_000] = 2.0
+    assert farthest_node(before, after, np.arange(40_000) + 5).node == 30_005
