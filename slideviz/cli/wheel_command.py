@@ -41,7 +41,7 @@ def _wheel(arguments: argparse.Namespace) -> int:
     limits = limits_report(made.limits)
     several = {"zones": [_numbers(zone) for zone in made.zones]} if made.zones else {}
     report = {"path": str(made.path)} | _numbers(made) | several
-    report |= {"limits": limits, "warnings": list(made.warnings)}
+    report |= {"limits": limits, "warnings": list(made.messages)}
     if not save_json(arguments.json, report) and not arguments.quiet:
         if made.zones:
             print(f"{made.path}:")
@@ -58,14 +58,14 @@ def _wheel(arguments: argparse.Namespace) -> int:
         print(f"  {len(names)} boundaries: {', '.join(few)}")
         if limits:
             print(f"limits:\n{limit_lines(limits)}")
-    print_remarks(made.warnings, quiet=arguments.quiet)
+    print_remarks(made.messages, quiet=arguments.quiet)
     code = report_limits(limits)
     return INVERTED if made.inverted else code
 
 
 def _numbers(made: WheelQuality) -> dict[str, object]:
     """Return the entry of a wheel, or of one zone's wheel, for a report."""
-    left = ("path", "limits", "warnings", "zones")
+    left = ("path", "limits", "messages", "zones")
     return {name: value for name, value in vars(made).items() if name not in left}
 
 

@@ -58,10 +58,15 @@ class WheelQuality:
     """Largest distance of nodes of neighboring passages that became one, in the mesh's unit."""
     limits: tuple[LimitResult, ...] = ()
     """The limits of the case, met or not, for each passage that moves in another way."""
-    warnings: tuple[Remark, ...] = ()
+    messages: tuple[Remark, ...] = ()
     """What the runs of the passages warn of."""
     zones: tuple[WheelQuality, ...] = ()
     """The wheel of each zone, with the names of its file, where the mesh has several."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The texts of ``messages``."""
+        return tuple(map(str, self.messages))
 
 
 @check_types
@@ -141,15 +146,15 @@ def wheel(
     if len(rows) < max(counts):
         cases.append(case)
     points = []
-    warnings = list[Remark]()
+    messages = list[Remark]()
     for each in cases:
         points.append(mesh.points)
         if each.motions:
             *_, last = deform(each, mesh, progress)
             points[-1] = last.mesh.points
-            warnings += last.messages
+            messages += last.messages
     made = write_wheel(Path(path), cases, mesh, points, counts, numbered, progress)
-    return replace(made, warnings=tuple(dict.fromkeys(warnings)))
+    return replace(made, messages=tuple(dict.fromkeys(messages)))
 
 
 def _require_passages(case: Case, mesh: Mesh, rows: Sequence[Case], counts: Sequence[int]) -> None:
