@@ -20,6 +20,7 @@ from slideviz.samples.table import sample
 from slideviz.session import jobs
 from slideviz.session.run_messages import remarks_of
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver.layers import height_warnings
 from slideviz.solver.prepare import prepare
 from slideviz.solver.remedies import remedies
 from slideviz.solver.setup import make_setup
@@ -457,3 +458,14 @@ def test_the_sides_of_a_sharp_edge_in_3d_turn_by_themselves():
         0.99 < wall["first_height"]["ratio"]["min"] <= wall["first_height"]["ratio"]["max"] < 1.01
     )
     assert sv.quality(last.mesh, mesh).inverted == 0
+
+
+@pytest.mark.parametrize("below", [0.0, 0.9])
+def test_heights_that_repair_changed_have_its_remedy(below):
+    mesh = around(ellipse, 40, 80)
+    x = mesh.points[mesh.marker("w").nodes, 0]
+    stretched = np.stack([0.5 * x * np.abs(x), 0 * x], axis=1)
+    case, last = deformed(mesh, lambda _: stretched, repair="yes", repair_below=below)
+    said = "\n".join(height_warnings(case, sv.walls(last.mesh, mesh), last.mesh))
+    assert ("beyond 0.67 to 1.5: repair moves nodes of layers" in said) == (below > 0.0)
+    assert bool(said) == (below > 0.0)
