@@ -187,6 +187,8 @@ def _stream(
     from slideviz.streaming.run import stream
     from slideviz.system.ranks import SERIAL
 
+    if not arguments.quiet:
+        say("note", "a streamed run does not measure how it changes the first heights of layers")
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         return stream(
             case,

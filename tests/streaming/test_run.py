@@ -210,6 +210,16 @@ def hidden(path):
     return path.with_name(f".{path.name}.partial")
 
 
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_a_streamed_run_says_at_once_that_it_measures_no_heights(tmp_path, capsys, quiet):
+    made(tmp_path, "square", 8, ("STEPS=1",))
+    call = ["run", str(tmp_path / "square.cfg"), "-o", str(tmp_path / "out.su2b"), "--stream"]
+    assert run([*call, *quiet]) == 0
+    said = capsys.readouterr().err
+    words = "note: a streamed run does not measure how it changes the first heights of layers"
+    assert (words in said) == (not quiet)
+
+
 def test_a_run_that_is_stopped_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
