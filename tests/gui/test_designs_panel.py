@@ -197,7 +197,7 @@ def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     panel.mesh = window.store.session.mesh
     panel.table = panel.table.with_results([DesignRow(1, problem=f"{name}: {why}")])
     panel.show_design(1)
-    assert panel.status.label.text() == f"Design 1: {why}"
+    assert panel.status.label.text() == f"Design 1: {name}: {why}"
     bar, high = panel.status.verticalScrollBar(), panel.fontMetrics().height()
     qtbot.waitUntil(lambda: panel.status.height() > 1.9 * high)
     assert panel.status.width() > 0.9 * panel.width()
