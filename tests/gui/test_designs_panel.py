@@ -211,8 +211,8 @@ def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     panel._ended("", wrong=False)
     assert panel.status.label.text().splitlines() == [
         "1 design done; 2 failed; 1 with inverted cells",
-        f"Design 1: {why}",
-        "Design 3: another reason",
+        f"Design 1: {name}: {why}",
+        f"Design 3: {name}: another reason",
     ]
     qtbot.waitUntil(lambda: bar.maximum() > 0)
     assert panel.status.height() < 4 * high
