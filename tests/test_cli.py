@@ -20,7 +20,7 @@ import pyvista as pv
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.cli.options import changed
+from slideviz.cli.inputs import changed
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
 from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
@@ -189,8 +189,8 @@ def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
         raise AssertionError("too late")
 
     monkeypatch.chdir(square)
-    monkeypatch.setattr("slideviz.formats.files.read", never)
-    monkeypatch.setattr("slideviz.read", never, raising=False)
+    for module in ("inputs", "mesh_source", "repair_command"):
+        monkeypatch.setattr(f"slideviz.cli.{module}.read", never)
     assert run(words) == 1
     assert "the folder" in (err := capsys.readouterr().err)
     assert "does not exist" in err
@@ -457,7 +457,7 @@ def test_an_unforeseen_error_is_one_message(square, monkeypatch, capsys):
     def broken(*_, **__):
         raise ZeroDivisionError("boom")
 
-    monkeypatch.setattr("slideviz.quality", broken, raising=False)
+    monkeypatch.setattr("slideviz.cli.run_command.quality", broken)
     assert run(["run", str(square / "square.cfg")]) == 1
     err = capsys.readouterr().err
     assert "internal error (ZeroDivisionError: boom)" in err
@@ -480,7 +480,7 @@ def test_out_of_memory_is_one_sentence(square, monkeypatch, capsys):
     def broken(*_, **__):
         raise MemoryError
 
-    monkeypatch.setattr("slideviz.deform", broken, raising=False)
+    monkeypatch.setattr("slideviz.cli.run_command.deform", broken)
     assert run(["run", str(square / "square.cfg")]) == 1
     assert "out of memory" in capsys.readouterr().err
 
@@ -559,7 +559,7 @@ def test_compiling_is_told_once_when_it_happens(quiet, times, capsys, monkeypatc
         return 0
 
     arguments = argparse.Namespace(command=command, quiet=quiet)
-    monkeypatch.setattr("slideviz.cli.parser.parse", lambda argv: arguments)
+    monkeypatch.setattr("slideviz.cli.parse", lambda argv: arguments)
     assert run([]) == 0
     told = capsys.readouterr()
     assert told.err.count("compiling") == times
@@ -847,7 +847,7 @@ def test_a_library_that_finds_no_memory_is_told_as_that(problem, monkeypatch, ca
     def fails(_):
         raise problem
 
-    monkeypatch.setattr("slideviz.cli.parser.parse", fails)
+    monkeypatch.setattr("slideviz.cli.parse", fails)
     assert run(["info", "a.su2"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("slideviz: there is not enough memory to load the libraries that this")

@@ -88,7 +88,7 @@ def test_each_run_judges_the_undeformed_mesh_by_its_own_metric(tmp_path, monkeyp
         drawn.extend((session, second_view(session)))
         yield from ()
 
-    monkeypatch.setattr("slideviz.export.film.film", draw)
+    monkeypatch.setattr("slideviz.cli.film_command.draw", draw)
     words = ["film", str(case), "-o", str(tmp_path / "a.gif"), "--set", "STEPS=2", "-q"]
     run([*words, "--beside", "QUALITY_METRIC=rbf-slide"])
     metrics = [[frame.quality.metric for frame in one.frames] for one in drawn]

@@ -17,8 +17,13 @@ from contextlib import nullcontext
 from mmap import mmap
 from typing import TYPE_CHECKING
 
+from slideviz.cli.output_paths import input_paths
+from slideviz.cli.parser import parse
+from slideviz.cli.progress import note_compilation
 from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, holding, terminal_streams
 from slideviz.errors import Cancelled, SlidevizError
+from slideviz.system.cleanup import leftover_message
+from slideviz.system.file_checks import protected
 
 if TYPE_CHECKING:
     from slideviz.system.ranks import Ranks
@@ -48,12 +53,7 @@ def _shared(argv: Sequence[str], variable: str) -> int:
 def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     # With a new cache, Matplotlib logs a line for each font that it replaces in formulas.
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
-    try:  # also around the imports, which take long enough to be interrupted
-        from slideviz.cli.output_paths import input_paths
-        from slideviz.cli.parser import parse
-        from slideviz.cli.progress import note_compilation
-        from slideviz.system.file_checks import protected
-
+    try:
         arguments = parse(argv)
         mmap(-1, LEAST_BYTES).close()
         arguments.inputs = input_paths(arguments)
@@ -67,8 +67,6 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):
-        from slideviz.system.cleanup import leftover_message
-
         return _fail(f"cancelled; {leftover_message()}", CANCELLED)
     except SlidevizError as problem:
         return _fail(str(problem), WRONG_INPUT)
@@ -162,6 +160,7 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
             "(for SU2 meshes) shares its work among several; add --stream, or start one "
             f"(unset {variable} where a program with MPI calls slideviz)"
         )
+    # Late: NumPy and pickles, only for several processes, take 0.1 s.
     from slideviz.system.ranks import Ranks
 
     try:

@@ -75,6 +75,7 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 def quality_limits(text: str) -> tuple[Limit, ...]:
     """Return the limits of a text."""
+    # Late: the case takes 0.5 s, and help does not need it.
     from slideviz.case.limits import read_limits
 
     found = read_limits(text)
@@ -120,6 +121,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _below(text: str) -> float:
     """Return the value of a text as of the key REPAIR_BELOW."""
+    # Late: the case takes 0.5 s, and help does not need it.
     from slideviz.case.keys import KEYS
 
     return float(KEYS["REPAIR_BELOW"].kind.read(text))

@@ -7,9 +7,32 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import read_case, read_mesh, require_mesh_file
+from slideviz.case.keys import KEYS
+from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
 from slideviz.cli.progress import Bar
+from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
+from slideviz.study.combinations import (
+    COMPARED_METHODS,
+    MODES,
+    STEPS,
+    announcement,
+    bounded,
+    combinations,
+    csv_text,
+    history_text,
+    refused,
+    save_text,
+    terminal_head,
+    terminal_line,
+    wanted_methods,
+    wanted_modes,
+    warm,
+)
+from slideviz.study.combinations import (
+    compare as compare_runs,
+)
 from slideviz.terms import PERIODIC_MODES
 
 if TYPE_CHECKING:
@@ -27,17 +50,6 @@ KEPT_BYTES = 1_500_000_000
 
 def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
-    from slideviz.cli.terminal import DONE
-    from slideviz.study.combinations import (
-        COMPARED_METHODS,
-        MODES,
-        announcement,
-        refused,
-        terminal_head,
-        warm,
-    )
-
     for name in ("matplotlib",) if arguments.no_pictures else ("matplotlib", "pyvista"):
         import_module(name)  # else it would be missed only after all is computed
     case = read_case(arguments)
@@ -76,13 +88,6 @@ def _say(arguments: argparse.Namespace, text: str) -> None:
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
     """Return the combinations that the arguments ask for; CaseError if an item is not valid."""
-    from slideviz.case.keys import KEYS
-    from slideviz.study.combinations import (
-        COMPARED_METHODS,
-        combinations,
-        wanted_methods,
-        wanted_modes,
-    )
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
         text = getattr(arguments, option)
@@ -98,7 +103,6 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
 
     methods = names("methods", tuple(COMPARED_METHODS), wanted_methods(case))
     modes = names("periodic", tuple(PERIODIC_MODES), wanted_modes(case))
-    from slideviz.study.combinations import STEPS
 
     steps = list(STEPS)
     if arguments.steps is not None:
@@ -127,15 +131,6 @@ def _computed(
     folder: Path,
 ) -> tuple[list[CombinationRow], list[Path]]:
     """Compute all combinations; return their rows, the tables, and reasons why some cannot be."""
-    from slideviz.study.combinations import (
-        bounded,
-        compare,
-        csv_text,
-        history_text,
-        save_text,
-        terminal_line,
-    )
-
     table = folder / TABLE
     histories = folder / HISTORY
     files = [table]
@@ -143,7 +138,7 @@ def _computed(
     reasons: list[str] = []
     count = len(wanted) - len(cannot)
     bars: list[Bar] = []
-    rows_one_by_one = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
+    rows_one_by_one = compare_runs(case, mesh, wanted, lambda _, now: bars[-1](now))
     pulled = bounded(rows_one_by_one, 0 if arguments.no_pictures else KEPT_BYTES)
     for tried in wanted:
         number = 1 + sum(row.combination not in cannot for row in rows)
@@ -178,6 +173,7 @@ def _drawn(
     rows: Sequence[CombinationRow],
     folder: Path,
 ) -> list[Path]:
+    # Late: matplotlib takes 0.4 s.
     from slideviz.study.plots import figures, profiler, save_figure, steps_name
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
@@ -185,6 +181,7 @@ def _drawn(
     for name, figure in figures(rows, span):
         files += save_figure(figure, folder, name)
     if not arguments.no_pictures:
+        # Late: VTK takes 0.6 s, and is not needed without pictures.
         from slideviz.study.montage import DPI, montage
 
         for steps in dict.fromkeys(row.combination.steps for row in rows):

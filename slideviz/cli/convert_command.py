@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
-from slideviz.cli.terminal import say
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.progress import Bar
+from slideviz.cli.terminal import DONE, say
 from slideviz.errors import CaseError
+from slideviz.formats.files import convert as convert_file
+from slideviz.solver.steps import Progress
+from slideviz.streaming.resources import missing_memory_of
 
 
 def convert(arguments: argparse.Namespace) -> int:
     """Write a mesh in another format, with notes on what that leaves out; return the exit code."""
-    from functools import partial
-
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.terminal import DONE
-    from slideviz.formats.files import convert
-
     require_output_paths(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):
         return _convert_streamed(arguments)
-    convert(arguments.mesh, arguments.output, arguments.zone, warn=partial(say, "warning"))
+    convert_file(arguments.mesh, arguments.output, arguments.zone, warn=partial(say, "warning"))
     print(arguments.output)
     return DONE
 
 
 def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
     """Return whether to convert piece by piece: with ``--stream``, or if memory is too small."""
+    # Late: streaming takes 0.1 s, and is for large meshes.
     from slideviz.streaming.converting import streamed_kind
-    from slideviz.streaming.resources import missing_memory_of
 
     kind = streamed_kind(arguments.mesh, arguments.output)
     if arguments.stream:
@@ -44,11 +44,7 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
 
 
 def _convert_streamed(arguments: argparse.Namespace) -> int:
-    from functools import partial
-
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.terminal import DONE
-    from slideviz.solver.steps import Progress
+    # Late: streaming takes 0.1 s, and is for large meshes.
     from slideviz.streaming.converting import convert_streamed
 
     with Bar() as bar:

@@ -9,9 +9,25 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import changed
-from slideviz.cli.terminal import say
+from slideviz import quality, walls, write
+from slideviz.case.words import counted
+from slideviz.cli.inputs import changed
+from slideviz.cli.output_paths import (
+    OutputPath,
+    add_case_inputs,
+    qualities_path,
+    require_output_paths,
+)
+from slideviz.cli.report import folded_cells, print_remarks, run_report, save_json
+from slideviz.cli.run_command import run_steps
+from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
+from slideviz.cli.terminal import DONE, say
+from slideviz.design.su2.boxes import set_boxes
+from slideviz.design.su2.config import own_changes, read_config
+from slideviz.design.su2.on_mesh import on_mesh, read_mesh
+from slideviz.design.su2.surface import at_rest, convex_part, make_surface
 from slideviz.errors import CaseError, SlidevizError
+from slideviz.formats.losses import warning_of_losses
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -23,11 +39,6 @@ if TYPE_CHECKING:
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
-    from slideviz.case.words import counted
-    from slideviz.cli.output_paths import add_case_inputs
-    from slideviz.design.su2.config import own_changes, read_config
-    from slideviz.design.su2.on_mesh import on_mesh, read_mesh
-
     own, others = own_changes(arguments.set)
     config = read_config(arguments.case, own)
     zones = (replace(zone, case=changed(zone.case, others)) for zone in config.zones)
@@ -61,14 +72,6 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
 
 def run_def(arguments: argparse.Namespace) -> int:
     """Deform a mesh by a configuration of SU2, write it with its boxes; return the exit code."""
-    from slideviz import quality, walls, write
-    from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
-    from slideviz.cli.report import folded_cells, run_report
-    from slideviz.cli.run_command import run_steps
-    from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
-    from slideviz.design.su2.surface import at_rest, convex_part, make_surface
-    from slideviz.formats.losses import warning_of_losses
-
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
     output = config.case.mesh_out
@@ -159,12 +162,6 @@ def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
 
 def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
-    from slideviz import write
-    from slideviz.cli.report import print_remarks, save_json
-    from slideviz.cli.terminal import DONE
-    from slideviz.design.su2.boxes import set_boxes
-    from slideviz.formats.losses import warning_of_losses
-
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)
     assert case.mesh_out is not None

@@ -6,8 +6,17 @@ import argparse
 import time
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from slideviz.cli.def_command import read_configuration, variable_rows
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.progress import Bar
+from slideviz.cli.report import print_remarks, save_json
+from slideviz.cli.terminal import DONE
+from slideviz.design.su2.gradients import design_gradients
+from slideviz.design.su2.sensitivities import sensitivity_files
 from slideviz.errors import CaseError
+from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,13 +27,6 @@ if TYPE_CHECKING:
 
 def run_dot(arguments: argparse.Namespace) -> int:
     """Write the gradients for moving nodes and for design variables; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.report import print_remarks, save_json
-    from slideviz.cli.terminal import DONE
-    from slideviz.design.su2.gradients import design_gradients
-    from slideviz.design.su2.sensitivities import sensitivity_files
-
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
     first = config.variables[0]
@@ -76,10 +78,6 @@ def _print(report: dict, sensitivities: Path, gradient: Path | None) -> None:
 
 def _write_surface(path: Path, found: Gradients) -> None:
     """Write a line ``x, y, z, dJ/dx, dJ/dy, dJ/dz`` for each moving node; in 2D z's are 0."""
-    import numpy as np
-
-    from slideviz.system.atomic import atomic_write
-
     table = np.zeros((len(found.points), 6))
     table[:, : found.points.shape[1]] = found.points
     table[:, 3 : 3 + found.points.shape[1]] = found.surface
@@ -90,8 +88,6 @@ def _write_surface(path: Path, found: Gradients) -> None:
 
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
     """Write a line with the name of the objective, and one with the gradient of each variable."""
-    from slideviz.system.atomic import atomic_write
-
     objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
     rows = [f"{objective} gradient", *(repr(value) for value in found.variables.tolist())]
     with atomic_write(path, CaseError) as file:

@@ -6,15 +6,26 @@ import argparse
 import sys
 from contextlib import closing
 from dataclasses import replace
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import (
-    changed,
-    read_case,
-    read_mesh,
-    require_mesh_file,
-)
+from slideviz import deform, quality
+from slideviz.case.keys import KEYS
+from slideviz.case.words import counted
+from slideviz.cli.inputs import changed, read_case, read_mesh, require_mesh_file
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.progress import Bar
+from slideviz.cli.report import print_remarks
+from slideviz.cli.terminal import DONE, INVERTED
+from slideviz.design.sweeps.columns import TIME, number_of
+from slideviz.design.sweeps.table import read_designs, require_distinct_times
 from slideviz.errors import CaseError, Remark
+from slideviz.export.encode import film_kind
+from slideviz.export.film import FilmOptions, check_film, require_pair_width
+from slideviz.export.film import film as draw
+from slideviz.scene.overview import require_detail
+from slideviz.session.opening import session_of_runs
+from slideviz.session.state import Run, StepFrame
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -27,14 +38,6 @@ SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.terminal import DONE, INVERTED
-    from slideviz.export.encode import film_kind
-    from slideviz.export.film import FilmOptions, check_film, require_pair_width
-    from slideviz.export.film import film as draw
-    from slideviz.session.opening import session_of_runs
-
     file = arguments.output
     film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
     check_film(file, film_options, overwrite=arguments.force)  # before the work, not after it
@@ -57,10 +60,6 @@ def film(arguments: argparse.Namespace) -> int:
 
 def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
-    from slideviz import quality
-    from slideviz.scene.overview import require_detail
-    from slideviz.session.state import Run, StepFrame
-
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     mesh_file = require_mesh_file(arguments, case)
     case, mesh = read_mesh(case, mesh_file)
@@ -85,10 +84,6 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Ru
 
 
 def _words(case: Case, keys: list[str]) -> str:
-    from textwrap import shorten
-
-    from slideviz.case.keys import KEYS
-
     words = []
     for name in dict.fromkeys(keys):
         value = KEYS[name].get(case)
@@ -98,13 +93,6 @@ def _words(case: Case, keys: list[str]) -> str:
 
 
 def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
-    from slideviz import deform, quality
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.report import print_remarks
-    from slideviz.design.sweeps.columns import TIME, number_of
-    from slideviz.design.sweeps.table import read_designs, require_distinct_times
-    from slideviz.session.state import StepFrame
-
     frames = []
     warnings = list[Remark]()
     cases = [("", case)]
@@ -132,8 +120,6 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
 
 
 def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: list[Run]) -> None:
-    from slideviz.case.words import counted
-
     for run in runs:
         last_frame = run.frames[-1]
         last = last_frame.quality

@@ -8,9 +8,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import read_inputs
+from slideviz import deform, gaps, quality
+from slideviz.cli.inputs import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.terminal import holding
+from slideviz.cli.report import print_remarks, save_json, table
+from slideviz.cli.terminal import DONE, INVERTED, holding
+from slideviz.design.blade_gaps import TOUCHING
 from slideviz.errors import CaseError, Remark
 
 if TYPE_CHECKING:
@@ -26,12 +29,10 @@ def gap(arguments: argparse.Namespace) -> int:
 
 
 def _gap(arguments: argparse.Namespace) -> int:
-    from slideviz import deform, gaps, quality
-    from slideviz.cli.report import print_remarks, save_json
-    from slideviz.cli.terminal import DONE, INVERTED
-    from slideviz.plots.section_picture import require_picture_name
-
     if arguments.output is not None:
+        # Late: matplotlib takes 0.4 s.
+        from slideviz.plots.section_picture import require_picture_name
+
         require_picture_name(arguments.output)
     case, mesh = read_inputs(arguments)
     mesh_file = case.mesh_file
@@ -91,9 +92,6 @@ def _gap(arguments: argparse.Namespace) -> int:
 
 def _lines(before: Gap, after: Gap | None) -> str:
     """Return the lines on a gap: its smallest distance, and a table of those by place."""
-    from slideviz.cli.report import table
-    from slideviz.design.blade_gaps import TOUCHING
-
     measured = [one for one in (before, after) if one is not None]
     words = before.words
     if not any(one.distance for one in measured):
@@ -119,6 +117,7 @@ def _lines(before: Gap, after: Gap | None) -> str:
 
 
 def _draw(path: Path, before: tuple[Gap, ...], after: tuple[Gap, ...]) -> None:
+    # Late: matplotlib takes 0.4 s.
     from slideviz.plots.figure_io import empty_figure, write_figure
     from slideviz.plots.gap_curves import draw_gaps
     from slideviz.plots.session_plots import UNDEFORMED

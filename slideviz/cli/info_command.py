@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from slideviz.cli.mesh_source import open_mesh
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.report import info_report, save_json, table, zone_words
+from slideviz.cli.terminal import DONE
 from slideviz.errors import MeshError
+from slideviz.ffd.section import boxes_of
+from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.zones import marker_zones
+from slideviz.streaming.quality import CellCounts
 
 if TYPE_CHECKING:
     from slideviz.ffd.box import Box
@@ -16,10 +24,6 @@ if TYPE_CHECKING:
 
 def info(arguments: argparse.Namespace) -> int:
     """Print what is in a mesh file, or write it as JSON; return the exit code."""
-    from slideviz.cli.mesh_source import open_mesh
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.streaming.quality import CellCounts
-
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with open_mesh(arguments) as opened:
         counts = CellCounts(opened.source)
@@ -33,11 +37,6 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
     ``mesh``: the mesh, or only its skin. ``counts`` and ``found``: counts and quality of the whole
     mesh.
     """
-    from slideviz.cli.report import info_report, save_json, table, zone_words
-    from slideviz.cli.terminal import DONE
-    from slideviz.mesh.periodic import find_pairs
-    from slideviz.mesh.zones import marker_zones
-
     report = info_report(mesh, find_pairs(mesh), counts, found)
     boxes, fault = _boxes(mesh)
     if boxes:
@@ -94,8 +93,6 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
 
 def _boxes(mesh: Mesh) -> tuple[tuple[Box, ...], str]:
     """Return the FFD boxes of a mesh, and what is wrong with them, or ""."""
-    from slideviz.ffd.section import boxes_of
-
     try:
         return boxes_of(mesh), ""
     except MeshError as problem:

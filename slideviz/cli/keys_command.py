@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
+from slideviz.case.cfg import describe_keys
+from slideviz.cli.terminal import DONE
+
 
 def keys(_: argparse.Namespace) -> int:
     """Print the reference of all case keys; return the exit code."""
-    from slideviz.case.cfg import describe_keys
-    from slideviz.cli.terminal import DONE
-
     print(describe_keys())
     return DONE

@@ -11,7 +11,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.case.zone_cases import with_marker_names
+from slideviz.cli.progress import Bar
+from slideviz.cli.report import print_remarks
 from slideviz.errors import MeshError
+from slideviz.formats.files import read
+from slideviz.mesh.model import Mesh
+from slideviz.solver.steps import Progress
+from slideviz.streaming.quality import measure_mesh
+from slideviz.streaming.source import FileSource, MemorySource, has_cells_of
+from slideviz.streaming.stream_input import open_read_only
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -42,8 +51,6 @@ class OpenMesh:
         metrics: MutableMapping[Metric, MetricValues | None] | None = None,
     ) -> Quality:
         """Return the quality of all cells; ``counts`` and ``metrics`` as for `measure_mesh`."""
-        from slideviz.streaming.quality import measure_mesh
-
         folder = Path(tempfile.gettempdir())
         metric: SkewMetric = getattr(arguments, "metric", "knupp")
         with progress_of(arguments, "quality") as tick:
@@ -61,9 +68,6 @@ class OpenMesh:
 @contextmanager
 def progress_of(arguments: argparse.Namespace, phase: str) -> Iterator[Callable[[float], None]]:
     """Context with a function that shows the progress of a phase, if ``--stream`` is set."""
-    from slideviz.cli.progress import Bar
-    from slideviz.solver.steps import Progress
-
     with Bar(arguments.stream) as bar:
         yield lambda part: bar.phase(Progress(1, 1, phase, part))
 
@@ -77,11 +81,6 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     for temporary files until the context ends. Raises MeshError if the mesh has a mistake or, with
     ``--stream``, is of no format that can be streamed; or ``--reference`` has other cells.
     """
-    from slideviz.case.zone_cases import with_marker_names
-    from slideviz.cli.report import print_remarks
-    from slideviz.formats.files import read
-    from slideviz.streaming.stream_input import open_read_only
-
     folder = Path(tempfile.gettempdir())
     reference = getattr(arguments, "reference", None)
     with ExitStack() as stack:
@@ -120,15 +119,10 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
 
 def _mesh_of(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:
     """Return a mesh in memory or, of one in its file, its boundary and the cells at it."""
-    from slideviz.mesh.model import Mesh
-
     return mesh if isinstance(mesh, Mesh) else mesh.skin(tick)
 
 
 def _same_cells(mesh: Mesh | StreamInput, base: Mesh | StreamInput) -> bool:
-    from slideviz.mesh.model import Mesh
-    from slideviz.streaming.source import has_cells_of
-
     if isinstance(mesh, Mesh) and isinstance(base, Mesh):
         return base.points.shape == mesh.points.shape and base.cells.same_as(mesh.cells)
     assert not isinstance(mesh, Mesh)
@@ -139,9 +133,6 @@ def _same_cells(mesh: Mesh | StreamInput, base: Mesh | StreamInput) -> bool:
 def _source(
     stack: ExitStack, mesh: Mesh | StreamInput, base: Mesh | StreamInput | None, skin: Mesh
 ) -> MeshSource:
-    from slideviz.mesh.model import Mesh
-    from slideviz.streaming.source import FileSource, MemorySource
-
     if isinstance(mesh, Mesh):
         assert base is None or isinstance(base, Mesh)
         return MemorySource(mesh, base)

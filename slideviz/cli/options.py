@@ -7,16 +7,13 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from slideviz.errors import CaseError, Message, not_one_of, raise_all
-from slideviz.terms import NO_REFERENCE, RATED, ROLES, Quantity, field_of
+from slideviz.errors import CaseError, not_one_of
+from slideviz.terms import NO_REFERENCE, RATED, Quantity, field_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable
 
-    from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
     from slideviz.scene.overview import Zoom
-    from slideviz.terms import Role
 
 Read = TypeVar("Read")
 
@@ -114,118 +111,6 @@ def add_changes(call: argparse.ArgumentParser) -> None:
     )
 
 
-def read_case(arguments: argparse.Namespace) -> Case:
-    """Return the case of the arguments, changed by ``--set``, ``--steps`` and ``--zone``."""
-    from slideviz import Case
-    from slideviz.cli.output_paths import add_case_inputs
-
-    case = changed(Case.read(arguments.case), arguments.set)
-    if getattr(arguments, "step_count", None) is not None:
-        case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
-    case = case if arguments.zone is None else case.change(zone=arguments.zone)
-    add_case_inputs(arguments, case)
-    return case
-
-
-def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
-    """Return the case with the names of the boundaries as its mesh has them, and the mesh."""
-    from slideviz import read
-    from slideviz.case.zone_cases import with_marker_names
-
-    mesh = read(path, zone=case.zone, file_format=case.mesh_format)
-    return with_marker_names(case, mesh), mesh
-
-
-def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
-    """Return the mesh file of a case, or raise CaseError."""
-    if case.mesh_file is None:
-        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
-    return case.mesh_file
-
-
-def read_inputs(arguments: argparse.Namespace, *, is_mesh: bool = False) -> tuple[Case, Mesh]:
-    """Return the case and its mesh of a command with ``-o`` and ``--json``, which can be written.
-
-    ``is_mesh``: whether ``-o`` is a mesh. Errors as `require_output_paths`.
-    """
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-
-    case = read_case(arguments)
-    mesh_file = require_mesh_file(arguments, case)
-    require_output_paths(
-        arguments,
-        OutputPath(arguments.output, "-o", is_mesh=is_mesh),
-        OutputPath(arguments.json, "--json"),
-    )
-    return read_mesh(case, mesh_file)
-
-
-def optional_case(arguments: argparse.Namespace) -> Case | None:
-    """Return the case of the option ``--case``, or None."""
-    from slideviz import Case
-    from slideviz.cli.output_paths import add_case_inputs
-
-    if arguments.case is None:
-        return None
-    case = Case.read(arguments.case)
-    add_case_inputs(arguments, case)
-    return case
-
-
-def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
-    """Return the case with other values of some keys, given as texts KEY=VALUE.
-
-    ``option`` is what messages call the texts. Raises CaseError if texts have another form, there
-    is no such key, a value is wrong, or a list of markers takes a marker from the role that it
-    needs; with a line for each.
-    """
-    from slideviz.case.cfg import set_key
-    from slideviz.case.check import idle_roles
-
-    before = idle_roles(case)
-    problems = list[Message]()
-    taken: dict[str, tuple[str, Role]] = {}
-    for text in texts:
-        key, sign, value = text.partition("=")
-        if not sign:
-            rule = f"{option} {text!r} is not of the form KEY=VALUE"
-            problems.append(Message(rule))
-            continue
-        try:
-            after = set_key(case, key.strip(), value.strip(), option)
-        except CaseError as problem:
-            problems += problem.messages
-            continue
-        for name, role in case.roles.items():
-            if after.roles.get(name, role) != role:
-                taken[name] = f"{option} {text}", role
-        case = after
-    raise_all((*problems, *_taken(case, taken)))
-    added = [warning for warning in case.warnings if warning not in before]
-    return case.change(warnings=(*added, *idle_roles(case)))
-
-
-def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:
-    """Yield a sentence for each marker that was taken from a role that it needs.
-
-    ``taken`` has, for markers that came into another role, the option that did it and the role
-    before.
-    """
-    from slideviz.case.motions.motion import named
-
-    periodic = case.markers_with("periodic")
-    for name, (option, role) in taken.items():
-        if case.roles.get(name) == role:
-            continue
-        it = f"{option} takes {name} from {ROLES[role].key}"
-        if role == "moving" and any(name in named(motion.marker) for motion in case.motions):
-            yield f"{it}, but MOTION still moves it; set MOTION, too, or leave {name} out"
-        elif role == "moving" and not case.markers_with("moving"):
-            yield f"{it}, and no other marker moves; leave {name} out, or set MARKER_MOVING, too"
-        elif role == "periodic" and len(periodic) % 2:
-            yield f"{it}, which has {', '.join(periodic)} left; markers repeat in pairs: name both"
-
-
 def add_zoom(call: argparse.ArgumentParser) -> None:
     """Add the option ``--zoom`` of pictures and films."""
     call.add_argument(
@@ -244,6 +129,7 @@ def zoom(text: str) -> Zoom:
         return "auto"
     if text == "all":
         return "all"
+    # Late: NumPy takes 0.1 s, and help does not need it.
     from slideviz.scene.overview import Detail
 
     try:

@@ -18,6 +18,7 @@ from slideviz.errors import CaseError, nearest
 
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given; return the exit code."""
+    # Late: VTK takes 0.6 s.
     from slideviz.export.offscreen import display_fault
 
     if arguments.file is not None and not arguments.file.exists():
@@ -28,6 +29,7 @@ def window(arguments: argparse.Namespace) -> int:
     why = display_fault() if sys.platform.startswith("linux") else ""
     if why:
         raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
+    # Late: the window takes 2 s.
     from slideviz.gui.app import launch
 
     return launch(arguments.file, run=arguments.run)

@@ -39,6 +39,7 @@ def note_compilation(quiet: bool) -> Iterator[None]:
     if quiet:
         yield
         return
+    # Late: Numba takes 0.3 s, and a command that is wrong needs none.
     from slideviz.system.jit_cache import compilation_watched
 
     noted: list[bool] = []

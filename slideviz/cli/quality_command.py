@@ -6,9 +6,33 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import optional_case, reference_words
+from slideviz import walls, write
+from slideviz.case.limits import MeasuredMesh, check_limits, require_streamed
+from slideviz.cli.inputs import optional_case
+from slideviz.cli.mesh_source import open_mesh
+from slideviz.cli.options import reference_words
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.report import (
+    WORST,
+    histogram_lines,
+    limit_lines,
+    limits_report,
+    metric_lines,
+    metrics_report,
+    quality_lines,
+    quality_report,
+    save_json,
+    table,
+    wall_lines,
+)
+from slideviz.cli.run_outcome import report_limits
+from slideviz.cli.terminal import INVERTED
 from slideviz.errors import CaseError, MeshError
+from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.table import holds_quality, own_endings
+from slideviz.mesh.periodic import find_pairs
+from slideviz.session.opening import guess_by_name
+from slideviz.system.atomic import atomic_write
 from slideviz.terms import CELL_STATES, METRICS, RATED, WALL_VALUES, field_of
 
 if TYPE_CHECKING:
@@ -28,12 +52,6 @@ def quality(arguments: argparse.Namespace) -> int:
 
     Returns the exit code.
     """
-    from slideviz import write
-    from slideviz.case.limits import MeasuredMesh, check_limits
-    from slideviz.cli.mesh_source import open_mesh
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.formats.files import metric_data, quality_data
-
     output = arguments.output
     _require_streamed(arguments)
     is_table = output is not None and output.suffix.lower() == ".csv"
@@ -75,8 +93,6 @@ def quality(arguments: argparse.Namespace) -> int:
 
 def _require_streamed(arguments: argparse.Namespace) -> None:
     """Raise CaseError for what needs the mesh in memory, where ``--stream`` is set."""
-    from slideviz.case.limits import require_streamed
-
     if not arguments.stream:
         return
     if arguments.output is not None:
@@ -101,22 +117,6 @@ def _report(
     limits: Sequence[LimitResult],
 ) -> int:
     """Print the quality of a mesh or write it as JSON, and return the exit code."""
-    from slideviz.cli.report import (
-        WORST,
-        histogram_lines,
-        limit_lines,
-        limits_report,
-        metric_lines,
-        metrics_report,
-        quality_lines,
-        quality_report,
-        save_json,
-        table,
-        wall_lines,
-    )
-    from slideviz.cli.run_outcome import report_limits
-    from slideviz.cli.terminal import INVERTED
-
     worst = found.worst(WORST)
     reference = opened.reference
     rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
@@ -145,9 +145,6 @@ def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
 
     None, which means all, if there are none such.
     """
-    from slideviz.mesh.periodic import find_pairs
-    from slideviz.session.opening import guess_by_name
-
     guesses = {name: guess_by_name(name) for name in mesh.marker_names}
     hinted = {name for name, guess in guesses.items() if guess and guess.role == "periodic"}
     if not hinted:
@@ -162,8 +159,6 @@ def _not_periodic(mesh: Mesh) -> Sequence[str] | None:
 
 def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> Walls | None:
     """Return the layers at the boundaries ``names`` of a mesh; None for one in a file."""
-    from slideviz import walls
-
     try:
         return walls(mesh, reference, names)
     except MeshError:  # of a mesh with a mistake the quality is of use still
@@ -172,8 +167,6 @@ def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> W
 
 def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
     """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
-    from slideviz.system.atomic import atomic_write
-
     columns = zip(found.values, found.size, found.skew, found.status, *more.values(), strict=True)
     lines = [",".join(("cell,size_skew,size,skew,status", *more))]
     for cell, (value, size, skew, status, *others) in enumerate(columns):

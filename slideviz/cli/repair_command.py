@@ -7,7 +7,14 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.terminal import say
+from slideviz import quality, read, write
+from slideviz import repair as mend
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.progress import Bar
+from slideviz.cli.report import print_remarks, quality_lines, save_json
+from slideviz.cli.terminal import DONE, INVERTED, say
+from slideviz.formats.files import quality_data
+from slideviz.formats.losses import warning_of_losses
 
 if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
@@ -15,15 +22,6 @@ if TYPE_CHECKING:
 
 def repair(arguments: argparse.Namespace) -> int:
     """Mend a mesh, write it, and print or write a report; return the exit code."""
-    from slideviz import quality, read, write
-    from slideviz import repair as mend
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.report import print_remarks, save_json
-    from slideviz.cli.terminal import DONE, INVERTED
-    from slideviz.formats.files import quality_data
-    from slideviz.formats.losses import warning_of_losses
-
     begin = time.perf_counter()
     output = arguments.output
     path = arguments.mesh
@@ -85,8 +83,6 @@ def repair(arguments: argparse.Namespace) -> int:
 
 
 def _print(report: dict[str, Any], words: str, found: Quality, before: Quality) -> None:
-    from slideviz.cli.report import quality_lines
-
     print(f"{report['mesh']}: {words}")
     print(quality_lines(found, before, "before"))
     print(f"  {report['seconds']['total']:.2f} s")

@@ -12,11 +12,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import (
-    read_case,
-    read_mesh,
-    require_mesh_file,
-)
+from slideviz import deform, quality, walls, write
+from slideviz.case.zone_cases import with_marker_names
+from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
+from slideviz.cli.progress import Bar
+from slideviz.cli.report import LISTED, folded_cells, metrics_report, run_report
 from slideviz.cli.run_outcome import (
     CELLS,
     QUALITY_BYTES,
@@ -26,7 +27,15 @@ from slideviz.cli.run_outcome import (
 )
 from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
+from slideviz.formats.files import metric_data, quality_data
+from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
+from slideviz.mesh.metrics import rated_metric
+from slideviz.scene.overview import require_detail
+from slideviz.solver.steps import RunResult
+from slideviz.streaming.resources import missing_memory
+from slideviz.system.file_checks import same_file
+from slideviz.system.ranks import SERIAL
 from slideviz.terms import METRICS, WALL_VALUES
 
 if TYPE_CHECKING:
@@ -46,10 +55,6 @@ KEPT_BYTES = 1_000_000_000
 
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
-    from slideviz.case.zone_cases import with_marker_names
-    from slideviz.cli.output_paths import qualities_path
-    from slideviz.cli.report import metrics_report, run_report
-
     begin = time.perf_counter()
     case = read_case(arguments)
     require_mesh_file(arguments, case)
@@ -71,6 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_qualities(qualities, found)
         seconds["write"] += time.perf_counter()
     if arguments.picture:
+        # Late: VTK takes 0.6 s.
         from slideviz.export.offscreen_renderer import PICTURE_SIZE
         from slideviz.export.verbs import picture
 
@@ -114,8 +120,6 @@ def _metrics_of(
     arguments: argparse.Namespace, mesh: Mesh, found: Quality, base: Mesh
 ) -> dict[Metric, MetricValues]:
     """Return the metrics that ``--metrics`` asks for, of a mesh with its quality."""
-    from slideviz.mesh.metrics import rated_metric
-
     names = [name for name in METRICS if name in arguments.metrics]
     return {name: rated_metric(mesh, name, base, found) for name in names}
 
@@ -127,9 +131,6 @@ def _fields(
 
     The first is None, and the second empty, where the format has no place for them.
     """
-    from slideviz import walls
-    from slideviz.formats.files import metric_data, quality_data
-
     data = quality_data(path, found)
     if data is None or not arguments.metrics:
         return data, {}
@@ -143,12 +144,6 @@ def _fields(
 def _deform(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
-    from slideviz import quality, walls, write
-    from slideviz.cli.report import folded_cells
-    from slideviz.formats.losses import warning_of_losses
-    from slideviz.scene.overview import require_detail
-    from slideviz.solver.steps import RunResult
-
     assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}
     case, mesh = read_mesh(case, case.mesh_file)
@@ -182,10 +177,8 @@ def _deform(
 def _stream(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
-    from slideviz.cli.progress import Bar
-    from slideviz.cli.report import LISTED
+    # Late: streaming takes 0.2 s.
     from slideviz.streaming.run import stream
-    from slideviz.system.ranks import SERIAL
 
     if not arguments.quiet:
         say("note", "a streamed run does not measure how it changes the first heights of layers")
@@ -213,6 +206,7 @@ def require_streamable(
     """
     if not arguments.stream:
         return
+    # Late: streaming takes 0.2 s.
     from slideviz.streaming.run import require_stream
 
     for name in _needing_memory(arguments):
@@ -232,8 +226,6 @@ def is_to_be_streamed(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
     """Return whether to stream a run: on request, or if it is possible and memory is too small."""
-    from slideviz.streaming.resources import missing_memory
-
     if arguments.stream:
         return True
     able = _is_su2(output, kind) and not _needing_memory(arguments)
@@ -254,9 +246,6 @@ def _is_su2(output: Path, kind: FileFormat | None) -> bool:
 def _require_output_paths(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.system.file_checks import same_file
-
     assert case.mesh_file is not None
     ours = "|".join(map(re.escape, endings(lambda row: row.solver)))
     may_force = not arguments.force and same_file(output, case.mesh_file)
@@ -273,6 +262,7 @@ def _require_output_paths(
     if arguments.steps_file:
         _require_series(arguments.steps_file)
     if arguments.picture:
+        # Late: VTK takes 0.6 s.
         from slideviz.export.offscreen import check_png, check_size
         from slideviz.export.offscreen_renderer import PICTURE_SIZE
 
@@ -328,9 +318,6 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
     Once meshes take more than `KEPT_BYTES`, only the last step keeps its own; earlier steps have
     the undeformed mesh instead.
     """
-    from slideviz import deform, write
-    from slideviz.cli.progress import Bar
-
     steps: list[Step] = []
     folder = arguments.steps_dir
     series = _series(arguments, case, mesh)
@@ -362,7 +349,6 @@ def _series(
     if path is None:
         yield lambda _: None
         return
-    from slideviz import quality
 
     with format_for(path).function("series")(path, mesh) as series:
 

@@ -8,7 +8,28 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import orjson
+
+from slideviz.case.limits import NUMBERS
+from slideviz.case.words import counted
+from slideviz.cli.report import (
+    limit_lines,
+    limit_words,
+    metric_lines,
+    print_remarks,
+    quality_lines,
+    save_history,
+    save_json,
+    table,
+    wall_lines,
+    zone_words,
+)
+from slideviz.cli.terminal import DONE, INVERTED, LIMIT_MISSED
 from slideviz.errors import CaseError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.margin import SafeFraction
+from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
@@ -44,9 +65,6 @@ def report_outcome(
     ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
     ``advice``: what may help against inverted cells or missed limits, from `advice_for`.
     """
-    from slideviz.cli.report import print_remarks, save_history, save_json
-    from slideviz.cli.terminal import INVERTED
-
     if arguments.history:
         save_history(arguments.history, report)
     if not save_json(arguments.json, report) and not arguments.quiet:
@@ -64,9 +82,6 @@ def report_outcome(
 
 def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
     """Print the limits of a report that are not met to stderr, and advice; return the exit code."""
-    from slideviz.cli.report import limit_words
-    from slideviz.cli.terminal import DONE, LIMIT_MISSED
-
     missed = [entry for entry in limits if not entry["passed"]]
     for entry in missed:
         named = ", ".join(map(str, entry["cells"][:5]))
@@ -82,9 +97,6 @@ def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
 
 def write_qualities(path: Path, found: Quality) -> None:
     """Write a line with the size-skew quality of each cell, as RBF-SliDe's GENERATE_QUALITY."""
-    import numpy as np
-    import orjson
-
     with atomic_write(path, CaseError) as file:
         for first in range(0, len(found), _ROWS):
             part = np.asarray(found.values[first : first + _ROWS])
@@ -99,17 +111,6 @@ def _print_run(
     files: dict[str, Path | None],
     metrics: Sequence[Quantity],
 ) -> None:
-    from slideviz.case.words import counted
-    from slideviz.cli.report import (
-        limit_lines,
-        metric_lines,
-        quality_lines,
-        table,
-        wall_lines,
-        zone_words,
-    )
-    from slideviz.mesh.margin import SafeFraction
-
     counts = report["node_counts"]
     spent = report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
@@ -194,10 +195,6 @@ def advice_for(
     missed = [entry for entry in limits if not entry["passed"] and entry["undeformed_passed"]]
     if found is not None and not found.inverted and not missed:
         return ""  # what the undeformed mesh misses, no other deformation mends
-    import numpy as np
-
-    from slideviz.case.limits import NUMBERS
-    from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 
     beside: tuple[str, ...] = ()
     pitch = ""
@@ -220,9 +217,6 @@ def advice_for(
 
 
 def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
-    from slideviz.mesh.elements import ELEMENTS
-    from slideviz.mesh.margin import SafeFraction
-
     inverted = report["quality"]["inverted"]
     cells = report["quality"]["cells"]
     named = ", ".join(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from slideviz.cli.report import table
+from slideviz.cli.terminal import DONE
+from slideviz.samples.table import SAMPLES, write_sample
+
 
 def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples; return the exit code."""
-    from slideviz.cli.report import table
-    from slideviz.cli.terminal import DONE
-    from slideviz.samples.table import SAMPLES, write_sample
-
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")
         print(table([(name, row.words()) for name, row in SAMPLES.items()]))

@@ -7,9 +7,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from slideviz.case.section_shapes import SECTION_SHAPES
-from slideviz.cli.options import optional_case, reference_words
+from slideviz.cli.inputs import optional_case
+from slideviz.cli.mesh_source import open_mesh, progress_of
+from slideviz.cli.options import reference_words
+from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.report import save_json
+from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.errors import CaseError
+from slideviz.export.flat_section import section as draw
+from slideviz.mesh.model import Skin
+from slideviz.plots.figure_io import empty_figure, write_figure
+from slideviz.plots.meridional import draw_meridional, meridional_bins
+from slideviz.plots.section_paint import paint
+from slideviz.plots.section_picture import SectionStyle, require_picture_name
+from slideviz.sections.span import find_walls
+from slideviz.session.passages import find_period, find_periods, keeps, passages
+from slideviz.streaming.quality import quality_blocks
+from slideviz.streaming.source import cut_cells, join_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,10 +58,6 @@ class _Scene:
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.export.flat_section import section as draw
-    from slideviz.plots.section_picture import SectionStyle, require_picture_name
-
     _check_usage(arguments)
     require_picture_name(arguments.output)
     case = optional_case(arguments)
@@ -81,14 +94,6 @@ def section(arguments: argparse.Namespace) -> int:
 
 def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     """Return the cells that the section can cut; of a 2D mesh all, which are shown around it."""
-    import numpy as np
-
-    from slideviz.cli.mesh_source import open_mesh, progress_of
-    from slideviz.mesh.model import Skin
-    from slideviz.session.passages import keeps
-    from slideviz.streaming.quality import quality_blocks
-    from slideviz.streaming.source import cut_cells, join_blocks
-
     with open_mesh(arguments, case) as opened:
         mesh = opened.source.mesh
         path = opened.reference
@@ -112,9 +117,6 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
 
 def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
     """Print the numbers of the cut or write them as JSON, and return the exit code."""
-    from slideviz.cli.report import save_json
-    from slideviz.cli.terminal import DONE, INVERTED
-
     mesh = scene.mesh
     chosen = scene.chosen
     summary = shown.paint.summary(shown.ids)
@@ -139,17 +141,6 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
 
 def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     """Draw the meridional view of a mesh to a file; return the exit code."""
-    import numpy as np
-
-    from slideviz.cli.mesh_source import open_mesh
-    from slideviz.cli.report import save_json
-    from slideviz.cli.terminal import DONE, INVERTED
-    from slideviz.plots.figure_io import empty_figure, write_figure
-    from slideviz.plots.meridional import draw_meridional, meridional_bins
-    from slideviz.plots.section_paint import paint
-    from slideviz.sections.span import find_walls
-    from slideviz.session.passages import find_periods
-
     with open_mesh(arguments, case) as opened:
         mesh = opened.source.mesh
         reference = opened.reference
@@ -222,11 +213,6 @@ def _section_and_passages(
     case: Case | None,
 ) -> tuple[Section, dict[int, FloatArray]]:
     """Return the section, and the transformation (4, 4) of each passage."""
-    import numpy as np
-
-    from slideviz.sections.span import find_walls
-    from slideviz.session.passages import find_period, find_periods, passages
-
     asked = arguments.asked
     chosen = replace(
         asked.section, whole_cells=mesh.dim == 2 if arguments.whole is None else arguments.whole

@@ -139,6 +139,7 @@ def _section(
     kind: str, origin: Sequence[float], direction: Sequence[float], size: float = 0.0
 ) -> Section:
     """Return a section; its CaseError becomes an ArgumentTypeError. Missing numbers are 0."""
+    # Late: NumPy and Numba take 0.4 s, and help does not need them.
     from slideviz.sections.model import Section
 
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0

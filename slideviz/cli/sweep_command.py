@@ -10,9 +10,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import read_case, read_mesh, require_mesh_file
+from slideviz import sweep as sweep_of
+from slideviz.case.key import FILES, VIEW
+from slideviz.case.keys import KEYS
+from slideviz.case.limits import MET
+from slideviz.case.words import counted, first_of
+from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
 from slideviz.cli.progress import Bar
+from slideviz.cli.report import print_remarks, save_json, table
+from slideviz.cli.terminal import DONE
+from slideviz.design.sweeps.columns import numbers_of
+from slideviz.design.sweeps.results import RESULTS
+from slideviz.design.sweeps.table import read_designs
 from slideviz.errors import CaseError, Remark
+from slideviz.system.cleanup import keep_partial
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,14 +39,6 @@ _CONNECTING = 10.0  # seconds to wait for a connection to a scheduler
 
 def sweep(arguments: argparse.Namespace) -> int:
     """Deform a mesh by many designs, and write the table of results; return the exit code."""
-    from slideviz import sweep as sweep_of
-    from slideviz.case.words import counted
-    from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
-    from slideviz.cli.report import save_json
-    from slideviz.cli.terminal import DONE
-    from slideviz.design.sweeps.results import RESULTS
-    from slideviz.design.sweeps.table import read_designs
-
     case = read_case(arguments)
     if arguments.columns:
         return _print_columns(case)
@@ -82,12 +86,6 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _print_columns(case: Any) -> int:
-    from slideviz.case.key import FILES, VIEW
-    from slideviz.case.keys import KEYS
-    from slideviz.cli.report import table
-    from slideviz.cli.terminal import DONE
-    from slideviz.design.sweeps.columns import numbers_of
-
     numbers = numbers_of(case)
     if numbers:
         print("numbers of the motions, and their values in the case:")
@@ -106,6 +104,7 @@ def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
     if arguments.workers is not None:
         raise CaseError("--workers is for processes of this machine; a Dask cluster has its own")
     try:
+        # Late: Dask takes 0.5 s, and need not be installed.
         from distributed import Client
     except ImportError:
         raise CaseError("--scheduler needs Dask; install slideviz[dask]") from None
@@ -128,9 +127,6 @@ def _pulled(
     arguments: argparse.Namespace, rows: Iterator[DesignRow], total: int, results: Path
 ) -> list[DesignRow]:
     """Run all designs and return their rows, with a progress bar."""
-    from slideviz.case.words import counted
-    from slideviz.system.cleanup import keep_partial
-
     found: list[DesignRow] = []
     begin = time.monotonic()
     earlier = 0
@@ -170,8 +166,6 @@ def _report(
 
 def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     """Return the entry of a report for each limit that designs miss: limit and their numbers."""
-    from slideviz.case.limits import MET
-
     missed: dict[str, list[int]] = {}
     for row in sorted(rows, key=_number):
         for text in row.limits.removesuffix(MET).split("; "):
@@ -189,9 +183,6 @@ def _named(row: DesignRow) -> dict[str, Any]:
 
 
 def _print_sweep(report: dict[str, Any]) -> None:
-    from slideviz.case.words import counted
-    from slideviz.cli.report import table
-
     seconds = report["seconds"]
     fresh = report["designs"] - report["earlier"]
     earlier = f" ({report['earlier']} were there)" if report["earlier"] else ""
@@ -214,16 +205,11 @@ def _print_sweep(report: dict[str, Any]) -> None:
 
 def _counted(designs: Sequence[int]) -> str:
     """Return how many designs there are, with the first of them."""
-    from slideviz.case.words import first_of
-
     return f"{len(designs)}  (design {first_of(designs, _LISTED)})"
 
 
 def _warn(warnings: Sequence[Remark], rows: Sequence[DesignRow], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason with its designs."""
-    from slideviz.case.words import first_of
-    from slideviz.cli.report import print_remarks
-
     print_remarks(warnings, quiet=quiet)
     reasons: dict[str, list[int]] = {}
     for row in sorted(rows, key=_number):

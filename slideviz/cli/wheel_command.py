@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import read_inputs
+from slideviz import wheel as wheel_of
+from slideviz.cli.inputs import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.terminal import holding
+from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
+from slideviz.cli.run_outcome import report_limits
+from slideviz.cli.terminal import INVERTED, holding
 
 if TYPE_CHECKING:
     from slideviz.design.deformed_wheel import WheelQuality
@@ -22,11 +25,6 @@ def wheel(arguments: argparse.Namespace) -> int:
 
 
 def _wheel(arguments: argparse.Namespace) -> int:
-    from slideviz import wheel as wheel_of
-    from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
-    from slideviz.cli.run_outcome import report_limits
-    from slideviz.cli.terminal import INVERTED
-
     case, mesh = read_inputs(arguments, is_mesh=True)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         made = wheel_of(

@@ -134,7 +134,7 @@ def test_a_film_says_which_designs_fold_cells(filed, tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     filed.write("block.cfg")
     (tmp_path / "motion.csv").write_text("BLOCK.translate.y\n0.35\n0.02\n")
-    monkeypatch.setattr(film, "film", lambda session, *_, **__: iter(()))
+    monkeypatch.setattr("slideviz.cli.film_command.draw", lambda session, *_, **__: iter(()))
     call = ["film", "block.cfg", "--designs", "motion.csv", "-o", "film.gif", "-q"]
     monkeypatch.setattr("slideviz.cli.film_command.closing", nullcontext)
     assert run(call) == 3

@@ -208,7 +208,7 @@ def test_cgns_for_a_mesh_of_su2_is_refused_before_the_work(passage, tmp_path, ca
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "same.su2", read_cgns(passage))
     (tmp_path / "same.cfg").write_text(CASE.format(mesh="same.su2", out="a.cgns"))
-    monkeypatch.setattr("slideviz.deform", None)  # no work is begun
+    monkeypatch.setattr("slideviz.cli.run_command.deform", None)  # no work is begun
     assert run(["run", "same.cfg"]) == 1
     assert "same.su2 is from none; write .su2" in capsys.readouterr().err
 
