@@ -9,6 +9,8 @@ import os
 import signal
 import sys
 
+from slideviz import __version__
+
 _ENDS = {signal.SIGINT: "cancelled", signal.SIGTERM: "ended by SIGTERM"}
 """Signals that end any command at any moment, with words for a message; the exit code is 128 plus
 the number of the signal."""
@@ -23,10 +25,9 @@ def main() -> int:
     # Loading libraries makes objects that stay: looking for garbage among them takes 0.05 s.
     gc.set_threshold(100_000)
     if sys.argv[1:] in (["--version"], ["-V"]):
-        from slideviz import __version__
-
         print(f"slideviz {__version__}")
         return 0
+    # Late: `--version` needs no parser, which takes 0.1 s.
     from slideviz.cli import run
 
     return run(sys.argv[1:])

@@ -17,8 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from slideviz.case.model import Case
+from slideviz.design.deformer import Deformer
 from slideviz.errors import CaseError
 from slideviz.formats.cgns.read import CgnsForm
+from slideviz.formats.files import read, write
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 if TYPE_CHECKING:
@@ -175,8 +178,6 @@ class USMesh:
     def __init__(
         self, options: Mapping[str, Any] | None = None, comm: Any = None, debug: bool = False
     ) -> None:
-        from slideviz.design.deformer import Deformer
-
         del debug
         if comm is not None and comm.size > 1:
             raise CaseError(
@@ -275,8 +276,6 @@ class USMesh:
 
         Raises CaseError if no name was given.
         """
-        from slideviz.formats.files import write
-
         if fileName is None:
             raise CaseError("writeGrid needs the name of a file, e.g. writeGrid('warped.cgns')")
         write(fileName, self.deformer.mesh.with_points(self._points))
@@ -367,9 +366,6 @@ class USMesh:
 
 def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
     """Return mesh, case and displacements (or None) of the options; CaseError if one is wrong."""
-    from slideviz.case.model import Case
-    from slideviz.formats.files import read
-
     unknown = sorted(set(options) - {*_OURS, *_THEIRS})
     missing = [name for name in ("gridFile", "case") if options.get(name) is None]
     if unknown or missing:

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from numba import prange
+from pyamg.aggregation import standard_aggregation
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
@@ -179,8 +180,6 @@ def _prolongation(matrix: Sparse, modes: FloatArray) -> tuple[Sparse, FloatArray
 
     ``modes`` (k, w) of each group are those that it keeps: nearly constant, zero in held rows.
     """
-    from pyamg.aggregation import standard_aggregation
-
     free = modes > 0.0
     aggregates = standard_aggregation(_of_group(matrix, 0))[0].tocsr()
     below = np.sqrt(aggregates.T @ modes**2)

@@ -15,6 +15,7 @@ from threading import Thread
 from typing import Any, TypeVar
 
 import numpy as np
+import pyamg
 from numba import prange
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigvalsh_tridiagonal
 from scipy.sparse import bsr_array, bsr_matrix
@@ -190,8 +191,6 @@ def while_ticking(work: Callable[[], Made], tick: Tick) -> Made:
 
 def hierarchy(matrix: bsr_array, modes: FloatArray) -> list[Level]:
     """Return the levels of a matrix, finest first; parameters as of ``solve``."""
-    import pyamg
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # pyamg tells of conversions that are meant
         made = pyamg.smoothed_aggregation_solver(

@@ -25,6 +25,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.sparse import block_array, csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from slideviz.elastic.conditions import Body, conditions
 from slideviz.elastic.corotated import Corotated
@@ -280,8 +281,6 @@ class Relaxation:
 
 def _grown(graph: csr_array, cap: FloatArray) -> FloatArray:
     """Return the largest parts (n,), up to 1, below ``cap`` (n,) that grow as the graph allows."""
-    from scipy.sparse.csgraph import dijkstra
-
     rows = np.flatnonzero(np.isfinite(cap))
     n = len(cap)
     to = csr_array((np.maximum(cap[rows], TINY), (np.zeros(len(rows), int), rows)), shape=(1, n))

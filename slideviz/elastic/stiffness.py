@@ -25,6 +25,7 @@ from functools import cache
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
+from scipy.spatial import KDTree
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
@@ -66,6 +67,7 @@ def shape(vtk: int) -> ReferenceShape:
     """Return the shape functions of a VTK element type, in the order of SU2's nodes."""
     if vtk == PYRAMID:
         return _pyramid()
+    # Late: scikit-fem takes 0.1 s.
     import skfem
 
     element = {
@@ -88,6 +90,7 @@ def shape(vtk: int) -> ReferenceShape:
 
 def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
     """Return integration points (d, q) and weights (q,)."""
+    # Late: scikit-fem takes 0.1 s.
     from skfem.quadrature import get_quadrature
     from skfem.refdom import RefLine, RefTri
 
@@ -170,8 +173,6 @@ def _near_walls(points: FloatArray, parts: list[ShapeBlock], stiffness: Stiffnes
 
     A cell between nodes of walls alone is as stiff as the stiffest of the others.
     """
-    from scipy.spatial import KDTree
-
     distance = np.asarray(KDTree(points[stiffness.walls]).query(points, workers=-1)[0])
     mean = np.zeros(_count(parts))
     for part in parts:

@@ -14,19 +14,18 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
+import imageio_ffmpeg
 import numpy as np
 from numpy.typing import NDArray
+from PIL import GifImagePlugin, Image
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import png_bytes
 from slideviz.system.atomic import atomic_write, require_writable
 from slideviz.system.cleanup import draft, killed_at_end
 from slideviz.system.file_checks import require_no_input
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 Pixels = NDArray[np.uint8]
 Add = Callable[[Pixels, float], None]
@@ -133,8 +132,6 @@ def _start_ffmpeg(
     path: str, size: tuple[int, int], rate: Fraction, log: IO[bytes]
 ) -> subprocess.Popen[bytes]:
     """Return a process of ffmpeg that reads raw images and writes an MP4; its messages: ``log``."""
-    import imageio_ffmpeg
-
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
     # BT.709 colors, declared in the file: otherwise players guess by the size.
     bt709 = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
@@ -169,8 +166,6 @@ def _raise_ffmpeg(file: Path, process: subprocess.Popen[bytes], log: IO[bytes]) 
 @contextmanager
 def _gif(file: Path, settings: EncoderSettings) -> Iterator[Add]:
     """Write a GIF, of each image only the rectangle that differs from the one before."""
-    from PIL import GifImagePlugin, Image
-
     palette = _palette(settings.samples())
     before: NDArray | None = None
     shown = 0.0
@@ -211,14 +206,12 @@ def _changed(colors: NDArray, before: NDArray | None) -> tuple[int, int, int, in
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def _palette(samples: Sequence[Pixels]) -> Image:
+def _palette(samples: Sequence[Pixels]) -> Image.Image:
     """Return an image whose palette of 256 colors suits all samples.
 
     One half covers the range of all colors, however rare (an inverted cell), the other has the
     most frequent ones (shades of the color map).
     """
-    from PIL import Image
-
     sheet = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples]))
     rare = sheet.quantize(128, method=Image.Quantize.MAXCOVERAGE)
     many = sheet.quantize(128, method=Image.Quantize.MEDIANCUT, kmeans=3)

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 from numpy.typing import NDArray
+from PIL import Image
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
@@ -35,8 +37,6 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
 
     Raises SlidevizError if the size cannot be drawn.
     """
-    import pyvista as pv
-
     check_size(size)
     if sys.platform.startswith("linux") and not has_x_server():
         # VTK would try X first, and log errors, before it uses EGL.
@@ -73,8 +73,6 @@ def write_title(
     ``letters``: size of the letters. ``height``: height in pixels of the strip in which the title
     is vertically centred.
     """
-    import pyvista as pv
-
     title = pv.Text(words)
     set_letters(title.prop, scheme, letters)
     title.prop.SetLineSpacing(1.25)
@@ -102,8 +100,6 @@ def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
     """Return the content of a PNG file with an image (height, width, 3 or 4)."""
-    from PIL import Image
-
     data = BytesIO()
     Image.fromarray(image).save(data, format="PNG", optimize=False)
     return data.getvalue()

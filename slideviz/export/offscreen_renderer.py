@@ -11,6 +11,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
+from pyvista import Color
 
 from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
@@ -30,6 +32,7 @@ from slideviz.export.titles import DETAIL, caption, label_marked_cell
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
+from slideviz.scene.scene import Scene
 from slideviz.session.changes import show_frame
 from slideviz.session.opening import session_of_runs
 from slideviz.session.panes import second_session, shown_views
@@ -89,8 +92,6 @@ class OffscreenRenderer:
             yield
 
     def _make(self) -> Iterator[None]:
-        from slideviz.scene.scene import Scene
-
         self._plotter = self._stack.enter_context(offscreen((640, 400)))
         yield
         self._plotter.render_window.Render()  # initializes OpenGL
@@ -185,8 +186,6 @@ class OffscreenRenderer:
 
     def _between(self, options: PictureOptions) -> Pixels:
         """Return the pixels between two pictures: background, with a line in the middle."""
-        from pyvista import Color
-
         scheme = self._scene.scheme
         height = options.size[1]
         down = np.linspace(0.0, 1.0, height)[:, None, None]
@@ -230,8 +229,6 @@ class OffscreenRenderer:
         Raises SlidevizError if the size cannot be drawn, the name does not end with .png, or the
         file cannot be written.
         """
-        from PIL import Image
-
         check_png(file)
         data = BytesIO()
         known = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.patches import Polygon
 
 from slideviz.color_scheme import PAPER, SELECTED_COLOR
 from slideviz.errors import printable
@@ -187,6 +188,7 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
 
     ``scale`` is the factor of lengths and letters.
     """
+    # Late: VTK takes 0.6 s.
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
@@ -228,8 +230,6 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
 
 def draw_marked_cell(axes: Any, session: Session, pixel_pt: float) -> None:
     """Draw the marked cell of a 2D mesh and its label; a pixel is ``pixel_pt`` points wide."""
-    from matplotlib.patches import Polygon
-
     words = mark_words(session)
     if not words:
         return

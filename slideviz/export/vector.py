@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
@@ -98,8 +101,6 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
 
 def _line_between(figure: Any, options: PictureOptions, start: int) -> None:
     """Draw the line between two pictures; the left one ends at the pixel ``start``."""
-    from matplotlib.lines import Line2D
-
     line = line_between(options)
     x = (start + (line.start + line.stop) / 2.0) / options.size[0]
     wide = (line.stop - line.start) * 72.0 / figure.dpi
@@ -140,8 +141,6 @@ class _Paint:
 
 def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: float) -> None:
     """Draw cells, sections and boundaries; a pixel at normal size is ``pixel_pt`` points wide."""
-    from matplotlib.collections import LineCollection
-
     frame = session.frame
     view = session.view
     assert frame is not None
@@ -211,8 +210,6 @@ def _title(figure: Any, words: str, options: PictureOptions, *, size: float, lef
 
 def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     """Draw the legend at the right, on a half-transparent plate: the roles, or the color bar."""
-    from matplotlib.patches import Patch, Rectangle
-
     width = options.size[0]
     scale = options.scale
     letters = _LETTERS * scale * 72.0 / figure.dpi

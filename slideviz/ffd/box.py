@@ -188,7 +188,8 @@ class Embedding:
 
     def matrix(self) -> csr_array:
         """Return the weights (m, I J K), also the derivatives of each coordinate of the nodes."""
-        from scipy.sparse import csr_array  # takes long to load
+        # Late: scipy.sparse takes 0.1 s.
+        from scipy.sparse import csr_array
 
         u, v, w = self.factors
         return csr_array(np.einsum("mi,mj,mk->mijk", u, v, w).reshape(len(u), -1))

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.formats.su2.lines import Piece
+from slideviz.formats.su2.loops import count_types
 from slideviz.formats.su2.numbers import (
     fill_cells,
     fill_points,
@@ -98,8 +99,6 @@ def binary_layouts(texts: Sequence[Text], *, is_result: bool) -> list[BinaryLayo
 
 def _counted(text: Text) -> IntArray:
     """Return how many elements of each type are before each piece (`BinaryLayout.before`)."""
-    from slideviz.formats.su2.loops import count_types
-
     pieces = text.zone.elements
     rows = text.n_cells
     before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)

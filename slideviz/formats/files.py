@@ -186,7 +186,8 @@ def _bare(cells: Cells) -> Cells:
 
 def _limit(seconds: int, memory: int) -> None:
     """Let the system end this process after ``seconds`` of CPU time; limit its memory (bytes)."""
-    import resource  # POSIX only
+    # Late: Windows has none.
+    import resource
 
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

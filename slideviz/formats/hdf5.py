@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import h5py
+
 from slideviz.errors import path_error
 from slideviz.system.atomic import atomic_write, reason_of
 from slideviz.system.cleanup import open_temporary
@@ -109,8 +111,6 @@ def hdf5_write(
     to write. ``replaces``: the input that may be overwritten. ``source``: a file whose copy the new
     one is at first; when left out it is empty.
     """
-    import h5py
-
     with atomic_write(path, replaces=replaces) as file:
         if source is not None:
             with source.open("rb") as original:

@@ -20,6 +20,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -151,8 +152,6 @@ def _add_block(
 
     ``nodes`` (n,) are the mesh nodes of the block, ascending; each partition has only its own.
     """
-    import h5py
-
     group = root.create_group(name)
     _typed(group, "UnstructuredGrid")
     group.attrs["Index"] = len(root) - 2  # the assembly is not a block

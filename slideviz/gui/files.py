@@ -20,6 +20,7 @@ from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
+from slideviz.samples.table import SAMPLES
 from slideviz.session import changes, jobs
 from slideviz.session.run_messages import stopped_words
 from slideviz.session.saving import Unsaved, files_beside, view_to_case
@@ -41,8 +42,6 @@ class Files(QObject):
     """
 
     def __init__(self, window: MainWindow, settings: QSettings) -> None:
-        from slideviz.samples.table import SAMPLES
-
         super().__init__(window)
         self.window = window
         self.settings = settings

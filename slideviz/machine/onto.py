@@ -183,6 +183,7 @@ class _Guide:
         Conjugate gradients solve for it. Their preconditioner has one factor for all components,
         with the mean of the conditions of a node over all directions.
         """
+        # Late: scipy.sparse takes 0.1 s.
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import LinearOperator, cg, splu
 
@@ -235,6 +236,7 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
 
     Edges weigh as the inverse of their lengths, and the weights of a node are 1 together.
     """
+    # Late: scipy.sparse takes 0.1 s.
     from scipy.sparse import coo_array, diags_array
 
     one = facets.ravel()

@@ -269,6 +269,7 @@ class SpanCurves:
 
         Raises MeshError if it is not between them, or on the axis.
         """
+        # Late: scipy.interpolate takes 0.3 s.
         from scipy.interpolate import RectBivariateSpline
 
         self.field = field
@@ -300,6 +301,7 @@ class SpanCurves:
 
         Raises MeshError for a point on the axis.
         """
+        # Late: scipy.spatial takes 0.1 s.
         from scipy.spatial import cKDTree
 
         on_axis = np.flatnonzero(coords[:, 1] <= ON_AXIS * self.field.radius)

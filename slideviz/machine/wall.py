@@ -117,6 +117,7 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The longest
     rim of each connected part is that of the wall itself.
     """
+    # Late: scipy.sparse takes 0.1 s.
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import Delaunay

@@ -66,7 +66,8 @@ def nearest(
     match = _alone(points, at, min(bound, likely))
     if match is not None and (bound <= likely or np.isfinite(match[0]).all()):
         return match
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     distance, number = cKDTree(points).query(at, distance_upper_bound=bound, workers=cores())
     return np.asarray(distance), np.asarray(number)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNERS, write_corners
 from slideviz.mesh.model import Mesh, sealed
 from slideviz.mesh.skew import ordered_sum
@@ -77,8 +78,6 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
     the mesh becomes two components that are mirror images. Where it becomes one (as for a Möbius
     strip), no signs agree, and all are 1.
     """
-    from slideviz.mesh.fans import components
-
     m = len(cells)
     first, second, agree = _neighbours(cells)
     shift = np.where(agree, 0, m)

@@ -6,6 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import FuncFormatter, Locator
+from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
 from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
@@ -33,10 +40,6 @@ def color_scale(color_map: str, limits: tuple[float, float], at_walls: bool = Fa
 
     With ``at_walls``, values above the limits are those of cells at no wall, without a color.
     """
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     table = colormaps[color_map].with_extremes(
         bad=INVERTED_COLOR, over=PAPER.cell if at_walls else None
     )
@@ -61,8 +64,6 @@ def draw_cells(
     cells, so that boundary layers do not turn black; 0: no lines. ``lit``: polygons are darker, the
     more they are tilted. ``options``: arguments of the PolyCollection.
     """
-    from matplotlib.collections import PolyCollection
-
     widths = np.clip(_PART * _thickness(axes, cells), min(_THINNEST, edges), edges)
     lines = {
         "edgecolors": PAPER.edge if edges else "face",
@@ -162,8 +163,6 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
 
     ``box`` (2,): lower and upper corner of what the axes show.
     """
-    from matplotlib.collections import LineCollection
-
     low, high = boxes_of(around)
     seen = around.take(np.flatnonzero(((high >= box[0]) & (low <= box[1])).all(axis=1)))
     if len(seen):
@@ -190,8 +189,6 @@ BAR_BELOW = 0.62
 
 def bar_beside(axes: Any) -> Any:
     """Return inset axes for a color bar at the right of ``axes``, as high as these."""
-    from matplotlib.transforms import ScaledTranslation, blended_transform_factory
-
     right = axes.figure.dpi_scale_trans + ScaledTranslation(1.0, 0.0, axes.transAxes)
     place = blended_transform_factory(right, axes.transAxes)
     return axes.inset_axes((BAR_GAP, 0.0, _THICK, 1.0), transform=place)
@@ -199,8 +196,6 @@ def bar_beside(axes: Any) -> Any:
 
 def bar_below(axes: Any, length: float, gap: float = BAR_BELOW) -> Any:
     """Return inset axes for a color bar below ``axes``; its length and their gap in inches."""
-    from matplotlib.transforms import ScaledTranslation
-
     middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
     return axes.inset_axes((-length / 2.0, -gap - _THICK, length, _THICK), transform=middle)
 
@@ -213,8 +208,6 @@ def color_bar(
     ``axes``: see `bar_beside` and `bar_below`. ``letters``: size of the numbers in points; the
     label's is one more. ``inverted``: the lower end has the color of inverted cells.
     """
-    from matplotlib.cm import ScalarMappable
-
     bar = axes.figure.colorbar(
         ScalarMappable(scale.norm, scale.cmap.with_extremes(under=INVERTED_COLOR)),
         cax=axes,
@@ -238,9 +231,6 @@ def color_bar(
 
 def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
     """Set ticks at both ends of a bar and between them; how many depends on its drawn length."""
-    from matplotlib.textpath import TextPath
-    from matplotlib.ticker import FuncFormatter, Locator
-
     upright = bar.orientation == "vertical"
     form = "%g"
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from matplotlib.ticker import NullLocator
 
 from slideviz.plots.series import GreedyRun, Outcome, StepRun
 from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
@@ -156,8 +157,6 @@ def _quality_limits(axes: Axes, values: Sequence[float]) -> None:
 
 def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
     """Set ticks at the numbers of steps; from a ratio of 8 on, the axis is logarithmic."""
-    from matplotlib.ticker import NullLocator
-
     places = np.array(steps, np.float64)
     if steps and steps[-1] >= 8 * steps[0] > 0:
         axes.set_xscale("log")

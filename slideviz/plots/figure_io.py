@@ -9,6 +9,12 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
+from matplotlib.transforms import Bbox
+
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.system.atomic import atomic_write
 
@@ -26,9 +32,6 @@ SMALLEST = 8.0  # smallest size of letters in points, at the printed size
 
 def empty_figure(inches: tuple[float, float], dpi: float, layout: str = "none") -> Any:
     """Return an empty white figure with a layout engine (see `lay_out`)."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=inches, dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     lay_out(figure, layout)
@@ -44,8 +47,6 @@ def lay_out(figure: Any, layout: str) -> None:
 
 def trim(figure: Any, rows: Sequence[Sequence[Any]]) -> None:
     """Reduce a figure's height to that of its texts and rows of axes as laid out."""
-    from matplotlib.transforms import Bbox
-
     figure.draw_without_rendering()
     boxes = [Bbox.union([axes.get_tightbbox() for axes in row]) for row in rows]
     boxes += [text.get_window_extent() for text in figure.texts]
@@ -60,8 +61,6 @@ def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
     The size is at most ``size``, smaller if a line is too long, and not below `SMALLEST`; lines
     still too long are wrapped.
     """
-    from matplotlib.textpath import TextPath
-
     points = 72.0 * inches
     wrapped = []
     widths = {
@@ -84,8 +83,6 @@ def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool =
     ``dpi``: pixels per inch; in PDF and SVG of the parts that are drawn as pixels. ``transparent``:
     whether the background is transparent.
     """
-    from matplotlib import rc_context
-
     data = BytesIO()
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     with rc_context(SETTINGS):  # type: ignore[arg-type]  # keys are names

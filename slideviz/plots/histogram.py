@@ -10,6 +10,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.legend_handler import HandlerBase
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import NullLocator
 
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.series import Bars, Distribution, Outline, QualityRun
@@ -131,8 +135,6 @@ def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> Non
 
 def _colors(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
     """Return the color (red, green, blue) of each bar."""
-    from matplotlib.colors import to_rgb
-
     chosen = bars.colors if bars.colors is not None else [style.series(0).color]
     rgbs = np.array([to_rgb(color) for color in chosen])
     if paler:
@@ -143,8 +145,6 @@ def _colors(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
 
 def _counts_axis(axes: Axes, bars: Bars | None, outlines: Sequence[Outline], log: bool) -> None:
     """Set scale and limits of the counts' axis; the undeformed mesh does not affect the limits."""
-    from matplotlib.ticker import NullLocator
-
     if log:
         axes.set_yscale("log")
         axes.yaxis.set_minor_locator(NullLocator())
@@ -199,8 +199,6 @@ def _strip(
 
 def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[str, Any]:
     """Return the legend's arguments for its entries: the bars first, then the outlines."""
-    from matplotlib.patches import Patch
-
     handles, labels = axes.get_legend_handles_labels()
     if bars is None:
         return {"handles": handles, "labels": labels}
@@ -218,8 +216,6 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
 
 def _swatch(colors: Sequence[Any], edge: str) -> Any:
     """Return a legend handler that draws a box with several colors side by side."""
-    from matplotlib.legend_handler import HandlerBase
-    from matplotlib.patches import Rectangle
 
     class Swatch(HandlerBase):
         def create_artists(

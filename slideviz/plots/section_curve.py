@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.section_paint import Paint
@@ -121,8 +122,6 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
 
 
 def _areas(axes: Any, curve: Curve, colors: Paint, bottom: float) -> None:
-    from matplotlib.collections import PolyCollection
-
     shown = PolyCollection(
         list(_columns(curve.ends, np.full(len(curve.values), bottom), curve.values)),
         array=np.clip(curve.values, *colors.limits),
@@ -137,8 +136,6 @@ def _areas(axes: Any, curve: Curve, colors: Paint, bottom: float) -> None:
 
 
 def _folded(axes: Any, curve: Curve, style: Style) -> None:
-    from matplotlib.collections import PolyCollection
-
     low, high = axes.get_ylim()
     ends = curve.ends[curve.inverted]
     columns = _columns(ends, np.full(len(ends), low), np.full(len(ends), high))

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from slideviz.color_scheme import PAPER
 from slideviz.errors import CaseError
@@ -138,8 +140,6 @@ def with_margin(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArr
 
 def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
     """Set labels and numbers of axes already laid out, as many as fit; None hides the axes."""
-    from matplotlib.ticker import MaxNLocator
-
     if labels is None:
         axes.set_axis_off()
         return
@@ -162,8 +162,6 @@ def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
 
 def draw_triad(figure: Any, piece: Polygons, section: Section) -> None:
     """Draw the directions of x, y and z as seen by `camera`, in the lower left corner."""
-    from matplotlib.lines import Line2D
-
     size = figure.get_size_inches()
     centre = np.array([0.55, 0.5])
     for word, towards in zip("xyz", camera(piece, section)[:2].T, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
+import matplotlib as mpl
 import numpy as np
 
 from slideviz.case.motion_words import deformation
@@ -350,8 +351,6 @@ def shown_measure(session: Session) -> Quantity:
 
 
 def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
-    import matplotlib as mpl
-
     low, high = session.color_range
     middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
     part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)

@@ -156,7 +156,8 @@ def connected(basis: Basis, features: FloatArray) -> IntArray:
     low, high, box = boxes(basis, features)
     if low.shape[1] == 1:
         return box
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     middle = ((low + high) / 2).T
     reach = SLACK * basis.radius

@@ -125,7 +125,8 @@ class WallNodes:
 
     @cached_property
     def _trees(self) -> list[tuple[cKDTree, ClosestPoints]]:
-        from scipy.spatial import cKDTree  # takes long to load
+        # Late: scipy.spatial takes 0.1 s.
+        from scipy.spatial import cKDTree
 
         return [
             (cKDTree(self.places[begins[:-1]]), ClosestPoints(as_simplices(self.places[facets])))
@@ -193,7 +194,8 @@ class WallNodes:
         The matrices (z, s) and (z, s d) take what `motion` returns to b u, (z, d). The result for a
         point does not depend on the others.
         """
-        from scipy.sparse import csr_array  # takes long to load
+        # Late: scipy.sparse takes 0.1 s.
+        from scipy.sparse import csr_array
 
         outside = np.ones(len(targets))
         weight = np.zeros(len(targets))

@@ -266,7 +266,8 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
         images = [problem.cartesian(at + s * problem.shift) for s in IMAGES[1:]]
         sources = np.concatenate([sources, *images])
         lacking = np.tile(lacking, (3, 1))
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     return Correction(cKDTree(sources), lacking, radius)
 

@@ -143,6 +143,7 @@ class Bodies:
     @cached_property
     def _harmonic(self) -> tuple[Callable[[FloatArray], FloatArray], Any]:
         """Return the inverse of the Laplacian at the inner places, and its columns of the rim."""
+        # Late: scipy.sparse takes 0.1 s.
         from scipy.sparse import coo_array, diags_array
         from scipy.sparse.linalg import splu
 

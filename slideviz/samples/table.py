@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from slideviz.case.cfg import write_case
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, nearest
+from slideviz.formats.files import write
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
 from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
@@ -189,9 +191,6 @@ def write_sample(
     ``overwrite``: whether to replace files that exist.
     ``file_format``: the format of the mesh.
     """
-    from slideviz.case.cfg import write_case
-    from slideviz.formats.files import write
-
     row, kind = _row(name, variant)
     made: Sample | StreamedSample
     if file_format == "su2b" and row.stream is not None:

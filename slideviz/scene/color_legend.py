@@ -7,8 +7,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib as mpl
 import numpy as np
 import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray
@@ -30,8 +33,6 @@ class LegendPlate:
     """
 
     def __init__(self, plotter: Any, name: str, scheme: ColorScheme) -> None:
-        from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
-
         self.plotter = plotter
         self._scheme = scheme
         self._shape = pv.PolyData(np.zeros((4, 3)), faces=[4, 0, 1, 2, 3])
@@ -85,8 +86,6 @@ cells there; distance in pixels from the field to its text."""
 @lru_cache(maxsize=1)
 def _font_file() -> str:
     """Return the path of a font with Greek letters and signs, which VTK's own font lacks."""
-    import matplotlib as mpl
-
     return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 
@@ -156,8 +155,6 @@ def _line(stage: Stage, sign: str, color: str, word: str, *, down: float) -> Non
 
 def _corner(x: float, y: float) -> Any:
     """Return a vtkCoordinate relative to the view (0 to 1), as reference of pixel positions."""
-    from vtkmodules.vtkRenderingCore import vtkCoordinate
-
     corner = vtkCoordinate()
     corner.SetCoordinateSystemToNormalizedViewport()
     corner.SetValue(x, y)
@@ -245,8 +242,6 @@ def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
 
 def _number(bar: Any, length: float) -> None:
     """Set the numbers beside a bar, as many as fit in its length (pixels at normal letter size)."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
     low, high = bar.GetLookupTable().GetRange()
     at, form = bar_ticks(low, high, lambda _: _LABEL / length)
     bar.SetLabelFormat(form)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkRenderingCore import vtkCellPicker
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.scene.actors import DrawnBoundary
@@ -62,8 +63,6 @@ def _foremost(
 
     ``tolerance``: distance up to which the actor is hit, relative to the view's diagonal.
     """
-    from vtkmodules.vtkRenderingCore import vtkCellPicker
-
     picker = vtkCellPicker()
     picker.SetTolerance(tolerance)
     picker.PickFromListOn()

@@ -19,6 +19,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.jobs import Stopped, raise_if_cancelled
 from slideviz.session.results import cell_displacement
+from slideviz.solver.deform import deform
 from slideviz.system.jit_cache import compilation_watched
 
 _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
@@ -66,8 +67,6 @@ def _look() -> None:
 
 
 def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
-    from slideviz.solver.deform import deform
-
     made = sample(name, size=_size(settings))
     mesh = made.mesh
     (block,) = made.case.markers_with("moving")

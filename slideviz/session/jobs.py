@@ -21,7 +21,9 @@ from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_l
 from slideviz.case.model import Case
 from slideviz.case.motions.span import prepare_span
 from slideviz.case.zone_cases import each_zone, with_marker_names
+from slideviz.design.deformed_wheel import write_wheel
 from slideviz.errors import Cancelled, CaseError, MeshError, Message, SlidevizError
+from slideviz.formats.files import read, write
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
@@ -31,6 +33,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.mesh.walls import Walls, walls
+from slideviz.samples.table import write_sample
 from slideviz.sections.span import find_walls
 from slideviz.session.inspect import WORST
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
@@ -40,7 +43,9 @@ from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
 from slideviz.session.state import Session, StepFrame
+from slideviz.solver.deform import deform
 from slideviz.solver.interface_motion import check_motions
+from slideviz.solver.repair_stage import mended_frame
 from slideviz.solver.rims import rims_key
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
@@ -247,8 +252,6 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
 
     Raises SlidevizError if the file cannot be used; the message says what and where.
     """
-    from slideviz.formats.files import read
-
     case = None
     mesh_path = path
     if path.suffix.lower() == ".cfg":
@@ -320,8 +323,6 @@ def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
     """Deform the mesh; report every step as a `StepFrame`, and the progress as `JobProgress`."""
-    from slideviz.solver.deform import deform
-
     furthest = 0.0
 
     def progress(now: Progress) -> None:
@@ -362,8 +363,6 @@ def repair(
     ``mesh`` is the undeformed mesh; with its frame alone, that is mended, and all moving boundaries
     stay.
     """
-    from slideviz.solver.repair_stage import mended_frame
-
     *earlier, last = frames
     tick = _tick(f"Repair: {PHASES['repair']}", report, stopped)
     step = mended_frame(case, mesh, last.step, lambda now: tick(now.fraction))
@@ -402,6 +401,7 @@ def compute_streamed(
     ``first`` is the undeformed frame, of the boundary. Raises Cancelled if it was stopped; a file
     that was at ``output`` is as before.
     """
+    # Late: streaming takes 0.2 s.
     from slideviz.streaming.run import stream
 
     def progress(now: Progress) -> None:
@@ -441,8 +441,6 @@ def save_mesh(
     With the undeformed mesh ``base``, the displacement is written, too. Raises Cancelled if it was
     stopped; what was at ``path`` is as before.
     """
-    from slideviz.formats.files import write
-
     report(JobProgress(f"Writing {path.name}"))
     data = cell_values(frame) if holds_quality(path) else None
     write(path, frame.mesh, overwrite, data, base, lambda: raise_if_cancelled(stopped))
@@ -463,8 +461,6 @@ def save_wheel(
 
     Other parameters and errors as of `slideviz.design.deformed_wheel.wheel`.
     """
-    from slideviz.design.deformed_wheel import write_wheel
-
     tick = _tick(f"Writing {path.name}", report, stopped)
     moved = [frame.mesh.points]
     return write_wheel(
@@ -506,8 +502,6 @@ def open_sample(
     ``size`` as of ``slideviz.samples.table.sample``; without one, not larger than ``SIZES``. Raises
     SlidevizError if there is no such sample, or it cannot be written.
     """
-    from slideviz.samples.table import write_sample
-
     report(JobProgress(f"Making the sample {name}"))
     with suppress(OSError):  # writing says why
         private_folder(folder)

@@ -14,6 +14,7 @@ from slideviz.mesh.fans import Fans, find_fans
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.session.motions import shown_case
 from slideviz.session.state import Session
+from slideviz.solver.domain import find_classes, find_period, roles_of_copies
 from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import NODE_TYPES, NodeType
 
@@ -86,8 +87,6 @@ def _fans(mesh: Mesh, angle_deg: float) -> Fans:
 
 
 def _types_of_zone(case: Case, mesh: Mesh) -> TypedNodes:
-    from slideviz.solver.domain import find_classes, find_period, roles_of_copies
-
     if not mesh.markers:
         return NOTHING
     case, _ = roles_of_copies(case, mesh)

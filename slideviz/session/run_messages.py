@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from slideviz.case.check import check_case
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import applies_to
@@ -18,6 +19,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.motion_scale import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
+from slideviz.solver.deform import free_memory
 from slideviz.solver.layers import height_warnings
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
@@ -34,8 +36,6 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
     All boundary nodes are control nodes: memory grows with the square of their number, and
     time with the cube.
     """
-    from slideviz.solver.deform import free_memory
-
     if case.method != "rbf" or case.reduction is not None:
         return ""
     nodes = [m.nodes for m in mesh.markers if case.roles.get(m.name, "fixed") != "internal"]
@@ -252,8 +252,6 @@ def tolerance_warning(case: Case, extent: float, largest: float) -> str:
 
 
 def _problems(session: Session) -> list[str]:
-    from slideviz.case.check import check_case
-
     assert session.mesh is not None
     said = (with_field_labels(text) for text in check_case(session.case, session.mesh))
     return [text[:1].upper() + text[1:] for text in said]

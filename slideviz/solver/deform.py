@@ -21,6 +21,7 @@ from slideviz.mesh.model import Assembly, IntArray, Mesh, Skin
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.tape import value
+from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
 from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
@@ -97,8 +98,6 @@ def deform(
     prepared = prepare(case, mesh)
     check_limits = partial(rated_limits, prepared.case, mesh)
     if isinstance(mesh, Assembly):
-        from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
-
         motion = InterfaceMotion(prepared, mesh)
         runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)
         steps = joined_steps(motion, runs)
@@ -124,7 +123,8 @@ def _steps_of_zone(
     require_memory(setup, case)
     mend = None
     if case.repair != "no" and not isinstance(mesh, Skin):
-        from slideviz.solver.repair_stage import mended_step  # loads SciPy's sparse matrices
+        # Late: scipy.sparse takes 0.1 s.
+        from slideviz.solver.repair_stage import mended_step
 
         mend = partial(mended_step, case, mesh, setup, report)
     stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify, mend=mend)

@@ -215,7 +215,8 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     some = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)]
     links = images
     if len(some):
-        from scipy.spatial import cKDTree  # takes long to load
+        # Late: scipy.spatial takes 0.1 s.
+        from scipy.spatial import cKDTree
 
         close = some[cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")]
         links = np.concatenate([close.reshape(-1, 2), images])

@@ -295,7 +295,8 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     nodes = np.concatenate([setup.known, setup.classes.sliding])
     at = setup.coords[nodes]
     shift = (moved - setup.coords)[nodes]
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     near = cKDTree(at).query(at, k=min(2, len(nodes)))
     gaps = np.reshape(near[0], (len(nodes), -1))[:, -1]

@@ -150,7 +150,8 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
         return [sentence]
     if not case.layer_thickness:
         return []
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     frame = domain.frame
     coords = domain.coords

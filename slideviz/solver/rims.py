@@ -216,7 +216,8 @@ def _bodies(
     ``facets`` (f, k): of the moving boundaries.
     ``moving``: the nodes of `Rims`, which has ``representative`` and ``rim``, too.
     """
-    from scipy.spatial import cKDTree  # takes long to load
+    # Late: scipy.spatial takes 0.1 s.
+    from scipy.spatial import cKDTree
 
     edges, weights = side_weights(mesh.points, facets)
     edges = representative[np.searchsorted(moving, edges)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.baselines.idw import Weights, deform_idw
 from slideviz.case.check import file_before_motions, idle_settings, motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
@@ -333,11 +334,10 @@ def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
 ) -> Callable[[Problem, PhaseTimer], Solution]:
     if case.method == "idw":
-        from slideviz.baselines.idw import Weights, deform_idw
-
         weights = Weights(case.idw_power or float(mesh.dim), case.idw_fixed_weight)
         return partial(deform_idw, weights=weights)
     if case.method == "elastic":
+        # Late: scikit-fem and pyamg take 0.2 s.
         from slideviz.elastic.linear import deform_elastic
 
         body = replace(elastic_body(mesh, frame, axis), stiffness=stiffness_of(case, mesh))
@@ -347,6 +347,7 @@ def _method(
 
 def stiffness_of(case: Case, mesh: Mesh) -> Stiffness:
     """Return how stiff the cells of an elastic body are."""
+    # Late: scikit-fem and pyamg take 0.2 s.
     from slideviz.elastic.stiffness import Stiffness
 
     walls = [np.empty(0, np.int64)]
@@ -389,6 +390,7 @@ def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Rel
     """Return the relaxation of a case's steps; None where they are not relaxed."""
     if not relaxes(case, mesh):
         return None
+    # Late: scikit-fem and pyamg take 0.2 s.
     from slideviz.elastic.relaxation import Relaxation
 
     body = elastic_body(mesh, frame, axis)
@@ -397,6 +399,7 @@ def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Rel
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
     """Return the mesh as an elastic body, without its halo."""
+    # Late: scikit-fem and pyamg take 0.2 s.
     from slideviz.elastic.conditions import Body
     from slideviz.elastic.stiffness import blocks
 

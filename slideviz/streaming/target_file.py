@@ -169,7 +169,8 @@ def target_file(path: Path, replaces: Path | None = None) -> Iterator[TargetFile
 
 def _lock(file: BinaryIO, ours: Path, path: Path) -> None:
     """Lock the hidden file of a target, unless another process has it, or just had it."""
-    import fcntl  # POSIX only
+    # Late: Windows has none.
+    import fcntl
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.colorbar import make_axes
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.export.encode import Pixels
@@ -180,8 +181,6 @@ def _numbers(result: Result) -> str:
 
 def _foot(figure: Any, facets: Any, colors: Any, inverted: bool, notes: Sequence[str]) -> None:
     """Draw one color bar for all facets and write the notes below it; trim the figure."""
-    from matplotlib.colorbar import make_axes
-
     if notes:
         width = figure.get_size_inches()[0]
         sentence = fitted("\n".join(notes), width - 0.2, SMALLEST)[0]

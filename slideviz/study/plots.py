@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, MeshError
@@ -308,8 +309,6 @@ def _same_height(together: Sequence[Axes]) -> None:
 
 def _readable_seconds(together: Sequence[Axes]) -> None:
     """Give axes of times that differ much (`_WIDE`) a logarithmic scale with plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
     values = np.concatenate([line.get_ydata() for axes in together for line in axes.lines])
     values = values[values > 0.0]
     if not len(values) or values.max() < _WIDE * values.min():

@@ -17,6 +17,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from numba import config, set_num_threads
+from threadpoolctl import threadpool_limits
+
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.system.threads import Result, Task, core_limit, cores, submit_ahead
 
@@ -79,6 +82,7 @@ class Ranks(SerialPool):
         launcher.
         """
         try:
+            # Late: MPI starts with it.
             from mpi4py import MPI
         except ModuleNotFoundError as problem:
             raise SlidevizError(
@@ -215,6 +219,7 @@ class Ranks(SerialPool):
 
         Between looks it sleeps, at most ``pause`` seconds: MPI's own wait would keep a core busy.
         """
+        # Late: MPI starts with it.
         from mpi4py import MPI
 
         status = MPI.Status()
@@ -272,8 +277,5 @@ def thread_limit(threads: int) -> Iterator[Callable[[], None]]:
 
     Numba's limit holds for the thread that calls that function.
     """
-    from numba import config, set_num_threads
-    from threadpoolctl import threadpool_limits
-
     with threadpool_limits(threads, user_api="blas"), core_limit(threads):
         yield lambda: set_num_threads(min(threads, config.NUMBA_NUM_THREADS))

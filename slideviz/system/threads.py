@@ -15,6 +15,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import TypeVar
 
+from numba import get_num_threads
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -27,8 +29,6 @@ _most = [sys.maxsize]  # limits of `core_limit` contexts that are open, the inne
 
 def cores() -> int:
     """Return the number of threads to work with: Numba's, or the limit of `core_limit` if lower."""
-    from numba import get_num_threads
-
     return min(int(get_num_threads()), _most[-1])
 
 

@@ -367,6 +367,7 @@ def _closest(
 
 
 def _corner(corners: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    # Late: scipy.spatial takes 0.1 s.
     from scipy.spatial import cKDTree
 
     return corners[cKDTree(corners).query(x)[1]], np.zeros_like(x)

@@ -32,6 +32,9 @@ from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple, NoReturn
 
+from numba import get_num_threads, set_num_threads
+from threadpoolctl import ThreadpoolController
+
 from slideviz import __version__
 from slideviz.case.limits import check_case_limits, outcome
 from slideviz.case.model import Case
@@ -170,8 +173,6 @@ def _worker_name() -> str:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """Context in which loops and linear algebra use one thread: designs run in parallel."""
-    from numba import get_num_threads, set_num_threads
-
     before = get_num_threads()
     set_num_threads(1)
     try:
@@ -184,8 +185,6 @@ def _one_thread() -> Iterator[None]:
 @cache
 def _libraries() -> Any:
     """Return the libraries of linear algebra of this process; finding them takes milliseconds."""
-    from threadpoolctl import ThreadpoolController
-
     return ThreadpoolController()
 
 

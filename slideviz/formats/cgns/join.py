@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from slideviz.formats.cgns.tree import Node
 from slideviz.formats.cgns.zone import CgnsZone, faces_by_number, facets_of, grid_nodes
@@ -223,8 +224,6 @@ def _nearest(
     zone: CgnsZone, faces: Cells, donor: CgnsZone, others: Cells
 ) -> tuple[IntArray, IntArray]:
     """Return nodes (m,) of faces, and the nearest node (m,) of the donor's faces ``others``."""
-    from scipy.spatial import KDTree
-
     here = faces.nodes
     there = others.nodes
     closest = KDTree(donor.points[there]).query(zone.points[here])[1]

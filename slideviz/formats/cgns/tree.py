@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,8 +33,6 @@ _LINK = " link"  # name of the HDF5 link in a node that is a link
 @contextmanager
 def cgns_file(path: Path) -> Iterator[Node]:
     """Context with the root node of a CGNS file; MeshError for any error of h5py in the block."""
-    import h5py
-
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if _ADF in head:
@@ -81,8 +80,6 @@ class Node:
 
     def children(self, *labels: str) -> list[Node]:
         """Return the children of a kind in ``labels``, in order; MeshError if a link is broken."""
-        import h5py
-
         nodes = []
         for name in self.group:
             thing = self.group.get(name)
@@ -117,8 +114,6 @@ class Node:
 
     def value(self) -> NDArray:
         """Return its value, with the axes as in the dataset; MeshError if it has none."""
-        import h5py
-
         data = self.group.get(DATA)
         if not isinstance(data, h5py.Dataset):
             raise self.fault("has no value; export the mesh again, or check it with cgnscheck")

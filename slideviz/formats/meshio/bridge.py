@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
+import meshio
 import numpy as np
 
 from slideviz.errors import MeshError, path_error, printable
@@ -39,8 +40,6 @@ _UNKNOWN = re.compile(r"Element type not available: (\S+)")
 
 def formats_of(path: Path) -> list[str]:
     """Return meshio's formats with the file's ending, the likeliest first; MeshError if none."""
-    import meshio
-
     # Gmsh before ANSYS, which has the same ending but is rare.
     table = meshio.extension_to_filetypes
     suffixes = [s.lower() for s in path.suffixes]
@@ -101,8 +100,6 @@ def load(path: Path, formats: list[str]) -> meshio.Mesh:
 
     Raises MeshError if it can be read in none of them; the message is that of the first.
     """
-    import meshio
-
     problems = []
     for name in formats:
         try:
@@ -310,6 +307,7 @@ def _resolved(path: Path) -> Path:
 
 def _require_no_links(path: Path) -> None:
     """Raise MeshError if an HDF5 file has a link to, or numbers in, another file, or lacks them."""
+    # Late: h5py takes 0.1 s, and few formats need it.
     import h5py
 
     with h5py.File(path, "r") as file:

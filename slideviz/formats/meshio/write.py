@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
+import meshio
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,8 +107,6 @@ def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
 
 
 def _write_by_meshio(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
-    import meshio
-
     # Without this XDMF puts the numbers in a second file.
     options = {"data_format": "XML"} if name == "xdmf" else {}
     with meshio_errors(path, f"written as {name}"):
@@ -119,8 +118,6 @@ def _not_written(path: Path, trial: Path, data: meshio.Mesh, name: str) -> list[
 
     It has simple coordinates: some of meshio's writers fail on long numbers.
     """
-    import meshio
-
     lost = []
     for block in data.cells:
         nodes = np.arange(block.data.shape[1])
@@ -181,8 +178,6 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
     Blocks of cells come first, then those of boundary elements, whose cell data are NaN.
     """
-    import meshio
-
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.dim] = mesh.points
     blocks = []

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2.lines import Lines, Piece, Rows, number_of, show
+from slideviz.formats.su2.loops import cell_block, point_block
 from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
@@ -63,8 +64,6 @@ def fill_cells(
 
     Raises MeshError if an element has a wrong type, dimension or nodes; the message has its line.
     """
-    from slideviz.formats.su2.loops import cell_block
-
     text = lines.text(piece)
     odd = np.empty((piece.rows, 3), np.int64)
     found, n_odd = cell_block(np.frombuffer(text, np.uint8), dim, n_points, types, nodes, odd)
@@ -186,8 +185,6 @@ def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
     may lack a coordinate (``extra`` of `loops.point_block`), the largest int64 if there is none.
     Raises MeshError if a row has too few or many numbers, or one that is not finite.
     """
-    from slideviz.formats.su2.loops import point_block
-
     text = lines.text(piece)
     dim = points.shape[1]
     odd = np.empty((piece.rows, 2), np.int64)

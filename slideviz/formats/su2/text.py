@@ -32,6 +32,7 @@ from slideviz.formats.su2.lines import (
     show,
     text_of,
 )
+from slideviz.formats.su2.loops import RUN_COLUMNS, scan_block
 from slideviz.formats.su2.numbers import fill_points, parse_cells
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.threads import Tick, ordered_map
@@ -386,7 +387,6 @@ def scan(raw: Source, progress: Tick) -> Lines:
     Raises MeshError if the file is empty or not text. ``raw``: the file. ``progress``: called with
     the fraction done after each block; may raise to stop.
     """
-    from slideviz.formats.su2.loops import RUN_COLUMNS, scan_block
 
     def scanned(bounds: tuple[int, int]) -> tuple[IntArray, int, bool]:
         text = text_of(raw, *bounds)

@@ -11,11 +11,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import orjson
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Piece, Rows, is_ffd
+from slideviz.formats.su2.loops import print_cells, print_changed, print_points
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.text import BLOCK_BYTES, SEND_RECEIVE
 from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
@@ -189,8 +191,6 @@ def _moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) 
     Raises MeshError if the file was changed. ``before`` and ``now`` (m, d) float64: the points of
     these rows, as read and as they are to be written.
     """
-    from slideviz.formats.su2.loops import print_changed
-
     text = raw[piece.begin : piece.end]
     changed = now.view(np.int64) != before.view(np.int64)
     if not changed.any():
@@ -206,8 +206,6 @@ def _moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) 
 
 def _digits(points: FloatArray) -> NDArray[np.uint8]:
     """Return the bytes of ``[[x,y],[x,y]]``, with as few digits as identify each float64."""
-    import orjson
-
     return np.frombuffer(orjson.dumps(points, option=orjson.OPT_SERIALIZE_NUMPY), np.uint8)
 
 
@@ -272,8 +270,6 @@ def _blocks(count: int) -> list[tuple[int, int]]:
 
 
 def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
-    from slideviz.formats.su2.loops import print_points
-
     mine = points(*block)
     numbers = _digits(mine)
     out = np.empty(len(numbers) + _NUMBER_BYTES * len(mine), np.uint8)
@@ -293,8 +289,6 @@ def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
 
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
-    from slideviz.formats.su2.loops import print_cells
-
     some = cells(*block)
     out = np.empty(_NUMBER_BYTES * (len(some.connectivity) + 2 * len(some)), np.uint8)
     index = block[0] if numbered else -1

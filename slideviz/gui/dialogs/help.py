@@ -25,6 +25,8 @@ from qtpy.QtWidgets import (
 )
 
 import slideviz
+from slideviz import __version__
+from slideviz.case.cfg import describe_keys
 from slideviz.case.words import counted
 from slideviz.gui.commands import MENUS
 from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row, push_button
@@ -80,8 +82,6 @@ class Help(QObject):
         self._show("shortcuts", lambda: ShortcutsDialog(self.window))
 
     def case_keys(self) -> None:
-        from slideviz.case.cfg import describe_keys
-
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
 
     def manual(self) -> None:
@@ -210,7 +210,6 @@ class AboutDialog(QDialog):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        from slideviz import __version__
 
         self.setWindowTitle("About slideviz")
         picture = QLabel()
@@ -327,8 +326,6 @@ def page_text(path: Path) -> str:
     """Return a page as Markdown without Sphinx's directives and pictures that are not there."""
     path = path.with_suffix(".md")
     if path.stem == "keys":
-        from slideviz.case.cfg import describe_keys
-
         return f"# Keys of a case file\n\n```\n{describe_keys()}\n```\n"
     if not path.is_file():
         where = ELSEWHERE.get(path.stem) or ELSEWHERE.get(path.parent.name)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from qtpy.QtCore import QSignalBlocker, QSize
 from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushButton, QWidget
@@ -117,8 +118,6 @@ def _not_ascending(ends: Sequence[float]) -> str:
 
 def map_icon(name: str) -> QIcon:
     """Return an icon of a color map, from low to high."""
-    from matplotlib import colormaps
-
     row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
     pixels = np.ascontiguousarray(np.repeat(row[None], 12, axis=0))
     image = QImage(pixels.tobytes(), 64, 12, 64 * 4, QImage.Format.Format_RGBA8888)

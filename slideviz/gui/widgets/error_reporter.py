@@ -21,6 +21,7 @@ from typing import Protocol
 
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
 from slideviz.system.cleanup import is_alive, private_file, private_folder
@@ -172,8 +173,6 @@ def _qt_says(kind: QtMsgType, _context: object, text: str) -> None:
 @contextlib.contextmanager
 def _vtk_heard() -> Iterator[None]:
     """Put VTK's errors and warnings into the log, instead of the terminal."""
-    from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
-
     before = vtkOutputWindow.GetInstance()
     heard = vtkStringOutputWindow()
     logger = logging.getLogger("slideviz.vtk")
