@@ -132,7 +132,8 @@ def painting():
 def window(request, qtbot, settings, monkeypatch):
     """A window without a mesh; that of the module if it has ``pytest.mark.window("shared")``.
 
-    A shared one still has the mesh of the test before: this is for tests that open one.
+    `reset` clears a shared one after each test. Tests that close or resize it, or change the theme,
+    have ``pytest.mark.window("own")``.
     """
     mark = request.node.get_closest_marker("window")
     if mark is not None and mark.args == ("shared",):
@@ -198,7 +199,7 @@ def close_unsaved(window):
 
 
 def reset(window, qtbot):
-    """Bring a window, but for its mesh, to the state of a new one."""
+    """Bring a window to the state of a new one: no mesh, no dialog, no job, the first layout."""
     for dialog in window.findChildren(QDialog):
         dialog.close()
     window.running.cancel()
