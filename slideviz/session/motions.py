@@ -155,13 +155,15 @@ def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] |
 def new_target(session: Session) -> Target:
     """Return the moving boundaries of a new motion: selected, else without motion, else all.
 
-    They are named, so that a boundary that moves later does not join.
+    They are named, so that a boundary that moves later does not join. Those that only a guess made
+    moving count where the user chose none.
     """
     case = session.case
     moving = case.markers_with("moving")
     without = [n for n in moving if not any(applies_to(motion, n) for motion in case.motions)]
-    names = tuple(name for name in moving if name in session.view.selected) or tuple(without)
-    return _target(names or moving)
+    names = tuple(name for name in moving if name in session.view.selected)
+    chosen = tuple(name for name in without if name not in session.guesses)
+    return _target(names or chosen or tuple(without) or moving)
 
 
 def _target(names: tuple[str, ...]) -> Target:

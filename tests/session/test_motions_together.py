@@ -23,7 +23,7 @@ from slideviz.session import changes
 from slideviz.session.motions import Ghosts, TableRows, box_names, new_target, targets
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements
-from slideviz.session.state import StepFrame
+from slideviz.session.state import Guess, StepFrame
 from tests.builders import stage
 
 PAIR = ("bottom", "left")
@@ -155,3 +155,15 @@ def test_the_table_lists_the_nodes_of_all_of_them(square):
     assert rows.of == "bottom, left"
     every = np.concatenate([square.marker(name).nodes for name in PAIR])
     assert rows.nodes.tolist() == np.unique(every).tolist()
+
+
+@pytest.mark.parametrize("selected", [(), ("left",)])
+def test_a_new_motion_is_of_what_the_user_chose_to_move_not_of_a_guess(session, selected):
+    guesses = {name: Guess("moving", "its name") for name in ("left", "right")}
+    moving = dict.fromkeys((*guesses, "top"), "moving")
+    guessed = replace(session, case=session.case.change(roles=moving), guesses=guesses)
+    guessed = changes.select(guessed, selected)
+    assert new_target(guessed) == (selected or ("top",))[0]
+    alone = changes.add_motion(guessed, Translate("top", (1.0, 0.0)))
+    assert new_target(alone) == (selected[0] if selected else ("left", "right"))
+    assert set(alone.guesses) == {"left", "right"}  # the window still marks them with "?"
