@@ -167,7 +167,7 @@ def test_auto_is_read_and_written(tmp_path):
     again = sv.Case.read(tmp_path / "auto.cfg")
     assert (again.steps, again.steps_gain) == (0, 0.1)
     (tmp_path / "bad.cfg").write_text("STEPS= 0\n")
-    with pytest.raises(sv.SlidevizError, match="whole number from 1, or auto"):
+    with pytest.raises(sv.SlidevizError, match="whole number from 1 to 9999, or auto"):
         sv.Case.read(tmp_path / "bad.cfg")
 
 

@@ -212,7 +212,7 @@ def test_a_marker_element_that_is_no_side_is_told():
     mesh = builders.square(6)
     odd = Marker("odd", Cells.from_blocks([(3, [[0, 8]])]))
     wrong = Mesh(mesh.points, mesh.cells, (*mesh.markers, odd))
-    with pytest.raises(MeshError, match=r"'odd' .* no side of any cell"):
+    with pytest.raises(MeshError, match=r"'odd' .* not a side of any cell"):
         next(sv.deform(square_case(mesh), wrong))
 
 
@@ -327,7 +327,7 @@ def test_a_boundary_layer_of_a_millionth(method, first, tmp_path):
         np.testing.assert_array_equal(found.mesh.points[mesh.marker(side).nodes, 0], value)
     if first == 1e-6:
         (warning,) = found.warnings
-        assert "that nearly coincide with others (first: node " in warning
+        assert "they nearly coincide with others (first: node " in warning
         node = int(warning.split("first: node ")[1].split(" at ")[0])
         where = [float(v) for v in warning.split(" at ")[1].split(")")[0].split(", ")]
         np.testing.assert_allclose(mesh.points[node], where, rtol=1e-5)

@@ -30,7 +30,7 @@ def test_boundaries_are_kept_and_images_move_alike(name, method, periodic):
     sliding = "ds" if method == "elastic" else "ps"
     mesh, case = real.make_case(name, sliding, periodic)
     case = case.change(method=method, reduction=None)
-    known = ("halo copies", "no longer fits")
+    known = ("halo copy", "no longer fits")
     found = make_setup(prepare(case, mesh)).warnings
     assert all(any(words in text for words in known) for text in map(str, found))
     real.check(mesh, case, real.load(real.CASES[name][0])[1])

@@ -168,7 +168,7 @@ def check(mesh, case, before):
     # Profiles with fine edges in a far field of 20 chords make systems nearly singular; the
     # channel's lower wall is a copy of the upper one, in a halo; walls that move leave other zones,
     # and the sliding walls beside them.
-    known = ("nearly coincide", "halo copies", "so it was refined", "no longer fits")
+    known = ("nearly coincide", "halo copy", "so it was refined", "no longer fits")
     known += ("has left",)
     unknown = [text for text in last.warnings if not any(words in text for words in known)]
     assert not unknown

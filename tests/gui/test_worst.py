@@ -385,9 +385,9 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
     for module, name in ((worst, "worst_cells"), (session_plots, "distribution")):
         real = getattr(module, name)
 
-        def told(*values, real=real, name=name):
+        def told(*values, real=real, name=name, **named):
             asked.append(name)
-            return real(*values)
+            return real(*values, **named)
 
         monkeypatch.setattr(module, name, told)
     panel = window.dock_manager.panels["worst"]

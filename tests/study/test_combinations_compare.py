@@ -105,7 +105,7 @@ def test_few_words_name_many_combinations():
     assert words_for(every[:6], every, KEYS) == "method none"
     both = [one for one in every if one.method == "none" or one.periodic == "fixed"]
     assert set(words_for(both, every, KEYS).split("; ")) == {"method none", "periodic fixed"}
-    assert reasons(dict.fromkeys(fixed, "it  cannot\n nor this")) == {"it cannot; nor this": fixed}
+    assert reasons(dict.fromkeys(fixed, "it  cannot\n nor this")) == {"it cannot nor this": fixed}
 
 
 def test_a_reason_is_written_once(rows):
