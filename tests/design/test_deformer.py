@@ -178,7 +178,7 @@ def test_control_nodes_suffice_for_all_displacements_together(levels, sliding):
 def test_a_design_off_its_facets_warns_of_them_alone():
     mesh, case = made("curved", reduction=None)
     deformer = sv.Deformer(mesh, case)
-    with pytest.warns(ToleranceWarning, match=": the facets that nodes slide on are those of"):
+    with pytest.warns(ToleranceWarning, match=": the facets that nodes slide on belong to"):
         deformer.deform(-2.0 * deformer.displacement)
 
 

@@ -61,7 +61,7 @@ def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(
     assert table.SAMPLES["turbine-row"].size <= 50_000
     made, window = [], driver.window
     monkeypatch.setattr(
-        table, "write_sample", lambda name, _folder, size, **_: made.append((name, size)) or []
+        jobs, "write_sample", lambda name, _folder, size, **_: made.append((name, size)) or []
     )
     for name, words in window.files.samples.items():
         with pytest.raises(StopIteration):  # as nothing was written

@@ -68,7 +68,7 @@ def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
 
 
 def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
-    from slideviz.solver import domain as module
+    from slideviz.session import node_types as module
 
     asked, real = [], module.find_classes
 

@@ -12,6 +12,7 @@ from slideviz.errors import Message
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import Reduction
+from slideviz.session import run_messages
 from slideviz.session.motions import largest_prescribed
 from slideviz.session.run_messages import (
     end_parts,
@@ -21,7 +22,6 @@ from slideviz.session.run_messages import (
     tolerance_warning,
 )
 from slideviz.session.state import Run, StepFrame
-from slideviz.solver import deform as solver
 from slideviz.solver.deform import deform
 from slideviz.solver.remedies import beyond_pitch
 from tests.builders import sector
@@ -167,11 +167,11 @@ def test_a_large_exact_run_is_told_beforehand(monkeypatch):
     line = Marker("wall", Cells.from_blocks([(3, np.stack([nodes[:-1], nodes[1:]], axis=1))]))
     points = np.random.default_rng(1).random((30_000, 2))
     mesh = Mesh(points, Cells.from_blocks([(5, np.array([[0, 1, 2]]))]), (line,))
-    monkeypatch.setattr(solver, "free_memory", lambda: 12e9)
+    monkeypatch.setattr(run_messages, "free_memory", lambda: 12e9)
     text = exact_cost(Case(steps=3, reduction=None), mesh)
     assert text.startswith("30,000 control nodes, without data reduction: about 19 GB of memory ")
     assert "(12 GB are free) and 45 minutes, more or less." in text
-    monkeypatch.setattr(solver, "free_memory", lambda: float("inf"))
+    monkeypatch.setattr(run_messages, "free_memory", lambda: float("inf"))
     assert "free" not in exact_cost(Case(reduction=None), mesh)
     for small in (
         Case(),

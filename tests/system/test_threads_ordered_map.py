@@ -12,7 +12,7 @@ from tests.formats.su2_samples import SOLID, save
 
 @pytest.fixture(params=[1, 2, 5], autouse=True)
 def threads(request, monkeypatch):
-    monkeypatch.setattr("numba.get_num_threads", lambda: request.param)
+    monkeypatch.setattr("slideviz.system.threads.get_num_threads", lambda: request.param)
     return request.param
 
 
