@@ -69,8 +69,12 @@ assert not loaded, loaded
 MODULES = """
 import importlib, pkgutil, slideviz
 
+DRAWING = ("gui", "scene", "export", "plots", "study")
+
 def needs_more(name):
-    return name.endswith("openmdao") or name.split(".")[1] in ("gui", "scene", "export", "study")
+    if name.endswith(("openmdao", "film_command", "section_command")):
+        return True
+    return name.split(".")[1] in DRAWING
 
 for module in pkgutil.walk_packages(slideviz.__path__, "slideviz.", onerror=needs_more):
     if not needs_more(module.name):
