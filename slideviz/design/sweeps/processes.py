@@ -374,7 +374,7 @@ def _serve_calls(connection: Connection, begin: Callable[[], None]) -> None:
     while True:
         try:
             function, arguments, named = connection.recv()
-        except EOFError:
+        except (EOFError, OSError):
             return
         answer: tuple[Any, BaseException | None]
         try:
@@ -385,6 +385,8 @@ def _serve_calls(connection: Connection, begin: Callable[[], None]) -> None:
             connection.send(answer)
         except (pickle.PicklingError, TypeError, AttributeError) as problem:
             connection.send((None, RuntimeError(f"cannot be sent back: {problem}")))
+        except OSError:
+            return
 
 
 def _begin() -> None:
