@@ -128,6 +128,9 @@ def test_focus_is_seen_wherever_the_tab_key_leads(opened, theme):
     for dock in ("runs", "histogram", "designs", "log"):
         window.dock_manager.bring_to_front(dock)
     window.boundaries.table.setFocus(reason)
+    opened.qtbot.waitUntil(
+        window.boundaries.table.hasFocus
+    )  # its window may come to the front later
     while (at := window.focusWidget()) not in seen:
         seen.append(at)
         if at is not window.view:
