@@ -27,7 +27,6 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from slideviz.case.model import Case
 
 COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""

@@ -98,9 +98,8 @@ def parsed_displacements(
     """Return the displacements that the text of a file lists; as `read_displacements`."""
     each = []
     for first, here, part, lines in in_zones(text, path, mesh, nodes):
-        whole = part.numbering
-        shape = whole.n_points, part.dim
-        read = parse_displacements(lines, path, whole.points[here], shape, of)
+        shape = part.file_counts[0], part.dim
+        read = parse_displacements(lines, path, part.numbers(here), shape, of)
         each.append(replace(read, nodes=here + first))
     return Displacements(
         np.concatenate([read.nodes for read in each]),

@@ -78,8 +78,8 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = bounds_words(mesh)
-    whole = mesh.numbering
-    count = f"{whole.n_cells:,} cells{halo}   {whole.n_points:,} points"
+    points, cells = mesh.file_counts
+    count = f"{cells:,} cells{halo}   {points:,} points"
     if isinstance(mesh, Skin):
         count += "   boundary and sections only"
         about += f"In memory: {len(mesh.cells):,} cells at the boundary; the rest is in its file.\n"

@@ -17,16 +17,8 @@ from slideviz.cli.options import (
     size,
 )
 from slideviz.cli.section_options import limits, neighbours, pair_of_names, pixels, section_reader
-from slideviz.formats.table import (
-    FILE_FORMATS,
-    own_endings,
-)
-from slideviz.terms import (
-    COLOR_MAPS,
-    QUANTITIES,
-    REPAIR_TARGETS,
-    SKEW_METRICS,
-)
+from slideviz.formats.table import FILE_FORMATS, own_endings
+from slideviz.terms import COLOR_MAPS, QUANTITIES, REPAIR_TARGETS, SKEW_METRICS
 
 if TYPE_CHECKING:
     from slideviz.case.limits import Limit

@@ -29,9 +29,7 @@ from slideviz.session.state import Run, StepFrame
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.export.film import FilmOptions
     from slideviz.mesh.model import Mesh
-    from slideviz.session.state import Run, StepFrame
 
 SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from slideviz.ffd.box import Box
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
-    from slideviz.streaming.quality import CellCounts
 
 
 def info(arguments: argparse.Namespace) -> int:

@@ -25,7 +25,6 @@ from slideviz.streaming.stream_input import open_read_only
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.metrics import MetricValues
-    from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.streaming.quality import CellCounts
     from slideviz.streaming.source import MeshSource

@@ -18,7 +18,7 @@ from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.motions.onto import Remaining
 from slideviz.case.words import counted, first_of
-from slideviz.errors import CaseError, Remark, messages_of
+from slideviz.errors import CaseError, Message, Remark, messages_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
@@ -312,11 +312,18 @@ def print_remarks(remarks: Iterable[Remark], *, quiet: bool) -> None:
             print(f"slideviz: {message.level}: {message}", file=sys.stderr)
 
 
+def _text(value: object) -> str:
+    """Return the text of a message in a report."""
+    if isinstance(value, Message):
+        return str(value)
+    raise TypeError(f"a report cannot have {value!r}")
+
+
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
     """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed."""
     if path is None:
         return False
-    text = json.dumps(report, indent=2, default=str) + "\n"
+    text = json.dumps(report, indent=2, default=_text) + "\n"
     if str(path) == "-":
         print(text, end="")
         return True

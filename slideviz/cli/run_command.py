@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.solver.deform import Step
-    from slideviz.solver.steps import RunResult
     from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000

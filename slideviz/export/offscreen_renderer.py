@@ -8,7 +8,7 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -39,9 +39,6 @@ from slideviz.session.panes import second_session, shown_views
 from slideviz.session.pieces import render_in_groups, run_to_end
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.system.atomic import atomic_write
-
-if TYPE_CHECKING:
-    from slideviz.scene.scene import Scene
 
 
 class OffscreenRenderer:

@@ -221,7 +221,6 @@ class _Reader:
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
         key = "FFD_SURFACE_POINTS"
-        part = self.mesh.numbering
         on: dict[str, list[Row]] = {}
         for line, words in self.rows(key, self.count(key)):
             on.setdefault(words[0], []).append((line, words[1:]))
@@ -230,7 +229,8 @@ class _Reader:
             table = self.table(key, tails, 4)
             number = table[:, 0]
             known = self.mesh.zones == 1 or marker in self.mesh.marker_names
-            most = part.n_points if known else np.inf  # SU2 lists nodes of all zones in one section
+            # SU2 lists nodes of all zones in one section.
+            most = self.mesh.file_counts[0] if known else np.inf
             bad = (number != np.floor(number)) | (number < 0) | (number >= most)
             if bad.any():
                 line, words = tails[int(np.argmax(bad))]
@@ -245,8 +245,9 @@ class _Reader:
                 )
             nodes, first = np.unique(number.astype(np.int64), return_index=True)
             if isinstance(self.mesh, Skin):  # which has all nodes of markers
-                inside = np.isin(nodes, part.points)
-                nodes = np.searchsorted(part.points, nodes[inside])
+                numbers = self.mesh.part.points
+                inside = np.isin(nodes, numbers)
+                nodes = np.searchsorted(numbers, nodes[inside])
                 first = first[inside]
             surfaces[marker] = nodes, table[first, 1:]
         return surfaces

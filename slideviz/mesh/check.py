@@ -46,14 +46,14 @@ def no_node(node: str, n_points: int) -> str:
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the index of the first element that has a node twice, and that node, or None."""
     repeated: list[tuple[int, int]] = []
-    numbers = np.arange(len(cells))
 
     def look(_vtk: int, rows: Index, nodes: IntArray) -> None:
         ordered = np.sort(nodes, axis=1)
         same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
         if same.any():
             k = int(np.argmax(same.any(axis=1)))
-            repeated.append((int(numbers[rows][k]), int(ordered[k, int(np.argmax(same[k]))])))
+            cell = int(np.arange(len(cells))[rows][k])
+            repeated.append((cell, int(ordered[k, int(np.argmax(same[k]))])))
 
     cells.in_parts(look)
     return min(repeated, default=None)

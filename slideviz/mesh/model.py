@@ -362,11 +362,22 @@ class Mesh:
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
 
     @property
+    def file_counts(self) -> tuple[int, int]:
+        """Return the numbers of points and cells that the mesh of its file has."""
+        return len(self.points), len(self.cells)
+
+    @property
     def numbering(self) -> Part:
-        """Return where its points and cells are in the mesh of its file: all, but of a `Skin`."""
-        points = len(self.points)
-        cells = len(self.cells)
+        """Return where its points and cells are in the mesh of its file: all, but of a `Skin`.
+
+        The arrays are made each time; `numbers` and `file_counts` need none.
+        """
+        points, cells = self.file_counts
         return Part(np.arange(points), np.arange(cells), points, cells)
+
+    def numbers(self, nodes: IntArray) -> IntArray:
+        """Return the numbers (k,) that nodes (k,) have in the file."""
+        return nodes
 
     def number(self, node: int) -> int:
         """Return the number that a node has in its file, for messages."""
@@ -399,9 +410,19 @@ class Skin(Mesh):
     """Where they are in the file."""
 
     @property
+    def file_counts(self) -> tuple[int, int]:
+        """Return the numbers of points and cells that the mesh of its file has."""
+        return self.part.n_points, self.part.n_cells
+
+    @property
     def numbering(self) -> Part:
         """Return where its points and cells are in the mesh of its file."""
         return self.part
+
+    def numbers(self, nodes: IntArray) -> IntArray:
+        """Return the numbers (k,) that nodes (k,) have in the file."""
+        numbers: IntArray = self.part.points[nodes]
+        return numbers
 
     def number(self, node: int) -> int:
         """Return the number that a node has in its file."""

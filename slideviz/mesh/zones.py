@@ -60,9 +60,8 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     points = _slices([zone.points for zone in zones])
     cells = _slices([zone.cells for zone in zones])
     markers = _slices([zone.markers for zone in zones])
-    whole = [zone.numbering for zone in zones]
-    *first_point, n_points = accumulate((part.n_points for part in whole), initial=0)
-    *first_cell, n_cells = accumulate((part.n_cells for part in whole), initial=0)
+    *first_point, n_points = accumulate((zone.file_counts[0] for zone in zones), initial=0)
+    *first_cell, n_cells = accumulate((zone.file_counts[1] for zone in zones), initial=0)
     coords = sealed(np.concatenate([zone.points for zone in zones]))
     alone = [
         replace(zone, points=coords[part], interfaces=())
@@ -89,6 +88,7 @@ def join_zones(zones: Sequence[Mesh]) -> Mesh:
     mesh = replace(mesh, halo=_halo(mesh), interfaces=tuple(_interfaces(mesh)))
     if not all(isinstance(zone, Skin) for zone in zones):
         return mesh
+    whole = [zone.numbering for zone in zones]
     numbers = [part.points + first for part, first in zip(whole, first_point, strict=True)]
     ids = [part.cells + first for part, first in zip(whole, first_cell, strict=True)]
     part = Part(sealed(np.concatenate(numbers)), sealed(np.concatenate(ids)), n_points, n_cells)

@@ -140,11 +140,11 @@ def intersection_key(session: Session) -> tuple[object, ...]:
 def find_intersection(
     case: Case, mesh: Mesh, _report: Report, stopped: Stopped
 ) -> tuple[str, Message | None]:
-    """Return two messages on boundaries that the motions make cross each other.
+    """Return two messages on motions: on boundaries that cross each other, mostly.
 
     The first keeps a run from starting: a moved boundary crosses another one, or a displacement
-    file has mistakes. The second does not: what moves crosses itself. There are none where the
-    case has other problems, which are reported elsewhere.
+    file has mistakes. The second does not: what moves crosses itself, or a motion hardly does what
+    is meant. There are none where the case has other problems, which are reported elsewhere.
     """
     files = [path for motion in case.motions for path in motion.files]
     prepare_spans(case, mesh)

@@ -47,7 +47,7 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
     """
     skin = read_skin(path, zone, tick)
     remark = (
-        f"{skin.numbering.n_cells:,} cells stay in the file. The window shows the boundary, "
+        f"{skin.file_counts[1]:,} cells stay in the file. The window shows the boundary, "
         "sections and the worst cells; a run deforms the mesh from file to file"
     )
     return replace(skin, remarks=(*skin.remarks, remark))

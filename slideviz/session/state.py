@@ -139,7 +139,8 @@ class Session:
     """A sentence on boundaries that the motions put through each other, which keeps a run from
     starting; empty if none are known."""
     folding: Message | None = None
-    """On moving boundaries that cross themselves, with which a run can start."""
+    """On moving boundaries that cross themselves, or a motion that hardly does what is meant, with
+    which a run can start."""
     laid: tuple[object, ...] = ()
     """What ghosts wait for and is computed: the motions onto surfaces, and for which roles rims
     stay on their walls."""

@@ -269,8 +269,7 @@ def unmendable_words(
     """
     if not impossible:
         return (), ()
-    numbers = mesh.numbering.points
-    nodes = {marker.name: numbers[marker.nodes] for marker in mesh.markers}
+    nodes = {marker.name: mesh.numbers(marker.nodes) for marker in mesh.markers}
 
     def on(ones: Sequence[Impossible]) -> str:
         wrong = np.concatenate([one.nodes for one in ones])
@@ -295,11 +294,10 @@ def slide_advice(case: Case, mesh: Mesh, poor: Cells, limit: float) -> tuple[str
     ``mesh``: it has the markers.
     ``poor``: the cells that are proved valid, but below a limit after the repair.
     """
-    numbers = mesh.numbering.points
     beside = [
         marker.name
         for marker in mesh.markers
-        if marker.name not in case.roles and np.isin(numbers[marker.nodes], poor.nodes).any()
+        if marker.name not in case.roles and np.isin(mesh.numbers(marker.nodes), poor.nodes).any()
     ]
     if not beside:
         return ()

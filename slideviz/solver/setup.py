@@ -301,7 +301,7 @@ def setup_of(
         *loose,
         *idle_settings(case),
         *file_before_motions(case),
-        *map(str, motion_doubts(case, mesh)),
+        *motion_doubts(case, mesh),
     )
     zone = layer_zone(case, mesh, domain, conditions.known)
     warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, mesh, domain, zone))

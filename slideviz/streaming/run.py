@@ -244,7 +244,7 @@ class _ZoneRuns:
             (before.points.view(np.int64) != after.points.view(np.int64)).any(axis=1)
         )
         if len(apart):
-            numbers = after.numbering.points[apart]
+            numbers = after.numbers(apart)
             points = after.points[apart]
             self._out.change(
                 zone, "evaluate", lambda at, file, _: at.points.write(file, numbers, points)
@@ -401,7 +401,7 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -
     """
     skin = displacer.skin
     last = displacer.steps[-1]
-    more = skin.numbering.n_points - len(skin.points)
+    more = skin.file_counts[0] - len(skin.points)
     stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
     steps = (*displacer.steps[:-1], replace(last, messages=(*last.messages, *stray)))
     return [
