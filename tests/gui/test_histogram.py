@@ -1,5 +1,7 @@
 """The histogram panel, by itself: what it draws, the brush, the words."""
 
+import time
+
 import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
@@ -202,6 +204,7 @@ def test_a_range_set_elsewhere_is_shown_also_in_a_stretched_image(full):
 
 
 def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
+    qtbot.waitUntil(lambda: not full.canvas.busy)
     full.hide()
     told = []
     full.canvas.drawn.connect(lambda: told.append(1))
@@ -212,6 +215,20 @@ def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
     with qtbot.waitSignal(full.canvas.drawn):
         full.show()
     assert f"{full.store.session.frame.quality.min:.4f}" in full.numbers.text()
+
+
+def test_hidden_while_a_drawing_waits_for_its_turn_it_draws_nothing(full, qtbot, monkeypatch):
+    qtbot.waitUntil(lambda: not full.canvas.busy)
+    monkeypatch.setattr(plot_canvas, "REST_MS", 10_000)
+    full.canvas._last = time.monotonic()  # also after it was resized
+    full.store.change(changes.show_frame, 0)
+    assert full.canvas._timer.isActive()
+    asked = []
+    full.canvas.drawing = lambda: asked.append(1)
+    full.hide()
+    full.canvas._timer.start(0)
+    qtbot.waitUntil(lambda: not full.canvas.busy)
+    assert not asked
 
 
 def test_playing_draws_less_often_than_it_steps(full, qtbot, monkeypatch):

@@ -392,7 +392,8 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
         monkeypatch.setattr(module, name, told)
     panel = window.dock_manager.panels["worst"]
     window.dock_manager.bring_to_front("curves")
-    opened.qtbot.wait(50)
+    canvases = window.findChildren(plot_canvas.PlotCanvas)
+    opened.qtbot.waitUntil(lambda: not any(canvas.busy for canvas in canvases))
     asked.clear()
     for frame in (0, 1):
         window.store.change(changes.show_frame, frame)
@@ -407,6 +408,21 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
     words = window.dock_manager.panels["histogram"].numbers
     low = f"{opened.session.frame.quality.min:.4g}"
     opened.qtbot.waitUntil(lambda: low in words.text())
+
+
+def test_a_list_that_is_hidden_before_its_turn_is_filled_when_it_is_seen(full, qtbot, monkeypatch):
+    qtbot.waitUntil(lambda: full.model.worst is not None)
+    monkeypatch.setattr(worst, "REST_MS", 10_000)
+    full.store.change(changes.show_frame, 1)
+    assert full._timer.isActive()
+    before = full.model.worst
+    full.hide()
+    monkeypatch.setattr(worst, "REST_MS", 0)
+    full._timer.start(0)
+    qtbot.waitUntil(lambda: not full._timer.isActive())
+    assert full.model.worst is before
+    full.show()
+    qtbot.waitUntil(lambda: full.model.worst is not before)
 
 
 def test_columns_share_the_width_unless_somebody_chose_others(full):

@@ -81,7 +81,7 @@ class WorstPanel(Panel):
         self.repair = push_button("Repair", mend.tip, lambda: mend.do(main_window(self)), "repair")
         parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self._timer = single_shot(self, lambda: self._fill(self.store.session))
+        self._timer = single_shot(self, lambda: self.sync(self.store.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),

@@ -205,8 +205,8 @@ class PlotCanvas(QWidget):
         return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
     def fill(self) -> None:
-        """Start a drawing; if one is going on, another will be started after it."""
-        self._stale = self._coming is not None
+        """Start a drawing; later, if one is going on or the widget has been hidden meanwhile."""
+        self._stale = self._coming is not None or not is_seen(self)
         if self._stale:
             return
         ratio = self.devicePixelRatioF()
