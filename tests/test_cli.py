@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import shutil
@@ -21,6 +20,7 @@ import pyvista as pv
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.inputs import changed
+from slideviz.cli.parser import parse
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
 from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
@@ -558,7 +558,9 @@ def test_compiling_is_told_once_when_it_happens(quiet, times, capsys, monkeypatc
             numba.njit(lambda x: x + 1)(1)
         return 0
 
-    arguments = argparse.Namespace(command=command, quiet=quiet)
+    arguments = parse(["keys"])
+    arguments.command = command
+    arguments.quiet = quiet
     monkeypatch.setattr("slideviz.cli.parse", lambda argv: arguments)
     assert run([]) == 0
     told = capsys.readouterr()

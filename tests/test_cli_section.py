@@ -11,8 +11,8 @@ from PIL import Image
 import slideviz as sv
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli import run
+from slideviz.cli.argument_readers import glued, plane, section_about_axis
 from slideviz.cli.parser import parse
-from slideviz.cli.section_options import glued, plane, section_about_axis
 from slideviz.plots import section_picture
 from slideviz.terms import COLOR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square

@@ -60,8 +60,8 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         arguments.ranks = ranks
         with (
             protected(lambda: arguments.inputs),
-            note_compilation(getattr(arguments, "quiet", False)),
-            holding() if getattr(arguments, "holds", False) else nullcontext() as arguments.begun,
+            note_compilation(arguments.quiet),
+            holding() if arguments.holds else nullcontext() as arguments.begun,
         ):
             return int(arguments.command(arguments))
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2

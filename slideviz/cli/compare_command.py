@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from slideviz.study.combinations import (
     announcement,
     bounded,
     combinations,
+    compare,
     csv_text,
     history_text,
     refused,
@@ -29,9 +30,6 @@ from slideviz.study.combinations import (
     wanted_methods,
     wanted_modes,
     warm,
-)
-from slideviz.study.combinations import (
-    compare as compare_runs,
 )
 from slideviz.terms import PERIODIC_MODES
 
@@ -48,7 +46,7 @@ KEPT_BYTES = 1_500_000_000
 """Most bytes of deformed meshes that are kept in memory, for the pictures."""
 
 
-def compare(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     for name in ("matplotlib",) if arguments.no_pictures else ("matplotlib", "pyvista"):
         import_module(name)  # else it would be missed only after all is computed
@@ -81,12 +79,12 @@ def compare(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _say(arguments: argparse.Namespace, text: str) -> None:
+def _say(arguments: Namespace, text: str) -> None:
     if not arguments.quiet:
         print(text, flush=True)
 
 
-def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
+def _wanted(arguments: Namespace, case: Case) -> tuple[Combination, ...]:
     """Return the combinations that the arguments ask for; CaseError if an item is not valid."""
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
@@ -123,7 +121,7 @@ def _items(text: str) -> list[str]:
 
 
 def _computed(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     case: Case,
     mesh: Mesh,
     wanted: Sequence[Combination],
@@ -138,7 +136,7 @@ def _computed(
     reasons: list[str] = []
     count = len(wanted) - len(cannot)
     bars: list[Bar] = []
-    rows_one_by_one = compare_runs(case, mesh, wanted, lambda _, now: bars[-1](now))
+    rows_one_by_one = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
     pulled = bounded(rows_one_by_one, 0 if arguments.no_pictures else KEPT_BYTES)
     for tried in wanted:
         number = 1 + sum(row.combination not in cannot for row in rows)
@@ -167,7 +165,7 @@ def _expected(rows: Sequence[CombinationRow], tried: Combination) -> float | Non
 
 
 def _drawn(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     case: Case,
     mesh: Mesh,
     rows: Sequence[CombinationRow],

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from functools import partial
 
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import DONE, say
 from slideviz.errors import CaseError
-from slideviz.formats.files import convert as convert_file
+from slideviz.formats.files import convert
 from slideviz.solver.steps import Progress
 from slideviz.streaming.resources import missing_memory_of
 
 
-def convert(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Write a mesh in another format, with notes on what that leaves out; return the exit code."""
     require_output_paths(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):
         return _convert_streamed(arguments)
-    convert_file(arguments.mesh, arguments.output, arguments.zone, warn=partial(say, "warning"))
+    convert(arguments.mesh, arguments.output, arguments.zone, warn=partial(say, "warning"))
     print(arguments.output)
     return DONE
 
 
-def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
+def _is_to_be_streamed(arguments: Namespace) -> bool:
     """Return whether to convert piece by piece: with ``--stream``, or if memory is too small."""
     # Late: streaming takes 0.1 s, and is for large meshes.
     from slideviz.streaming.converting import streamed_kind
@@ -43,7 +43,7 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
     return bool(missing)
 
 
-def _convert_streamed(arguments: argparse.Namespace) -> int:
+def _convert_streamed(arguments: Namespace) -> int:
     # Late: streaming takes 0.1 s, and is for large meshes.
     from slideviz.streaming.converting import convert_streamed
 

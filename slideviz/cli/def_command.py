@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import time
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from slideviz import quality, walls, write
+from slideviz import write
 from slideviz.case.words import counted
 from slideviz.cli.inputs import changed
 from slideviz.cli.output_paths import (
@@ -18,9 +18,9 @@ from slideviz.cli.output_paths import (
     qualities_path,
     require_output_paths,
 )
-from slideviz.cli.report import folded_cells, print_remarks, run_report, save_json
-from slideviz.cli.run_command import run_steps
-from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
+from slideviz.cli.report import print_remarks, run_report, save_json
+from slideviz.cli.run_command import measured, run_steps, silent_timer
+from slideviz.cli.run_outcome import CELLS, report_outcome, write_qualities
 from slideviz.cli.terminal import DONE, say
 from slideviz.design.su2.boxes import set_boxes
 from slideviz.design.su2.config import own_changes, read_config
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from slideviz.solver.steps import Step
 
 
-def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
+def read_configuration(arguments: Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
     own, others = own_changes(arguments.set)
     config = read_config(arguments.case, own)
@@ -70,7 +70,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     return on_mesh(config, mesh), mesh
 
 
-def run_def(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Deform a mesh by a configuration of SU2, write it with its boxes; return the exit code."""
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
@@ -91,8 +91,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     )
     if config.variables[0].kind == "FFD_SETTING":
         return _set_boxes(arguments, config, mesh, begin)
-    seconds = {"read": time.perf_counter() - begin}
-
+    timer = silent_timer({"read": time.perf_counter() - begin})
     first = make_surface(config, mesh)
 
     def attempt(design: Su2Config) -> tuple[MovingSurface, list[Step]]:
@@ -110,32 +109,21 @@ def run_def(arguments: argparse.Namespace) -> int:
         )
     case = surface.case()
     steps[-1] = replace(steps[-1], messages=(*steps[-1].messages, *said))
-    seconds["quality"] = -time.perf_counter()
-    measured = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
-    before = quality(mesh, metric=case.quality_metric)
-    layers = walls(steps[-1].mesh, mesh, case.walls(mesh.marker_names))
-    seconds["quality"] += time.perf_counter()
-    seconds["write"] = -time.perf_counter()
-    deformed = surface.boxed(steps[-1].mesh)
-    write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
-    if rated:
-        write_qualities(rated, measured)
-    seconds["write"] += time.perf_counter()
-    seconds["total"] = time.perf_counter() - begin
-    folded = folded_cells(steps, mesh, measured)
-    report = run_report(
-        case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded, walls=layers
-    )
-    advice = advice_for(case, steps[-1], mesh, measured, report["limits"])
+    done = measured(case, mesh, steps, timer)
+    with timer.phase("write"):
+        deformed = surface.boxed(steps[-1].mesh)
+        write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
+        if rated:
+            write_qualities(rated, done.quality)
+    timer.seconds["total"] = time.perf_counter() - begin
+    report = run_report(case, done, timer.seconds)
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": surface.displacer.inside,
         "part": part,
         "ignored": list(config.ignored),
     }
-    return report_outcome(
-        arguments, report, {"mesh": output, CELLS: rated}, measured, before, folded, advice=advice
-    )
+    return report_outcome(arguments, case, done, report, {"mesh": output, CELLS: rated})
 
 
 @contextmanager
@@ -160,7 +148,7 @@ def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
     ]
 
 
-def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
+def _set_boxes(arguments: Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)

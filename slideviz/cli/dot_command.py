@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import time
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from slideviz.design.su2.gradients import Gradients
 
 
-def run_dot(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Write the gradients for moving nodes and for design variables; return the exit code."""
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import Namespace
 from contextlib import closing
 from dataclasses import replace
 from textwrap import shorten
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 
 
-def film(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film; return the exit code."""
     file = arguments.output
     film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
@@ -56,7 +56,7 @@ def film(arguments: argparse.Namespace) -> int:
     return INVERTED if any(folded) else DONE
 
 
-def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
+def _runs(arguments: Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     mesh_file = require_mesh_file(arguments, case)
@@ -90,7 +90,7 @@ def _words(case: Case, keys: list[str]) -> str:
     return ", ".join(words)
 
 
-def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
+def _frames(arguments: Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
     frames = []
     warnings = list[Remark]()
     cases = [("", case)]
@@ -117,7 +117,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     return tuple(frames)
 
 
-def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: list[Run]) -> None:
+def _print_film(arguments: Namespace, film_options: FilmOptions, runs: list[Run]) -> None:
     for run in runs:
         last_frame = run.frames[-1]
         last = last_frame.quality
@@ -132,7 +132,7 @@ def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: 
         print("few steps; --between 20 puts 20 images between two steps")
 
 
-def _print_inverted(arguments: argparse.Namespace, run: Run) -> bool:
+def _print_inverted(arguments: Namespace, run: Run) -> bool:
     """Print how many cells are inverted in the last step, or in designs; return whether any are."""
     last = [frame for frame in run.frames if frame.label] or run.frames[-1:]
     folded = [frame for frame in last if frame.quality.inverted]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
@@ -12,7 +12,7 @@ from slideviz import deform, gaps, quality
 from slideviz.cli.inputs import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
-from slideviz.cli.terminal import DONE, INVERTED, holding
+from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.design.blade_gaps import TOUCHING
 from slideviz.errors import CaseError, Remark
 
@@ -22,13 +22,8 @@ if TYPE_CHECKING:
 LISTED = (0.1, 0.3, 0.5, 0.7, 0.9)  # the places that the summary has
 
 
-def gap(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Measure the smallest distances of a case; return the exit code."""
-    with holding() as arguments.begun:
-        return _gap(arguments)
-
-
-def _gap(arguments: argparse.Namespace) -> int:
     if arguments.output is not None:
         # Late: matplotlib takes 0.4 s.
         from slideviz.plots.section_picture import require_picture_name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from slideviz.cli.mesh_source import open_mesh
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
 
-def info(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Print what is in a mesh file, or write it as JSON; return the exit code."""
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with open_mesh(arguments) as opened:
@@ -30,7 +30,7 @@ def info(arguments: argparse.Namespace) -> int:
         return _report(arguments, opened.source.mesh, counts, measured)
 
 
-def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found: Quality) -> int:
+def _report(arguments: Namespace, mesh: Mesh, counts: CellCounts, found: Quality) -> int:
     """Print or write what is in a mesh, and return the exit code.
 
     ``mesh``: the mesh, or only its skin. ``counts`` and ``found``: counts and quality of the whole

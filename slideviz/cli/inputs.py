@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -17,10 +17,10 @@ from slideviz.mesh.model import Mesh
 from slideviz.terms import ROLES, Role
 
 
-def read_case(arguments: argparse.Namespace) -> Case:
+def read_case(arguments: Namespace) -> Case:
     """Return the case of the arguments, changed by ``--set``, ``--steps`` and ``--zone``."""
     case = changed(Case.read(arguments.case), arguments.set)
-    if getattr(arguments, "step_count", None) is not None:
+    if arguments.step_count is not None:
         case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
     case = case if arguments.zone is None else case.change(zone=arguments.zone)
     add_case_inputs(arguments, case)
@@ -33,14 +33,14 @@ def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
     return with_marker_names(case, mesh), mesh
 
 
-def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
+def require_mesh_file(arguments: Namespace, case: Case) -> Path:
     """Return the mesh file of a case, or raise CaseError."""
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     return case.mesh_file
 
 
-def read_inputs(arguments: argparse.Namespace, *, is_mesh: bool = False) -> tuple[Case, Mesh]:
+def read_inputs(arguments: Namespace, *, is_mesh: bool = False) -> tuple[Case, Mesh]:
     """Return the case and its mesh of a command with ``-o`` and ``--json``, which can be written.
 
     ``is_mesh``: whether ``-o`` is a mesh. Errors as `require_output_paths`.
@@ -55,7 +55,7 @@ def read_inputs(arguments: argparse.Namespace, *, is_mesh: bool = False) -> tupl
     return read_mesh(case, mesh_file)
 
 
-def optional_case(arguments: argparse.Namespace) -> Case | None:
+def optional_case(arguments: Namespace) -> Case | None:
     """Return the case of the option ``--case``, or None."""
     if arguments.case is None:
         return None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 
 from slideviz.case.cfg import describe_keys
 from slideviz.cli.terminal import DONE
 
 
-def keys(_: argparse.Namespace) -> int:
+def main(_: Namespace) -> int:
     """Print the reference of all case keys; return the exit code."""
     print(describe_keys())
     return DONE

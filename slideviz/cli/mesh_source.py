@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
+from argparse import Namespace
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from slideviz.streaming.quality import CellCounts
     from slideviz.streaming.source import MeshSource
     from slideviz.streaming.stream_input import StreamInput
-    from slideviz.terms import FileFormat, Metric, SkewMetric
+    from slideviz.terms import FileFormat, Metric
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +45,18 @@ class OpenMesh:
 
     def quality(
         self,
-        arguments: argparse.Namespace,
+        arguments: Namespace,
         counts: CellCounts | None = None,
         metrics: MutableMapping[Metric, MetricValues | None] | None = None,
     ) -> Quality:
         """Return the quality of all cells; ``counts`` and ``metrics`` as for `measure_mesh`."""
         folder = Path(tempfile.gettempdir())
-        metric: SkewMetric = getattr(arguments, "metric", "knupp")
         with progress_of(arguments, "quality") as tick:
             return measure_mesh(
                 self.stack,
                 folder,
                 self.source,
-                metric=metric,
+                metric=arguments.metric,
                 counts=counts,
                 tick=tick,
                 metrics=metrics,
@@ -65,14 +64,14 @@ class OpenMesh:
 
 
 @contextmanager
-def progress_of(arguments: argparse.Namespace, phase: str) -> Iterator[Callable[[float], None]]:
+def progress_of(arguments: Namespace, phase: str) -> Iterator[Callable[[float], None]]:
     """Context with a function that shows the progress of a phase, if ``--stream`` is set."""
     with Bar(arguments.stream) as bar:
         yield lambda part: bar.phase(Progress(1, 1, phase, part))
 
 
 @contextmanager
-def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterator[OpenMesh]:
+def open_mesh(arguments: Namespace, case: Case | None = None) -> Iterator[OpenMesh]:
     """Context with the mesh of a command, and the undeformed one.
 
     That is of ``--reference`` or else of ``--case``, but only where it has the same cells: the case
@@ -81,7 +80,7 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     ``--stream``, is of no format that can be streamed; or ``--reference`` has other cells.
     """
     folder = Path(tempfile.gettempdir())
-    reference = getattr(arguments, "reference", None)
+    reference = arguments.reference
     with ExitStack() as stack:
         with progress_of(arguments, "read") as tick:
 

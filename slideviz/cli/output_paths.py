@@ -5,9 +5,9 @@ No input file must be overwritten, and no two results be written to one file.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
+from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -49,7 +49,7 @@ class OutputPath:
     remedy: str = ""  # the advice in the message where it is an input file
 
 
-def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
+def input_paths(arguments: Namespace) -> dict[Path, str]:
     """Return the input files of a command line, with words for what each is."""
     paths = ((getattr(arguments, name, None), what) for name, what in _INPUTS.items())
     return {path: what for path, what in paths if path is not None}
@@ -62,13 +62,13 @@ def qualities_path(output: Path) -> Path:
     return output.with_name(f"{output.stem}_qual.txt")
 
 
-def add_case_inputs(arguments: argparse.Namespace, case: Case) -> None:
+def add_case_inputs(arguments: Namespace, case: Case) -> None:
     """Add the input files of a case to those of the command line, ``arguments.inputs``."""
     for path, what in case.inputs().items():
         arguments.inputs.setdefault(path, what)
 
 
-def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
+def require_output_paths(arguments: Namespace, *outputs: OutputPath) -> None:
     """Raise where a result must not or cannot be written; print which older files are replaced.
 
     Folders for results are made where they are missing. Raises SlidevizError if a result is an
@@ -95,7 +95,7 @@ def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) ->
             make_folder(output.path)
         else:
             require_writable(output.path, CaseError, output.replaces)
-    if not getattr(arguments, "quiet", False):
+    if not arguments.quiet:
         _print_replaced([output for output in there if not output.named])
 
 

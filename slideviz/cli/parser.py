@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import ArgumentParser, HelpFormatter, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
@@ -11,48 +11,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from slideviz import __version__
-from slideviz.cli import command_parsers
-from slideviz.cli.section_options import glued
+from slideviz.cli.argument_readers import glued
+from slideviz.cli.commands import COMMANDS
 from slideviz.errors import CaseError, nearest
-
-
-def window(arguments: argparse.Namespace) -> int:
-    """Open the window, with a file if one is given; return the exit code."""
-    # Late: VTK takes 0.6 s.
-    from slideviz.export.offscreen import display_fault
-
-    if arguments.file is not None and not arguments.file.exists():
-        raise CaseError(
-            f"{arguments.file}: there is no such file or command (commands: "
-            f"{', '.join(arguments.commands)}){nearest(str(arguments.file), arguments.commands)}"
-        )
-    why = display_fault() if sys.platform.startswith("linux") else ""
-    if why:
-        raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
-    # Late: the window takes 2 s.
-    from slideviz.gui.app import launch
-
-    return launch(arguments.file, run=arguments.run)
-
-
-COMMANDS = {
-    "run": "run_command.run",
-    "info": "info_command.info",
-    "quality": "quality_command.quality",
-    "repair": "repair_command.repair",
-    "film": "film_command.film",
-    "section": "section_command.section",
-    "gap": "gap_command.gap",
-    "compare": "compare_command.compare",
-    "sweep": "sweep_command.sweep",
-    "convert": "convert_command.convert",
-    "wheel": "wheel_command.wheel",
-    "def": "def_command.run_def",
-    "dot": "dot_command.run_dot",
-    "sample": "sample_command.sample",
-    "keys": "keys_command.keys",
-}
-"""Where the function of each command is, in the order of the help; ``add_NAME`` adds its parser."""
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -69,8 +30,16 @@ exit codes: 0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cell
 a first try:  slideviz sample passage -o try && slideviz run try/passage.cfg
 """
 
+_USUAL: dict[str, Any] = {
+    **dict.fromkeys(("history", "picture", "reference", "step_count", "steps_dir", "steps_file")),
+    "metric": "knupp",
+    "metrics": (),
+    "quiet": False,
+}
+"""The values of arguments that a command does not have."""
 
-def parse(argv: Sequence[str]) -> argparse.Namespace:
+
+def parse(argv: Sequence[str]) -> Namespace:
     """Return the arguments, with ``command`` the function to call; or raise SystemExit."""
     if not any(word in (*COMMANDS, "-h", "--help", "help") for word in argv[:1]):
         parser = _window_parser()
@@ -82,17 +51,12 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     return _parser(called).parse_args(glued(argv))
 
 
-def _command(place: str, arguments: argparse.Namespace) -> int:
-    """Run the command at a place, whose module is loaded only now; return the exit code."""
-    module, _, function = place.partition(".")
-    return int(getattr(import_module(f"slideviz.cli.{module}"), function)(arguments))
-
-
-class _Parser(argparse.ArgumentParser):
+class _Parser(ArgumentParser):
     """A parser that accepts options in full only: ``--steps`` is not short for ``--steps-dir``."""
 
-    def __init__(self, **options: object) -> None:
-        super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
+    def __init__(self, **options: Any) -> None:
+        super().__init__(allow_abbrev=False, **options)
+        self.set_defaults(**_USUAL)
 
     def parse_known_args(self, *given: Any, **named: Any) -> Any:
         """Return the arguments and no others, which end the command with a message."""
@@ -109,34 +73,67 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
 
 
-def _base(**options: object) -> _Parser:
-    return _Parser(
+def _base(**options: Any) -> _Parser:
+    parser = _Parser(
         prog="slideviz",
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=RawDescriptionHelpFormatter,
         **options,
     )
-
-
-def _window_parser() -> argparse.ArgumentParser:
-
-    parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
-    parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
-    parser.add_argument("--run", action="store_true", help="deform the case at once")
-    # Quiet on the terminal: the window itself shows when it compiles.
-    parser.set_defaults(command=window, commands=tuple(COMMANDS), quiet=True)
     return parser
 
 
-def _parser(names: Iterable[str]) -> argparse.ArgumentParser:
+def _window_parser() -> ArgumentParser:
+    parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
+    parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
+    parser.add_argument("--run", action="store_true", help="deform the case at once")
+    # Quiet on the terminal: the window itself shows when it compiles.
+    parser.set_defaults(command=_window, holds=False, quiet=True)
+    return parser
+
+
+def _window(arguments: Namespace) -> int:
+    """Open the window, with a file if one is given; return the exit code."""
+    # Late: VTK takes 0.6 s.
+    from slideviz.export.offscreen import display_fault
+
+    if arguments.file is not None and not arguments.file.exists():
+        raise CaseError(
+            f"{arguments.file}: there is no such file or command (commands: "
+            f"{', '.join(COMMANDS)}){nearest(str(arguments.file), COMMANDS)}"
+        )
+    why = display_fault() if sys.platform.startswith("linux") else ""
+    if why:
+        raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
+    # Late: the window takes 2 s.
+    from slideviz.gui.app import launch
+
+    return launch(arguments.file, run=arguments.run)
+
+
+def _command(name: str, arguments: Namespace) -> int:
+    """Run a command, whose module is loaded only now; return the exit code."""
+    return int(import_module(f"slideviz.cli.{name}_command").main(arguments))
+
+
+def _parser(names: Iterable[str]) -> ArgumentParser:
     parser = _base()
-    parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     calls = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, parser_class=_Parser
     )
     for name in names:
-        getattr(command_parsers, f"add_{name}")(calls)
-        calls.choices[name].set_defaults(command=partial(_command, COMMANDS[name]))
+        row = COMMANDS[name]
+        call = calls.add_parser(
+            name,
+            help=row.help,
+            description=row.description,
+            epilog=row.examples or row.epilog,
+            formatter_class=RawDescriptionHelpFormatter if row.examples else HelpFormatter,
+        )
+        for add in row.arguments:
+            add(call)
+        run = partial(_command, name)
+        call.set_defaults(command=run, holds=row.holds, wrong_usage=call.error)
     return parser

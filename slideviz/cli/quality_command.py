@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,6 @@ from slideviz import walls, write
 from slideviz.case.limits import MeasuredMesh, check_limits, require_streamed
 from slideviz.cli.inputs import optional_case
 from slideviz.cli.mesh_source import open_mesh
-from slideviz.cli.options import reference_words
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.report import (
     WORST,
@@ -21,6 +20,7 @@ from slideviz.cli.report import (
     metrics_report,
     quality_lines,
     quality_report,
+    reference_words,
     save_json,
     table,
     wall_lines,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from slideviz.terms import Metric
 
 
-def quality(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Print or write the quality of a mesh, relative to the undeformed one if it is given.
 
     Returns the exit code.
@@ -91,7 +91,7 @@ def quality(arguments: argparse.Namespace) -> int:
         return _report(arguments, opened, found, values, layers, results)
 
 
-def _require_streamed(arguments: argparse.Namespace) -> None:
+def _require_streamed(arguments: Namespace) -> None:
     """Raise CaseError for what needs the mesh in memory, where ``--stream`` is set."""
     if not arguments.stream:
         return
@@ -109,7 +109,7 @@ def _require_streamed(arguments: argparse.Namespace) -> None:
 
 
 def _report(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     opened: OpenMesh,
     found: Quality,
     metrics: Mapping[Metric, MetricValues],

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
+from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
-from slideviz import quality, read, write
-from slideviz import repair as mend
+from slideviz import quality, read, repair, write
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, quality_lines, save_json
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
 
-def repair(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Mend a mesh, write it, and print or write a report; return the exit code."""
     begin = time.perf_counter()
     output = arguments.output
@@ -44,7 +43,7 @@ def repair(arguments: argparse.Namespace) -> int:
     say("warning", warning_of_losses(output, mesh, None))
     roles = {role: getattr(arguments, role) for role in ("fixed", "sliding", "periodic")}
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
-        done = mend(
+        done = repair(
             mesh,
             reference,
             **roles,

@@ -23,15 +23,15 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.mesh.walls import Walls, statistics_of, wall_words
+from slideviz.mesh.walls import statistics_of, wall_words
 from slideviz.mesh.zones import marker_zones
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
 from slideviz.solver.layers import height_warnings
-from slideviz.solver.steps import MeshRepair, safe_fraction_of
+from slideviz.solver.steps import MeshRepair, RunResult
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
-from slideviz.terms import WALL_VALUES, Metric, Quantity, field_of
+from slideviz.terms import NO_REFERENCE, WALL_VALUES, Metric, Quantity, field_of
 
 LISTED = 100  # most inverted cells listed in a report
 MOST_WALLS = 6  # most boundaries whose layers a summary has
@@ -48,26 +48,12 @@ CYCLE_KEYS = ("cycle", "level", "error", "control_nodes", "seconds")
 """The fields of `Cycle` that a report has, under the same keys."""
 
 
-def run_report(
-    case: Case,
-    mesh: Mesh,
-    steps: Sequence[Step],
-    seconds: Mapping[str, float],
-    *,
-    quality: Quality,
-    undeformed: Quality,
-    folded: Mapping[int, tuple[int, int]],
-    walls: Walls | None = None,
-) -> dict[str, Any]:
-    """Return the JSON object of ``run --json``.
-
-    ``seconds``: seconds by phase, besides those of the steps.
-    ``quality`` and ``undeformed``: quality after the last step, and before the run.
-    ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
-    ``walls``: the layers at the boundaries; None where the mesh is in a file.
-    """
+def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Return the JSON object of ``run --json``; ``seconds``: by phase, besides the steps' own."""
+    mesh = done.mesh
+    steps = done.steps
+    walls = done.walls
     last = steps[-1]
-    safe = safe_fraction_of(steps)
     changed = [] if walls is None else height_warnings(case, walls, last.mesh)
     each = [step.relaxed for step in steps if step.relaxed is not None]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
@@ -84,18 +70,18 @@ def run_report(
         "periodic": case.periodic,
         "steps": last.total,
         "quality": {
-            **quality.summary(),
-            "metric": quality.metric,
-            "inverted_cells": list(folded),
-            "inverted_at_step": [step for _, step in folded.values()],
-            "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
+            **done.quality.summary(),
+            "metric": done.quality.metric,
+            "inverted_cells": list(done.folded),
+            "inverted_at_step": [step for _, step in done.folded.values()],
+            "undeformed": {"min": done.undeformed.min, "mean": done.undeformed.mean},
         },
         "limits": limits_report(
-            check_case_limits(case, quality, last.mesh, mesh),
-            check_case_limits(case, undeformed, mesh, mesh),
+            check_case_limits(case, done.quality, last.mesh, mesh),
+            check_case_limits(case, done.undeformed, mesh, mesh),
         ),
         "walls": None if walls is None else walls.summary(),
-        **({} if safe is None else safe.report()),
+        **({} if done.safe is None else done.safe.report()),
         "safe_fractions": [step.safe.fraction for step in steps if step.safe is not None],
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
@@ -296,6 +282,12 @@ def info_report(
         "remarks": list(mesh.remarks),
         "quality": quality.summary(),
     }
+
+
+def reference_words(reference: Path | None) -> str:
+    """Return the line on the undeformed mesh that the quality refers to, or that there is none."""
+    remedy = f"{NO_REFERENCE}; give --reference UNDEFORMED"
+    return remedy if reference is None else f"reference: {reference}"
 
 
 def zone_words(zone: int | None, zones: int) -> str:

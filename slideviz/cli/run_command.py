@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import time
-from collections.abc import Callable, Iterator
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -21,7 +21,6 @@ from slideviz.cli.report import LISTED, folded_cells, metrics_report, run_report
 from slideviz.cli.run_outcome import (
     CELLS,
     QUALITY_BYTES,
-    advice_for,
     report_outcome,
     write_qualities,
 )
@@ -31,6 +30,7 @@ from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 from slideviz.mesh.metrics import rated_metric
+from slideviz.rbf.problem import PhaseTimer
 from slideviz.scene.overview import require_detail
 from slideviz.solver.steps import RunResult
 from slideviz.streaming.resources import missing_memory
@@ -52,7 +52,7 @@ KEPT_BYTES = 1_000_000_000
 """Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""
 
 
-def run(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -67,56 +67,38 @@ def run(arguments: argparse.Namespace) -> int:
         raise CaseError("--metrics needs the mesh in memory; leave it out for a streamed run")
     done = (_stream if streamed else _deform)(arguments, case, output, kind)
     case = with_marker_names(case, done.mesh)
-    found = done.quality
-    before = done.undeformed
-    seconds = dict(done.seconds)
+    last = done.steps[-1].mesh
+    timer = silent_timer(dict(done.seconds))
     if qualities:
-        seconds["write"] -= time.perf_counter()
-        write_qualities(qualities, found)
-        seconds["write"] += time.perf_counter()
+        with timer.phase("write"):
+            write_qualities(qualities, done.quality)
     if arguments.picture:
         # Late: VTK takes 0.6 s.
         from slideviz.export.offscreen_renderer import PICTURE_SIZE
         from slideviz.export.verbs import picture
 
-        named = replace(done.steps[-1].mesh, name=output.name)
-        pixels = arguments.picture_size or PICTURE_SIZE
         picture(
             arguments.picture,
-            named,
+            replace(last, name=output.name),
             done.mesh,
             case=case,
             step=done.steps[-1],
-            rated=found,
-            before=before,
-            size=pixels,
+            rated=done.quality,
+            before=done.undeformed,
+            size=arguments.picture_size or PICTURE_SIZE,
             zoom=arguments.zoom,
         )
-    seconds["total"] = time.perf_counter() - begin
-    folded = done.folded
-    report = run_report(
-        case,
-        done.mesh,
-        done.steps,
-        seconds,
-        quality=found,
-        undeformed=before,
-        folded=folded,
-        walls=done.walls,
-    )
+    timer.seconds["total"] = time.perf_counter() - begin
+    report = run_report(case, done, timer.seconds)
     if arguments.metrics:
-        report["metrics"] = {
-            "before": metrics_report(_metrics_of(arguments, done.mesh, before, done.mesh)),
-            "after": metrics_report(_metrics_of(arguments, done.steps[-1].mesh, found, done.mesh)),
-        }
-    in_memory = None if streamed else done.mesh
-    advice = advice_for(case, done.steps[-1], in_memory, found, report["limits"])
-    files = {"mesh": output, CELLS: qualities}
-    return report_outcome(arguments, report, files, found, before, folded, advice=advice)
+        before = _metrics_of(arguments, done.mesh, done.undeformed, done.mesh)
+        after = _metrics_of(arguments, last, done.quality, done.mesh)
+        report["metrics"] = {"before": metrics_report(before), "after": metrics_report(after)}
+    return report_outcome(arguments, case, done, report, {"mesh": output, CELLS: qualities})
 
 
 def _metrics_of(
-    arguments: argparse.Namespace, mesh: Mesh, found: Quality, base: Mesh
+    arguments: Namespace, mesh: Mesh, found: Quality, base: Mesh
 ) -> dict[Metric, MetricValues]:
     """Return the metrics that ``--metrics`` asks for, of a mesh with its quality."""
     names = [name for name in METRICS if name in arguments.metrics]
@@ -124,7 +106,7 @@ def _metrics_of(
 
 
 def _fields(
-    arguments: argparse.Namespace, case: Case, path: Path, mesh: Mesh, found: Quality, base: Mesh
+    arguments: Namespace, case: Case, path: Path, mesh: Mesh, found: Quality, base: Mesh
 ) -> tuple[dict[str, NDArray] | None, dict[str, NDArray]]:
     """Return the quality and the metrics of a mesh as data of the cells and points of a file.
 
@@ -140,42 +122,31 @@ def _fields(
     return data | cells, points
 
 
-def _deform(
-    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
-) -> RunResult:
+def _deform(arguments: Namespace, case: Case, output: Path, kind: FileFormat | None) -> RunResult:
     assert case.mesh_file is not None
-    seconds = {"read": -time.perf_counter()}
-    case, mesh = read_mesh(case, case.mesh_file)
-    say("warning", warning_of_losses(output, mesh, kind))
-    if arguments.picture:
-        require_detail(arguments.zoom, mesh)
-    seconds["read"] += time.perf_counter()
-    steps = run_steps(arguments, case, mesh)
-    last = steps[-1]
-    seconds["quality"] = -time.perf_counter()
-    layers = walls(last.mesh, mesh, case.walls(mesh.marker_names))  # takes most memory: first
-    measured = quality(last.mesh, reference=mesh, metric=case.quality_metric)
-    before = quality(mesh, metric=case.quality_metric)
-    seconds["quality"] += time.perf_counter()
-    seconds["write"] = -time.perf_counter()
-    cells, points = _fields(arguments, case, output, last.mesh, measured, mesh)
-    write(
-        output,
-        last.mesh,
-        overwrite=arguments.force,
-        cell_data=cells,
-        base=mesh,
-        file_format=kind,
-        point_data=points,
-    )
-    seconds["write"] += time.perf_counter()
-    folded = folded_cells(steps, mesh, measured)
-    return RunResult(mesh, tuple(steps), measured, before, folded, seconds, layers)
+    timer = silent_timer({})
+    with timer.phase("read"):
+        case, mesh = read_mesh(case, case.mesh_file)
+        say("warning", warning_of_losses(output, mesh, kind))
+        if arguments.picture:
+            require_detail(arguments.zoom, mesh)
+    done = measured(case, mesh, run_steps(arguments, case, mesh), timer)
+    last = done.steps[-1].mesh
+    with timer.phase("write"):
+        cells, points = _fields(arguments, case, output, last, done.quality, mesh)
+        write(
+            output,
+            last,
+            overwrite=arguments.force,
+            cell_data=cells,
+            base=mesh,
+            file_format=kind,
+            point_data=points,
+        )
+    return done
 
 
-def _stream(
-    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
-) -> RunResult:
+def _stream(arguments: Namespace, case: Case, output: Path, kind: FileFormat | None) -> RunResult:
     # Late: streaming takes 0.2 s.
     from slideviz.streaming.run import stream
 
@@ -196,7 +167,7 @@ def _stream(
 
 
 def require_streamable(
-    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+    arguments: Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> None:
     """Raise where ``--stream`` is given for a run that cannot be streamed.
 
@@ -222,7 +193,7 @@ def require_streamable(
 
 
 def is_to_be_streamed(
-    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+    arguments: Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
     """Return whether to stream a run: on request, or if it is possible and memory is too small."""
     if arguments.stream:
@@ -234,7 +205,7 @@ def is_to_be_streamed(
     return bool(why)
 
 
-def _needing_memory(arguments: argparse.Namespace) -> list[str]:
+def _needing_memory(arguments: Namespace) -> list[str]:
     return [name for name in ("picture", "steps_dir", "steps_file") if getattr(arguments, name)]
 
 
@@ -243,7 +214,7 @@ def _is_su2(output: Path, kind: FileFormat | None) -> bool:
 
 
 def _require_output_paths(
-    arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
+    arguments: Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
     assert case.mesh_file is not None
     ours = "|".join(map(re.escape, endings(lambda row: row.solver)))
@@ -311,7 +282,23 @@ def _format_of(output: Path, case: Case) -> FileFormat | None:
     return kind
 
 
-def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
+def silent_timer(seconds: dict[str, float]) -> PhaseTimer:
+    """Return a timer of phases that adds to ``seconds``, and shows no progress."""
+    return PhaseTimer(lambda *_: None, seconds)
+
+
+def measured(case: Case, mesh: Mesh, steps: Sequence[Step], timer: PhaseTimer) -> RunResult:
+    """Return the outcome of a run in memory, with the qualities of its meshes."""
+    last = steps[-1].mesh
+    with timer.phase("quality"):
+        layers = walls(last, mesh, case.walls(mesh.marker_names))  # takes most memory: first
+        found = quality(last, reference=mesh, metric=case.quality_metric)
+        before = quality(mesh, metric=case.quality_metric)
+    folded = folded_cells(steps, mesh, found)
+    return RunResult(mesh, tuple(steps), found, before, folded, timer.seconds, layers)
+
+
+def run_steps(arguments: Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Deform a mesh, and return all steps; write each step's mesh where asked for.
 
     Once meshes take more than `KEPT_BYTES`, only the last step keeps its own; earlier steps have
@@ -335,9 +322,7 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
 
 
 @contextmanager
-def _series(
-    arguments: argparse.Namespace, case: Case, mesh: Mesh
-) -> Iterator[Callable[[Mesh], object]]:
+def _series(arguments: Namespace, case: Case, mesh: Mesh) -> Iterator[Callable[[Mesh], object]]:
     """Context with a function that adds the mesh of a step to the file of all steps.
 
     The undeformed mesh is in it already. Each mesh has the quality of its cells, the

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,15 +28,13 @@ from slideviz.cli.report import (
 from slideviz.cli.terminal import DONE, INVERTED, LIMIT_MISSED
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.margin import SafeFraction
 from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
-    from slideviz.solver.steps import Step
+    from slideviz.solver.steps import RunResult
     from slideviz.terms import Quantity
 
 CELLS = "quality of each cell"  # what the summary calls the file of qualities
@@ -44,38 +42,25 @@ QUALITY_BYTES = 20  # most bytes of a line in the file of qualities: 16 or 17 di
 _ROWS = 1 << 18
 
 
-Folded = Mapping[int, tuple[int, int]]
-"""VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
-
-
 def report_outcome(
-    arguments: argparse.Namespace,
-    report: dict,
-    files: dict[str, Path | None],
-    found: Quality,
-    before: Quality,
-    folded: Folded,
-    *,
-    advice: str,
+    arguments: Namespace, case: Case, done: RunResult, report: dict, files: dict[str, Path | None]
 ) -> int:
     """Write the report of a run, print its summary and warnings, and return the exit code.
 
     ``files``: the files written so far, by their words in the summary.
-    ``found`` and ``before``: quality after and before the run.
-    ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
-    ``advice``: what may help against inverted cells or missed limits, from `advice_for`.
     """
+    advice = _advice(case, done, report["limits"])
     if arguments.history:
         save_history(arguments.history, report)
     if not save_json(arguments.json, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
-        _print_run(report, found, before, files, getattr(arguments, "metrics", ()))
+        _print_run(report, done, files, arguments.metrics)
     print_remarks(report["warnings"], quiet=arguments.quiet)
     if report["quality"]["inverted"]:
         report_limits(report["limits"])
-        print(f"slideviz: {_inverted_sentence(report, folded, advice)}", file=sys.stderr)
+        print(f"slideviz: {_inverted_sentence(report, done, advice)}", file=sys.stderr)
         return INVERTED
     return report_limits(report["limits"], advice)
 
@@ -105,11 +90,7 @@ def write_qualities(path: Path, found: Quality) -> None:
 
 
 def _print_run(
-    report: dict,
-    found: Quality,
-    before: Quality,
-    files: dict[str, Path | None],
-    metrics: Sequence[Quantity],
+    report: dict, done: RunResult, files: dict[str, Path | None], metrics: Sequence[Quantity]
 ) -> None:
     counts = report["node_counts"]
     spent = report["seconds"]
@@ -120,7 +101,7 @@ def _print_run(
     slides = counts["sliding_edge"] + counts["sliding_surface"]
     sliding = report["sliding"] if slides else "none"
     print(f"sliding {sliding}, periodic {report['periodic']}{zone}")
-    print(quality_lines(found, before) + wall_lines(report["walls"]))
+    print(quality_lines(done.quality, done.undeformed) + wall_lines(report["walls"]))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
     rows.append(("control candidates", report["control_candidates"]))
@@ -155,9 +136,9 @@ def _print_run(
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
-    if (safe := SafeFraction.of_report(report)) is not None:
+    if done.safe is not None:
         mended = bool(mended and mended["nodes_moved"])
-        print(f"  {safe.words}{safe.ending(found.inverted, mended)}")
+        print(f"  {done.safe.words}{done.safe.ending(done.quality.inverted, mended)}")
     if report["limits"]:
         print(f"limits:\n{limit_lines(report['limits'])}")
     if rated := report.get("metrics"):
@@ -179,34 +160,28 @@ def _trial_words(trial: Mapping[str, Any]) -> str:
     return f"{trial['planned']} ({result}{halved})"
 
 
-def advice_for(
-    case: Case,
-    step: Step | None,
-    mesh: Mesh | None = None,
-    found: Quality | None = None,
-    limits: Sequence[Mapping[str, Any]] = (),
-) -> str:
+def _advice(case: Case, done: RunResult, limits: Sequence[Mapping[str, Any]]) -> str:
     """Return what may help against inverted cells or missed limits: remedies, with keys.
 
-    ``step`` is the last one, ``limits`` are those of the report. Without a mesh in
-    memory, with its quality ``found`` after the run, neither the pitch nor boundaries beside the
-    cells are named.
+    ``limits`` are those of the report. Of a mesh in a file neither the pitch nor boundaries beside
+    the cells are named.
     """
+    found = done.quality
     missed = [entry for entry in limits if not entry["passed"] and entry["undeformed_passed"]]
-    if found is not None and not found.inverted and not missed:
+    if not found.inverted and not missed:
         return ""  # what the undeformed mesh misses, no other deformation mends
 
     beside: tuple[str, ...] = ()
     pitch = ""
-    if mesh is not None and found is not None:
+    if done.walls is not None:
         cells = found.inverted_cells()
         if not found.inverted:
             cells = np.array([cell for entry in missed for cell in entry["cells"]], np.int64)
-        beside = fixed_beside(case, mesh, cells)
-        pitch = beyond_pitch(case, mesh)
-    folded = found is None or found.inverted > 0
-    every = [remedy.keys for remedy in remedies(case, beside, pitch, step, folded)]
-    if found is not None and not found.inverted and case.method == "rbf":
+        beside = fixed_beside(case, done.mesh, cells)
+        pitch = beyond_pitch(case, done.mesh)
+    last = done.steps[-1]
+    every = [r.keys for r in remedies(case, beside, pitch, last, found.inverted > 0)]
+    if not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
         if case.relax == "no":
             every.insert(0, "RELAX= YES")
@@ -216,14 +191,14 @@ def advice_for(
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")
 
 
-def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
+def _inverted_sentence(report: dict, done: RunResult, advice: str) -> str:
     inverted = report["quality"]["inverted"]
     cells = report["quality"]["cells"]
     named = ", ".join(
         f"{cell} ({ELEMENTS[vtk].name}, step {step})"
-        for cell, (vtk, step) in list(folded.items())[:5]
+        for cell, (vtk, step) in list(done.folded.items())[:5]
     )
     more = f" and {inverted - 5} more" if inverted > 5 else ""
-    safe = SafeFraction.of_report(report)
+    safe = done.safe
     reach = "" if safe is None or safe.fraction >= 1 else f"{safe.words}; "
     return f"{inverted} of {cells} cells are inverted: {named}{more}; {reach}{advice}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from pathlib import Path
 
 from slideviz.cli.report import table
@@ -10,7 +10,7 @@ from slideviz.cli.terminal import DONE
 from slideviz.samples.table import SAMPLES, write_sample
 
 
-def sample(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Write a sample case, or list the samples; return the exit code."""
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")

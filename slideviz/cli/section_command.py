@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,9 +12,8 @@ import numpy as np
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli.inputs import optional_case
 from slideviz.cli.mesh_source import open_mesh, progress_of
-from slideviz.cli.options import reference_words
 from slideviz.cli.output_paths import OutputPath, require_output_paths
-from slideviz.cli.report import save_json
+from slideviz.cli.report import reference_words, save_json
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.errors import CaseError
 from slideviz.export.flat_section import section as draw
@@ -56,7 +55,7 @@ class _Scene:
     reference: Path | None  # the file of the undeformed mesh
 
 
-def section(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
     _check_usage(arguments)
     require_picture_name(arguments.output)
@@ -92,7 +91,7 @@ def section(arguments: argparse.Namespace) -> int:
     return _report(arguments, scene, shown)
 
 
-def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
+def _scene(arguments: Namespace, case: Case | None) -> _Scene:
     """Return the cells that the section can cut; of a 2D mesh all, which are shown around it."""
     with open_mesh(arguments, case) as opened:
         mesh = opened.source.mesh
@@ -115,7 +114,7 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     return _Scene(near.mesh, near.base, near.quality, chosen, matrices, outer, path)
 
 
-def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
+def _report(arguments: Namespace, scene: _Scene, shown: SectionInRun) -> int:
     """Print the numbers of the cut or write them as JSON, and return the exit code."""
     mesh = scene.mesh
     chosen = scene.chosen
@@ -139,7 +138,7 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
     return INVERTED if summary["inverted"] else DONE
 
 
-def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
+def _meridional(arguments: Namespace, case: Case | None) -> int:
     """Draw the meridional view of a mesh to a file; return the exit code."""
     with open_mesh(arguments, case) as opened:
         mesh = opened.source.mesh
@@ -190,7 +189,7 @@ def _meridional(arguments: argparse.Namespace, case: Case | None) -> int:
     return INVERTED if summary["inverted"] else DONE
 
 
-def _check_usage(arguments: argparse.Namespace) -> None:
+def _check_usage(arguments: Namespace) -> None:
     if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
     if arguments.meridional:
@@ -207,7 +206,7 @@ def _check_usage(arguments: argparse.Namespace) -> None:
 
 
 def _section_and_passages(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     mesh: Mesh,
     read_base: Callable[[], Mesh | None],
     case: Case | None,

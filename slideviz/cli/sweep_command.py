@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz import sweep as sweep_of
+from slideviz import sweep
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.limits import MET
@@ -37,7 +37,7 @@ _LISTED = 5
 _CONNECTING = 10.0  # seconds to wait for a connection to a scheduler
 
 
-def sweep(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Deform a mesh by many designs, and write the table of results; return the exit code."""
     case = read_case(arguments)
     if arguments.columns:
@@ -53,7 +53,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     make_folder(folder)
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with _executor(arguments) as executor:
-        rows = sweep_of(
+        rows = sweep(
             case,
             designs,
             executor,
@@ -96,7 +96,7 @@ def _print_columns(case: Any) -> int:
 
 
 @contextmanager
-def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
+def _executor(arguments: Namespace) -> Iterator[Executor | None]:
     """Context with the executor of ``--scheduler``, or None; CaseError if there is none."""
     if arguments.scheduler is None:
         yield None
@@ -124,7 +124,7 @@ def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
 
 
 def _pulled(
-    arguments: argparse.Namespace, rows: Iterator[DesignRow], total: int, results: Path
+    arguments: Namespace, rows: Iterator[DesignRow], total: int, results: Path
 ) -> list[DesignRow]:
     """Run all designs and return their rows, with a progress bar."""
     found: list[DesignRow] = []
@@ -144,7 +144,7 @@ def _pulled(
 
 
 def _report(
-    arguments: argparse.Namespace, designs: Designs, rows: Sequence[DesignRow], seconds: float
+    arguments: Namespace, designs: Designs, rows: Sequence[DesignRow], seconds: float
 ) -> dict[str, Any]:
     done = sorted((row for row in rows if not row.problem), key=lambda row: (-row.min, row.design))
     fresh = [row for row in rows if not row.earlier]

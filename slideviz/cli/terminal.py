@@ -18,7 +18,6 @@ from slideviz.errors import SlidevizError
 
 DONE = 0
 WRONG_INPUT = 1  # the mesh or the case is wrong
-WRONG_USAGE = 2  # the arguments are wrong; argparse itself exits with this code
 INVERTED = 3  # done, but cells are inverted
 LIMIT_MISSED = 4  # done, without inverted cells, but a limit of the case is not met
 CANCELLED = 130

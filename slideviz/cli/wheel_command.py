@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from slideviz import wheel as wheel_of
+from slideviz import wheel
 from slideviz.cli.inputs import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
 from slideviz.cli.run_outcome import report_limits
-from slideviz.cli.terminal import INVERTED, holding
+from slideviz.cli.terminal import INVERTED
 
 if TYPE_CHECKING:
     from slideviz.design.deformed_wheel import WheelQuality
@@ -18,16 +18,11 @@ if TYPE_CHECKING:
 MOST_NAMES = 20  # boundaries whose names are all printed
 
 
-def wheel(arguments: argparse.Namespace) -> int:
+def main(arguments: Namespace) -> int:
     """Write the wheel of a case; return the exit code."""
-    with holding() as arguments.begun:
-        return _wheel(arguments)
-
-
-def _wheel(arguments: argparse.Namespace) -> int:
     case, mesh = read_inputs(arguments, is_mesh=True)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
-        made = wheel_of(
+        made = wheel(
             arguments.output,
             case,
             mesh,

@@ -13,10 +13,10 @@ coordinates and determinants is subtracted (`ROUNDING`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from math import floor
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -159,14 +159,6 @@ class SafeFraction:
         """Return the keys of a report: ``safe_fraction``, ``safe_cell`` and so on."""
         known = {f"safe_{name}": value for name, value in asdict(self).items()}
         return known if self.zone else {key: known[key] for key in known if key != "safe_zone"}
-
-    @classmethod
-    def of_report(cls, report: Mapping[str, Any]) -> SafeFraction | None:
-        """Return what `report` wrote into a report; None if it did not."""
-        if "safe_fraction" not in report:
-            return None
-        names = {one.name: f"safe_{one.name}" for one in fields(cls)}
-        return cls(**{name: report[key] for name, key in names.items() if key in report})
 
 
 def reach_words(fraction: float) -> str:

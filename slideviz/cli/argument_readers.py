@@ -1,20 +1,22 @@
-"""Reads the texts of sections, sizes and limits in the options of ``slideviz section``."""
+"""Reads the texts of arguments: each function returns a value, or raises CaseError."""
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
-from slideviz.errors import CaseError
-from slideviz.terms import AXES
+from slideviz.errors import CaseError, not_one_of
+from slideviz.terms import AXES, RATED, Quantity, field_of
 
 if TYPE_CHECKING:
+    from slideviz.case.limits import Limit
+    from slideviz.design.deformed_wheel import Count
+    from slideviz.scene.overview import Zoom
     from slideviz.sections.model import Section
 
 
@@ -54,10 +56,10 @@ def plane(text: str) -> SectionArgument:
     word, sign, value = text.partition("=")
     if sign:
         if word.strip() not in AXES:
-            raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z; write e.g. z=0.5")
+            raise CaseError(f"{text!r}: the axis is x, y or z; write e.g. z=0.5")
         normal = AXES[word.strip()]
         if value.count(",") == 1:
-            raise argparse.ArgumentTypeError(_comma(text, value.strip().replace(",", ".")))
+            raise CaseError(_comma(text, value.strip().replace(",", ".")))
         (at,) = _numbers(value, (1,), "a coordinate, e.g. z=0.5")
         return SectionArgument(_section("plane", [at * part for part in normal], normal))
     values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, e.g. z=0.5")
@@ -75,11 +77,11 @@ def section_about_axis(row: ShapeTerms, text: str) -> SectionArgument:
     word, sign, value = number.partition("=")
     if sign:
         if word.strip() not in (row.letter, row.size.word):
-            raise argparse.ArgumentTypeError(f"{text!r} is not {row.size.example}")
+            raise CaseError(f"{text!r} is not {row.size.example}")
         number = value
     digits, _, more = axis.partition(",")
     if digits.strip().isdecimal() and (not more or more.partition(",")[0].strip() in AXES):
-        raise argparse.ArgumentTypeError(_comma(text, f"{number.strip()}.{digits.strip()}"))
+        raise CaseError(_comma(text, f"{number.strip()}.{digits.strip()}"))
     (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
         return SectionArgument(_section(row.value, (), AXES["z"], size), False)
@@ -100,7 +102,7 @@ def pair_of_names(text: str) -> tuple[str, str]:
     """Return the two boundaries of a text like ``BLADE,HUB``."""
     first, _, second = map(str.strip, text.partition(","))
     if not first or not second or "," in second:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected two boundaries, e.g. BLADE,HUB")
+        raise CaseError(f"{text!r}: expected two boundaries, e.g. BLADE,HUB")
     return first, second
 
 
@@ -114,13 +116,11 @@ def pixels(text: str) -> tuple[int, int]:
     """Return width and height of a text like ``1600x1000``."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
     if not match:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a size; write e.g. 1600x1000")
+        raise CaseError(f"{text!r} is not a size; write e.g. 1600x1000")
     width = int(match[1])
     height = int(match[2])
     if not (300 <= width <= 20000 and 200 <= height <= 20000):
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected a size from 300x200 to 20000x20000 pixels"
-        )
+        raise CaseError(f"{text!r}: expected a size from 300x200 to 20000x20000 pixels")
     return width, height
 
 
@@ -129,25 +129,20 @@ def neighbours(text: str) -> int | Literal["wheel"]:
     if text == "wheel":
         return "wheel"
     if not text.isdecimal() or int(text) > MOST_COPIES:
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected a number from 0 to {MOST_COPIES}, or the word wheel"
-        )
+        raise CaseError(f"{text!r}: expected a number from 0 to {MOST_COPIES}, or the word wheel")
     return int(text)
 
 
 def _section(
     kind: str, origin: Sequence[float], direction: Sequence[float], size: float = 0.0
 ) -> Section:
-    """Return a section; its CaseError becomes an ArgumentTypeError. Missing numbers are 0."""
+    """Return a section, whose missing numbers are 0."""
     # Late: NumPy and Numba take 0.4 s, and help does not need them.
     from slideviz.sections.model import Section
 
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0
     a, b, c, *_ = *direction, 0.0, 0.0, 0.0
-    try:
-        return Section.of(kind, (x, y, z), (a, b, c), size)
-    except CaseError as problem:
-        raise argparse.ArgumentTypeError(str(problem)) from problem
+    return Section.of(kind, (x, y, z), (a, b, c), size)
 
 
 def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
@@ -155,9 +150,92 @@ def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
     try:
         values = [float(word) for word in text.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not {form}") from None
+        raise CaseError(f"{text!r} is not {form}") from None
     if not all(map(isfinite, values)):
-        raise argparse.ArgumentTypeError(f"{text!r} has a number that is not finite")
+        raise CaseError(f"{text!r} has a number that is not finite")
     if len(values) not in counts:
-        raise argparse.ArgumentTypeError(f"{text!r} has {len(values)} numbers; write {form}")
+        raise CaseError(f"{text!r} has {len(values)} numbers; write {form}")
     return values
+
+
+def metric_names(text: str) -> tuple[Quantity, ...]:
+    """Return metrics and numbers of walls of a text: "all", or names with commas, with - or _."""
+    fields = {field_of(name): name for name in RATED}
+    wanted = [field_of(word.strip().lower()) for word in text.split(",")]
+    if wanted == ["all"]:
+        return tuple(RATED)
+    for word in wanted:
+        if word not in fields:
+            raise CaseError(not_one_of(word, ("all", *fields)))
+    return tuple(fields[word] for word in wanted)
+
+
+def zoom(text: str) -> Zoom:
+    """Return the detail for ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``; ``auto`` and ``all`` as they are."""
+    if text == "auto":
+        return "auto"
+    if text == "all":
+        return "all"
+    # Late: NumPy takes 0.1 s, and help does not need it.
+    from slideviz.scene.overview import Detail
+
+    try:
+        *centre, width = map(float, text.split(","))
+    except ValueError:
+        centre = []
+        width = 0.0
+    if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
+        raise CaseError(
+            f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
+        )
+    return Detail(tuple(centre), width)
+
+
+def integer(text: str) -> int:
+    """Parse a whole number, written like ``20000`` or ``1e8``."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.5
+    if not number.is_integer():
+        raise CaseError(f"{text!r} is not a whole number; write e.g. 20000 or 1e8")
+    return int(text) if text.strip().lstrip("+-").isdigit() else int(number)
+
+
+def size(text: str) -> tuple[int, int]:
+    """Return width and height of a text like ``1280x800``."""
+    width, sign, height = text.lower().partition("x")
+    if not (sign and width.isdecimal() and height.isdecimal()):
+        raise CaseError(f"{text!r} is not of the form WIDTHxHEIGHT; write e.g. 1280x800")
+    return int(width), int(height)
+
+
+def quality_limits(text: str) -> tuple[Limit, ...]:
+    """Return the limits of a text."""
+    # Late: the case takes 0.5 s, and help does not need it.
+    from slideviz.case.limits import read_limits
+
+    found = read_limits(text)
+    if not found:
+        raise CaseError(f"{text!r} has no limit; write e.g. min > 0.3")
+    return found
+
+
+def names_in(text: str) -> tuple[str, ...]:
+    """Return the names of a text, separated by commas."""
+    return tuple(filter(None, (name.strip() for name in text.split(","))))
+
+
+def repair_below(text: str) -> float:
+    """Return the value of a text as of the key REPAIR_BELOW."""
+    # Late: the case takes 0.5 s, and help does not need it.
+    from slideviz.case.keys import KEYS
+
+    return float(KEYS["REPAIR_BELOW"].kind.read(text))
+
+
+def passages(text: str) -> Count | list[Count]:
+    """Return a number of passages, or "all"; with commas one for each zone."""
+    words = [word.strip() for word in text.split(",")]
+    counts: list[Count] = ["all" if word.lower() == "all" else integer(word) for word in words]
+    return counts if len(counts) > 1 else counts[0]
