@@ -81,5 +81,5 @@ study: setup ## the thesis's cases, and a contest, into study/ (ARGS=--quick: sm
 
 clean: ## remove what was built, the virtual environment and demo/ included
 	rm -rf .venv demo study build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
-		.import_linter_cache tests/golden/new docs/gallery docs/reference/{keys,commands}.md
+		.import_linter_cache .coverage tests/golden/new docs/gallery docs/reference/{keys,commands}.md
 	find slideviz tests -name __pycache__ -prune -exec rm -rf {} +
