@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 from slideviz.solver.steps import Trial
 from tests.builders import grid, layered, stage
+from tests.processes import wait_until
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -503,9 +503,7 @@ def test_interrupt_leaves_nothing_half_written(square, tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    give_up = time.monotonic() + 120
-    while not (made.is_dir() and any(made.iterdir())) and time.monotonic() < give_up:
-        time.sleep(0.1)
+    wait_until(lambda: made.is_dir() and any(made.iterdir()))
     child.send_signal(signal.SIGINT)
     _, err = child.communicate(timeout=60)
     assert child.returncode == 130

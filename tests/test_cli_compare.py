@@ -7,7 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from io import StringIO
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.samples.table import write_sample
 from tests.builders import stage
+from tests.processes import wait_until
 
 
 @pytest.fixture
@@ -198,9 +198,7 @@ def test_an_interrupt_leaves_what_was_finished(tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
-    end = time.monotonic() + 60
-    while not (out / "compare.csv").exists() and time.monotonic() < end:
-        time.sleep(0.05)
+    wait_until((out / "compare.csv").exists)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130, told

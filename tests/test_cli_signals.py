@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ import pytest
 from slideviz.samples.table import write_sample
 from slideviz.system.atomic import atomic_write, require_writable
 from slideviz.system.cleanup import PREFIX, draft
+from tests.processes import is_running, wait_until
 
 SAID = {
     signal.SIGINT: "slideviz: cancelled; it leaves nothing half-written\n",
@@ -56,13 +56,6 @@ def drafts(folder: Path) -> list[Path]:
     return list(folder.glob(f"{PREFIX}*"))
 
 
-def wait_for(what: Callable[[], object]) -> None:
-    give_up = time.monotonic() + 120
-    while not what():
-        assert time.monotonic() < give_up
-        time.sleep(0.01)
-
-
 def heeds_signals(child: subprocess.Popen[str]) -> bool:
     """Return whether a program has its own answer to SIGTERM already."""
     status = Path(f"/proc/{child.pid}/status").read_text()
@@ -76,12 +69,6 @@ def children_of(pid: int) -> list[int]:
         for task in Path(f"/proc/{pid}/task").iterdir()
         for number in (task / "children").read_text().split()
     ]
-
-
-def is_running(pid: int) -> bool:
-    with suppress(OSError):
-        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
-    return False
 
 
 COMMANDS = {
@@ -107,7 +94,7 @@ MORE = [
 
 def end(start, folder: Path, name: str, number: signal.Signals, wait: float) -> None:
     child = start(*COMMANDS[name])
-    wait_for(lambda: heeds_signals(child))
+    wait_until(lambda: heeds_signals(child))
     time.sleep(wait)
     child.send_signal(number)
     _, err = child.communicate(timeout=60)
@@ -131,14 +118,14 @@ def test_a_signal_ends_a_command_at_any_moment(square, start, name, number, wait
 @pytest.mark.slow
 def test_nothing_is_left_of_a_film_that_is_ended(square, start):
     child = start(*COMMANDS["film"][:-2], "--between", "50")
-    wait_for(lambda: drafts(square) and children_of(child.pid))
+    wait_until(lambda: drafts(square) and children_of(child.pid))
     programs = children_of(child.pid)
     child.send_signal(signal.SIGTERM)
     _, err = child.communicate(timeout=60)
     assert child.returncode == 143
     assert err.endswith(SAID[signal.SIGTERM])
     assert drafts(square) == []
-    wait_for(lambda: not any(map(is_running, programs)))
+    wait_until(lambda: not any(map(is_running, programs)))
 
 
 def test_what_a_killed_run_left_is_removed_by_the_next(square):
@@ -147,7 +134,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next(square):
         "with draft(Path()) as file: file.touch(); time.sleep(300)"
     )
     child = subprocess.Popen([sys.executable, "-c", code], cwd=square)
-    wait_for(lambda: drafts(square))
+    wait_until(lambda: drafts(square))
     child.kill()
     child.wait()
     assert drafts(square)

@@ -8,12 +8,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from slideviz.cli import run
 from slideviz.design.sweeps import sweep as sweeping
+from tests.processes import wait_until
 
 
 @pytest.fixture
@@ -157,10 +157,7 @@ def test_a_signal_ends_it_and_resume_goes_on(folder, number):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as child:
         results = folder / "out" / "results.csv"
-        give_up = time.monotonic() + 60
-        while not results.exists() or results.read_bytes().count(b"\n") < 4:
-            assert time.monotonic() < give_up
-            time.sleep(0.02)
+        wait_until(lambda: results.exists() and results.read_bytes().count(b"\n") >= 4)
         child.send_signal(number)
         _, err = child.communicate(timeout=60)
     assert child.returncode == 128 + number

@@ -2,8 +2,6 @@
 
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ from slideviz.formats import files
 from slideviz.formats.files import read, write
 from slideviz.formats.meshio.bridge import read_with_meshio
 from tests.formats.su2_samples import SOLID, assert_same, save
+from tests.processes import is_running, wait_until
 
 NETGEN = """\
 mesh3d
@@ -158,10 +157,7 @@ def test_the_reader_does_not_outlive_a_killed_program():
         "reader.wait()\n"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as parent:
-        reader = Path(f"/proc/{int(parent.stdout.readline())}/stat")
-        assert reader.exists()
+        reader = int(parent.stdout.readline())
+        assert is_running(reader)
         parent.kill()
-    give_up = time.monotonic() + 60
-    while reader.exists() and ") Z " not in reader.read_text():
-        assert time.monotonic() < give_up
-        time.sleep(0.01)
+    wait_until(lambda: not is_running(reader))

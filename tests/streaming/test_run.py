@@ -357,8 +357,8 @@ def slow(*a):
     print("writes", flush=True)
     time.sleep(0.05)
     return move(*a)
-output.write_points, output.CHUNK = slow, 30
-sys.exit(run(["run", *sys.argv[1:], "-q", "--stream"]))
+output.write_points, output.CHUNK = slow, int(sys.argv[1])
+sys.exit(run(["run", *sys.argv[2:], "-q", "--stream"]))
 """
 ROOT = Path(sv.__file__).parents[1]
 
@@ -370,7 +370,8 @@ def test_a_signal_leaves_nothing(tmp_path, number, words):
     made(tmp_path, "square", 25)
     out = tmp_path / "out.su2b"
     out.write_bytes(b"older")
-    call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), "-o", str(out)]
+    # In so many parts that it is not done before the signal.
+    call = [sys.executable, "-c", SCRIPT, "1", str(tmp_path / "square.cfg"), "-o", str(out)]
     pipe = subprocess.PIPE
     process = subprocess.Popen(call, cwd=ROOT, stdout=pipe, stderr=pipe, text=True)
     assert process.stdout.read(6) == "writes"
@@ -727,7 +728,7 @@ def test_killing_it_at_random_moments_leaves_no_half_mesh(tmp_path):
     case.change(steps=2).write(tmp_path / "square.cfg")
     out, reference = tmp_path / "out.su2b", tmp_path / "reference.su2b"
     stream(sv.Case.read(tmp_path / "square.cfg"), reference)
-    call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), "-o", str(out)]
+    call = [sys.executable, "-c", SCRIPT, "30", str(tmp_path / "square.cfg"), "-o", str(out)]
     begin = time.monotonic()
     subprocess.run(call, check=True, cwd=ROOT)
     usual = time.monotonic() - begin
