@@ -3,6 +3,7 @@ import os
 import shutil
 import threading
 import weakref
+from functools import partial
 
 import pytest
 
@@ -23,6 +24,7 @@ else:
     from slideviz.session.state import Session, StepFrame
     from slideviz.session.store import Store
 
+PATIENCE_MS = 100_000
 
 DIALOGS = (
     "ask_open",
@@ -89,6 +91,14 @@ def answers(monkeypatch):
 
 
 @pytest.fixture
+def qtbot(qtbot):
+    """Wait as long as a test may take: no test fails because a machine was busy for a while."""
+    for name in ("waitUntil", "waitSignal", "waitExposed"):
+        setattr(qtbot, name, partial(getattr(qtbot, name), timeout=PATIENCE_MS))
+    return qtbot
+
+
+@pytest.fixture
 def settings(tmp_path):
     return QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
 
@@ -126,6 +136,7 @@ class Painting:
 @pytest.fixture(scope="session", autouse=True)
 def painting():
     Painting.replace()
+    return Painting
 
 
 @pytest.fixture
@@ -182,13 +193,13 @@ def shared_windows(qapp, tmp_path_factory):
 def show(window):
     """Show a window, and make it the active one: shortcuts belong to it."""
     window.show()
-    assert QTest.qWaitForWindowExposed(window)
+    assert QTest.qWaitForWindowExposed(window, PATIENCE_MS)
     activate(window)
 
 
 def activate(window):
     window.activateWindow()
-    assert QTest.qWaitForWindowActive(window)
+    assert QTest.qWaitForWindowActive(window, PATIENCE_MS)
 
 
 def close_unsaved(window):
@@ -203,7 +214,7 @@ def reset(window, qtbot):
     for dialog in window.findChildren(QDialog):
         dialog.close()
     window.running.cancel()
-    qtbot.waitUntil(lambda: not window.runner.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not window.runner.busy)
     window.player.stop()
     window.exports.end()
     window.store.put(Session())
@@ -306,9 +317,9 @@ class Driver:
         self.window.activateWindow()
         self.qtbot.waitUntil(self.window.isActiveWindow)
 
-    def settle(self, timeout=60_000):
+    def settle(self):
         """Wait until no job runs."""
-        self.qtbot.waitUntil(lambda: not self.window.runner.busy, timeout=timeout)
+        self.qtbot.waitUntil(lambda: not self.window.runner.busy)
 
     def open(self, path):
         self.window.files.open_path(path)

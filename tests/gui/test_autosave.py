@@ -388,7 +388,7 @@ def test_a_program_that_was_killed_leaves_its_session(tmp_path, folder, case_fil
 
 def run_in(window, qtbot):
     window.start_run()
-    qtbot.waitUntil(lambda: not window.runner.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not window.runner.busy)
     assert window.store.session.unsaved_mesh
 
 
@@ -410,7 +410,7 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
     monkeypatch.setattr(questions, "ask_save", lambda *_: next(names))
     window.store.change(changes.show_frame, 1)
     assert not window.close(), "first the mesh is written"
-    qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
+    qtbot.waitUntil(lambda: not window.isVisible())
     assert [can for _, can in asked] == [("case", "mesh")]
     assert "the deformed mesh of run 1" in asked[0][0]
     assert (tmp_path / "out.cfg").is_file()
@@ -431,7 +431,7 @@ def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, an
     file = tmp_path / {"case": "out.cfg", "mesh": "out.su2"}[answer]
     monkeypatch.setattr(questions, "ask_save", lambda *_: file)
     window.close()
-    qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
+    qtbot.waitUntil(lambda: not window.isVisible())
     assert file.is_file()
 
 

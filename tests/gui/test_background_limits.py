@@ -19,7 +19,7 @@ def test_limits_are_checked_on_what_is_shown_and_rings_are_at_cells_that_fail(wi
     store, scene = shown.window.store, shown.window.scene
 
     def results():
-        shown.qtbot.waitUntil(lambda: store.session.limit_results is not None, timeout=60_000)
+        shown.qtbot.waitUntil(lambda: store.session.limit_results is not None)
         return store.session.limit_results
 
     assert results() == ()

@@ -194,9 +194,9 @@ def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbo
 
 def drawn_kind(panel, kind, qtbot):
     """Choose a plot, wait until it is drawn, and return its figure."""
-    with qtbot.waitSignal(panel.canvas.drawn, timeout=60_000):
+    with qtbot.waitSignal(panel.canvas.drawn):
         choose(panel, kind)
-    qtbot.waitUntil(lambda: not panel.canvas.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not panel.canvas.busy)
     return panel.canvas.figure
 
 
@@ -204,7 +204,7 @@ def test_of_a_machine_the_meridional_view_throat_and_span_are_drawn(panel, qtbot
     mesh = passage((2, 6, 6), 40.0)
     roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
     case = Case(roles=roles, periodic_type="rotational")
-    with qtbot.waitSignal(panel.canvas.drawn, timeout=60_000):
+    with qtbot.waitSignal(panel.canvas.drawn):
         panel.kind.show_value("meridional")
         panel.store.put(open_mesh(StepFrame(mesh, quality(mesh)), None, (), case))
     view, bar = drawn_kind(panel, "meridional", qtbot).axes

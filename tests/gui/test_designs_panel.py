@@ -48,7 +48,7 @@ def fill(panel, column, values):
 def run(panel, qtbot):
     QTest.mouseClick(panel.run, LEFT)
     assert panel.runner.busy
-    qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not panel.runner.busy)
 
 
 def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, driver):
@@ -129,7 +129,7 @@ def test_a_design_is_shown_only_when_it_is_whole_and_computed_once(window, passa
     driver.settle()
     assert status.text() == "Design 1 is shown."
     panel.show_design(2)
-    qtbot.waitUntil(lambda: len(window.store.session.frames) > 2, timeout=60_000)
+    qtbot.waitUntil(lambda: len(window.store.session.frames) > 2)
     # A second click, as of a double click, does not begin it anew.
     panel.show_design(2)
     assert len(window.store.session.frames) > 2
@@ -392,9 +392,9 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     panel = passage
     fill(panel, "airfoil.rotate.angle_deg", "-6 to 0 in 500")
     QTest.mouseClick(panel.run, LEFT)
-    qtbot.waitUntil(lambda: len(panel.table.results) > 1, timeout=60_000)
+    qtbot.waitUntil(lambda: len(panel.table.results) > 1)
     QTest.mouseClick(panel.stop, LEFT)
-    qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not panel.runner.busy)
     assert panel.status.label.text() == "Stopped; the results are kept."
     assert 1 < len(panel.table.results) < 500
 
@@ -483,7 +483,7 @@ def test_closing_asks_about_designs_that_go_on(
     assert "(1 of 500 designs done)" in now()
     assert passage.runner.busy
     # What is done can be saved before it is stopped.
-    qtbot.waitUntil(lambda: len(passage.table.results) > 1, timeout=60_000)
+    qtbot.waitUntil(lambda: len(passage.table.results) > 1)
     asked = answers("ask_unsaved", "table")
     answers("ask_save", tmp_path / "out.csv")
     assert window.close()

@@ -17,17 +17,11 @@ from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
+from tests.windows import come_to_rest
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
 SMALL = 1280, 800
-
-
-def settled(qtbot, window):
-    """Wait until the layout has followed."""
-    qtbot.wait(30)
-    QApplication.processEvents()
-    return window
 
 
 @pytest.fixture
@@ -39,7 +33,7 @@ def method(driver, sample_folder, qtbot):
     window.dock_manager.bring_to_front("method")
     driver.window.store.change(changes.set_case, reduction=Reduction(multilevel=True))
     driver.click(window.method.more.button)
-    settled(qtbot, window)
+    come_to_rest()
     return window.method
 
 
@@ -155,7 +149,8 @@ def start(qtbot, settings, monkeypatch):
             window.resize(*size)
         with qtbot.waitExposed(window):
             window.show()
-        return settled(qtbot, window)
+        come_to_rest()
+        return window
 
     return make
 
@@ -164,7 +159,7 @@ def share(window, qtbot, left, right):
     """Drag the edges of the view, as with the mouse."""
     docks = [window.docks[name] for name in ("boundaries", "histogram")]
     window.resizeDocks(docks, [left, right], Qt.Orientation.Horizontal)
-    settled(qtbot, window)
+    come_to_rest()
 
 
 def test_the_layout_comes_back_after_a_restart(start, qtbot, monkeypatch):
@@ -173,7 +168,7 @@ def test_the_layout_comes_back_after_a_restart(start, qtbot, monkeypatch):
     first.docks["log"].show()
     first.docks["sections"].hide()
     first.docks["worst"].raise_()
-    settled(qtbot, first)
+    come_to_rest()
     before = widths(first)
     assert before["boundaries"] == pytest.approx(LEFT_WIDTH + 60, abs=3)
     close(first, monkeypatch)
@@ -196,7 +191,7 @@ def test_the_layout_can_be_put_back(start, qtbot, monkeypatch):
     assert widths(second) != at_first
     assert second.docks["method"].isFloating()
     second.actions_table.by_name["restore_layout"].trigger()
-    settled(qtbot, second)
+    come_to_rest()
     assert widths(second) == at_first
     assert not second.docks["method"].isFloating()
     assert second.docks["sections"].isVisibleTo(second)
@@ -229,7 +224,7 @@ def test_names_are_whole_in_a_window_of_1024_pixels(driver, sample_folder, tmp_p
     window.dock_manager.bring_to_front("limits")
     for width, height in ((1024, 700), (1280, 800), (1024, 700)):
         window.resize(width, height)
-        settled(driver.qtbot, window)
+        come_to_rest()
         assert table.columnWidth(0) >= table.sizeHintForColumn(0)
         longest = max(map(table.fontMetrics().horizontalAdvance, names.values()))
         assert table.columnWidth(0) > longest
@@ -255,7 +250,7 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
     docks = window.docks
     for size in ((720, 450), (720, 410), (1280, 800), (900, 620), (720, 410)):
         window.resize(*size)
-        settled(qtbot, window)
+        come_to_rest()
         assert (window.width(), window.height()) == size
         low = size[1] < 600
         beside = window.tabifiedDockWidgets(docks["boundaries"])
@@ -267,7 +262,7 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
     qtbot.waitUntil(lambda: not window.runner.busy)
     for dock in ("motion", "method", "worst", "limits", "curves", "sections", "display", "designs"):
         window.dock_manager.bring_to_front(dock)
-        settled(qtbot, window)
+        come_to_rest()
         assert overlaps(window) == set(), dock
         assert run_is_seen(window)
     port = window.motions.parentWidget()
@@ -276,12 +271,12 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
     docks["designs"].hide()
     window.dock_manager.bring_to_front("method")
     window.resize(1280, 800)
-    settled(qtbot, window)
+    come_to_rest()
     assert not docks["method"].visibleRegion().isEmpty()
     assert not docks["boundaries"].visibleRegion().isEmpty()
     window.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, docks["method"])
     window.resize(720, 410)
-    settled(qtbot, window)
+    come_to_rest()
     assert window.tabifiedDockWidgets(docks["boundaries"]) == []
     assert run_is_seen(window)
 
@@ -294,18 +289,18 @@ def test_sides_follow_the_window_until_they_are_moved_also_after_a_restart(
     second = start()
     narrow = widths(second)
     second.resize(1800, 900)
-    settled(qtbot, second)
+    come_to_rest()
     wide = widths(second)
     assert all(wide[name] > narrow[name] + 20 for name in wide)
     share(second, qtbot, LEFT_WIDTH + 30, RIGHT_WIDTH + 40)
     moved = widths(second)
     second.resize(1900, 900)
-    settled(qtbot, second)
+    come_to_rest()
     assert widths(second) == pytest.approx(moved, abs=3)
     close(second, monkeypatch)
     third = start()
     third.resize(1700, 900)
-    settled(qtbot, third)
+    come_to_rest()
     assert widths(third) == pytest.approx(moved, abs=3)
 
 
@@ -328,7 +323,7 @@ def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch)
     assert not is_titled(docks["curves"])
     bar, at = tab_of(window, "Curves")
     QTest.mouseDClick(bar, Qt.MouseButton.LeftButton, pos=at)
-    settled(qtbot, window)
+    come_to_rest()
     assert docks["curves"].isFloating()
     assert is_titled(docks["curves"])
     assert docks["curves"].isVisible()
@@ -338,7 +333,7 @@ def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch)
     again = start()
     assert again.docks["curves"].isFloating()
     again.actions_table.by_name["restore_layout"].trigger()
-    settled(qtbot, again)
+    come_to_rest()
     assert not again.docks["curves"].isFloating()
     assert not is_titled(again.docks["curves"])
     tab_of(again, "Curves")
@@ -348,11 +343,11 @@ def test_a_panel_without_a_tab_has_a_title_and_the_menu_of_a_tab_closes_it(start
     window = start(SMALL)
     for name in ("worst", "limits", "curves"):
         window.docks[name].close()
-    settled(qtbot, window)
+    come_to_rest()
     assert is_titled(window.docks["histogram"])
     assert not is_titled(window.docks["run"]), "its button names it"
     window.docks["worst"].show()
-    settled(qtbot, window)
+    come_to_rest()
     assert not is_titled(window.docks["histogram"])
     assert run_is_seen(window)
     window = start(SMALL)
@@ -361,7 +356,7 @@ def test_a_panel_without_a_tab_has_a_title_and_the_menu_of_a_tab_closes_it(start
     texts["Own window"].trigger()
     assert window.docks["runs"].isFloating()
     texts["Close"].trigger()
-    settled(qtbot, window)
+    come_to_rest()
     assert not window.docks["runs"].isVisible()
 
 
@@ -414,12 +409,12 @@ def test_keys_go_from_panel_to_panel_behind_tabs_too(driver, sample_folder, qtbo
     docks.bring_to_front("motion")
     for key, name in ((Qt.Key.Key_PageDown, "method"), (Qt.Key.Key_PageUp, "motion")):
         QTest.keyClick(window.focusWidget(), key, Qt.KeyboardModifier.ControlModifier)
-        settled(qtbot, window)
+        come_to_rest()
         assert window.docks[name].isAncestorOf(window.focusWidget())
         assert not window.docks[name].visibleRegion().isEmpty()
     seen = []
     for _ in range(12):
         docks.bring_next()
-        settled(qtbot, window)
+        come_to_rest()
         seen += [k for k, one in window.docks.items() if one.isAncestorOf(window.focusWidget())]
     assert set(seen) == {k for k, one in window.docks.items() if not one.isHidden()}

@@ -276,7 +276,7 @@ def test_a_film_is_made_while_the_window_goes_on(ran, film, answers, tmp_path, q
     timer = QTimer()
     timer.timeout.connect(lambda: turns.append(film.bar.value()))
     timer.start(0)
-    with qtbot.waitSignal(film.made, timeout=30_000):
+    with qtbot.waitSignal(film.made):
         film.make.click()
         assert film.filming
         ran.window.store.change(changes.show_frame, 1)
@@ -295,7 +295,7 @@ def test_pictures_of_a_film_get_a_new_folder(ran, film, answers, tmp_path, qtbot
     film.form.kind.show_value("")
     film.form._kind_chosen("")
     assert not film.form.fps.isEnabled()
-    with qtbot.waitSignal(film.made, timeout=30_000):
+    with qtbot.waitSignal(film.made):
         film.make.click()
     assert len(list((tmp_path / "passage_steps_2").glob("*.png"))) == 3
     assert not list((tmp_path / "passage_steps").iterdir())
@@ -336,7 +336,7 @@ def test_a_film_that_fails_is_told_and_with_an_error_nobody_expected_not_finishe
 ):
     answers("ask_save", tmp_path / "no" / "out.gif")
     film.form.kind.show_value(".gif")
-    with qtbot.waitSignal(film.failed, timeout=10_000):
+    with qtbot.waitSignal(film.failed):
         film.make.click()
     assert "folder" in ran.window.banner.text.text()
     assert not film.filming
@@ -346,7 +346,7 @@ def test_a_film_that_fails_is_told_and_with_an_error_nobody_expected_not_finishe
     made = []
     film.made.connect(made.append)
     monkeypatch.setattr(film_module, "film_frame_at", None)
-    with qtbot.waitSignal(film.failed, timeout=10_000):
+    with qtbot.waitSignal(film.failed):
         film.make.click()
     qtbot.wait(50)
     assert not made
@@ -401,7 +401,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
     answers("ask_save", tmp_path / "out.gif")
     film.form.kind.show_value(".gif")
     film.form.between.setValue(1)
-    with qtbot.waitSignal(film.made, timeout=30_000):
+    with qtbot.waitSignal(film.made):
         film.make.click()
     for where in threads.values():
         assert where

@@ -16,6 +16,7 @@ from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import IN_FILE
 from slideviz.solver.deform import deform
 from tests.builders import stage
+from tests.windows import come_to_rest
 
 pytestmark = pytest.mark.window("shared")
 
@@ -36,8 +37,8 @@ def stator(driver, folder, monkeypatch):
 
 def waited(stator):
     reader = stator.window.section_reader
-    stator.qtbot.waitUntil(lambda: not reader.busy, timeout=20_000)
-    stator.qtbot.wait(5)
+    stator.qtbot.waitUntil(lambda: not reader.busy)
+    come_to_rest()
 
 
 def add(stator, section):

@@ -33,7 +33,7 @@ def cycle(qtbot, settings, path):
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     window.store.change(changes.set_case, steps=2)
     window.start_run()
-    qtbot.waitUntil(lambda: not window.runner.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not window.runner.busy)
     session = window.store.session
     assert len(session.frames) == 3
     gone = [

@@ -167,7 +167,7 @@ def test_a_file_with_mistakes_is_told_as_it_is_chosen(blade, tmp_path, qtbot):
     blade.add_motion(FromFile)
     blade.type(editor(blade).path, str(file))
     told = blade.window.run_panel.text
-    qtbot.waitUntil(lambda: "table.txt:1: " in told.text(), timeout=10_000)
+    qtbot.waitUntil(lambda: "table.txt:1: " in told.text())
     assert not blade.window.run_panel.run.isEnabled()
 
 

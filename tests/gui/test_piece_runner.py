@@ -128,9 +128,10 @@ def test_stopping_ends_what_is_done_beside_and_tells_nothing(runner, qtbot):
 
 
 def test_other_work_takes_the_place_of_what_goes_on(runner, qtbot):
-    emitted, ends = Emitted(runner), []
+    emitted, begun, ends = Emitted(runner), threading.Event(), []
 
     def endless():
+        begun.set()
         try:
             while True:
                 yield None
@@ -138,7 +139,7 @@ def test_other_work_takes_the_place_of_what_goes_on(runner, qtbot):
             ends.append("first")
 
     runner.start(endless())
-    qtbot.wait(20)
+    qtbot.waitUntil(begun.is_set)
     runner.start(iter_of("second"))
     assert ends == ["first"]
     qtbot.waitUntil(lambda: not runner.busy)

@@ -169,11 +169,11 @@ def test_what_is_dragged_beside_it_turns_the_view(window, panel):
     assert sections(window) == before
 
 
-def test_what_the_mouse_would_take_is_shown(window, panel):
+def test_what_the_mouse_would_take_is_shown(window, panel, qtbot):
     at = QPoint(*pixel(window.view, ball(window)).round().astype(int))
     shapes = Qt.CursorShape
     QTest.mouseMove(window.view, at)
-    assert window.view.cursor().shape() == shapes.SizeAllCursor
+    qtbot.waitUntil(lambda: window.view.cursor().shape() == shapes.SizeAllCursor)
     assert len(blue(window.view)) < 10
     # It goes from below the mouse by itself.
     window.viewing.look_from("+z")

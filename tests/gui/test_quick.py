@@ -21,6 +21,7 @@ from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.widgets import plot_canvas
 from slideviz.gui.widgets.build import QuietBar
 from slideviz.plots.style import PRINT
+from tests.windows import come_to_rest
 
 
 class Painted(QObject):
@@ -55,7 +56,8 @@ def framed_view(qtbot):
     qtbot.addWidget(frame, before_close_func=lambda one: one.view.close())
     with qtbot.waitExposed(frame):
         frame.show()
-    qtbot.wait(50)
+    come_to_rest()
+    qtbot.waitUntil(lambda: not frame.view._repaints._timer.isActive())
     return frame
 
 

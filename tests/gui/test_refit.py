@@ -6,6 +6,7 @@ import pytest
 from slideviz.case.motions.rigid import Translate
 from slideviz.session import changes
 from slideviz.session.saving import view_to_case
+from tests.windows import come_to_rest
 
 
 @pytest.mark.parametrize("zoomed", [False, True])
@@ -32,7 +33,7 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
 
 
 def scale_of(driver):
-    driver.qtbot.wait(60)
+    come_to_rest()
     return driver.window.view.camera.parallel_scale
 
 

@@ -54,7 +54,7 @@ def test_cancel_at_ten_random_moments_of_a_3d_run(driver, case_file):
         window.start_run()
         driver.qtbot.wait(round(1000 * rng.uniform(0.0, 0.5 * whole)))
         window.running.cancel()
-        driver.settle(timeout=10_000)
+        driver.settle()
         ends.append(sound(driver.session).end)
         assert window.run_panel.run.isVisible()
         assert window.run_panel.run.isEnabled()
@@ -77,7 +77,7 @@ def test_opening_can_be_cancelled_at_any_moment_and_keeps_what_is_open(driver, c
         window.files.open_path(case_file)
         driver.qtbot.wait(pause)
         window.running.cancel()
-        driver.settle(timeout=10_000)
+        driver.settle()
         assert driver.session.mesh is not None
         assert not window.banner.isVisible()
     assert len(before.points) == len(driver.session.mesh.points)
@@ -133,7 +133,7 @@ def test_a_window_that_saves_closes_when_the_mesh_is_written(
     write = jobs.save_mesh
 
     def slow(*values, **named):
-        assert go.wait(20)
+        assert go.wait(100)
         return write(*values, **named)
 
     monkeypatch.setattr(jobs, "save_mesh", slow)
@@ -142,7 +142,7 @@ def test_a_window_that_saves_closes_when_the_mesh_is_written(
     assert not driver.window.close()
     assert driver.window.isVisible()
     go.set()
-    driver.qtbot.waitUntil(lambda: not driver.window.isVisible(), timeout=20_000)
+    driver.qtbot.waitUntil(lambda: not driver.window.isVisible())
     assert target.is_file()
 
 
@@ -150,7 +150,7 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
     monkeypatch.setattr(worker, "CLOSING_S", 0.05)
     driver.open(case_file)
     go = threading.Event()
-    driver.window.running.start_job("Deaf", lambda _: None, lambda report, stopped: go.wait(60))
+    driver.window.running.start_job("Deaf", lambda _: None, lambda report, stopped: go.wait(100))
     try:
         assert driver.window.close()
         assert driver.window.left_behind
@@ -160,19 +160,19 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
 
 
 def test_a_large_mesh_appears_part_by_part_but_a_picture_is_whole_and_what_is_hidden_stays_so(
-    driver, case_file, monkeypatch
+    driver, case_file, monkeypatch, painting
 ):
     from slideviz.gui.viewport import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
-    driver.open(case_file)
     view = driver.window.view
-    assert view._veiled, "the first part only"
-    driver.qtbot.waitUntil(lambda: not view._veiled, timeout=20_000)
+    with driver.qtbot.waitSignal(view.signals.unveiled):
+        driver.open(case_file)
     for name, one in driver.window.scene.drawn.items():
         assert one.actor.visibility, name
+    monkeypatch.setattr(painting, "is_on", False)
     driver.open(case_file)
-    assert view._veiled
+    assert view._veiled, "the first part only"
     early = view.snapshot()
     assert not view._veiled
     assert (early == view.snapshot()).mean() > 0.999
@@ -180,7 +180,9 @@ def test_a_large_mesh_appears_part_by_part_but_a_picture_is_whole_and_what_is_hi
     assert view._veiled
     name = driver.session.mesh.marker_names[-1]
     driver.window.store.change(changes.show_boundaries, (name,), False)
-    driver.qtbot.waitUntil(lambda: not view._veiled, timeout=20_000)
+    monkeypatch.setattr(painting, "is_on", True)
+    view.update()
+    driver.qtbot.waitUntil(lambda: not view._veiled)
     assert not driver.window.scene.drawn[name].actor.visibility
     assert driver.window.scene.drawn[driver.session.mesh.marker_names[0]].actor.visibility
 

@@ -236,11 +236,14 @@ def open_and_choose(driver, button, text):
     failed = []
 
     def go():
+        if (menu := QApplication.activePopupWidget()) is None:
+            QTimer.singleShot(50, go)
+            return
         try:
-            choose(driver, QApplication.activePopupWidget(), text)
+            choose(driver, menu, text)
         except BaseException as error:
             failed.append(error)
-            QApplication.activePopupWidget().close()
+            menu.close()
 
     QTimer.singleShot(50, go)
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)

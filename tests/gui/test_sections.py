@@ -595,7 +595,7 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
     driver.settle()
     assert [row.label for row in view.rows] == ["undeformed", "run 1"]
     assert view.facts.text() != before
-    driver.qtbot.waitUntil(lambda: not view.area.canvas.busy, timeout=20_000)
+    driver.qtbot.waitUntil(lambda: not view.area.canvas.busy)
     drawn = {line.get_gid() for line in view.area.canvas.figure.axes[0].get_lines()}
     assert drawn == {"along:undeformed", "along:run 1"}
     cell = int(view.rows[-1].curve.cells[3])

@@ -11,6 +11,7 @@ from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from tests.windows import come_to_rest
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +77,15 @@ def test_a_mouse_that_rests_shows_all_facets_and_a_quick_picture_is_never_made_c
 
 def test_a_movement_of_the_mouse_is_drawn_once(stator, qtbot):
     view = stator.window.view
-    qtbot.wait(50)
+    come_to_rest()
     drawn = []
     tag = view.renderer.AddObserver("EndEvent", lambda *_: drawn.append(1))
     QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(150, 150))
-    qtbot.wait(50)
+    come_to_rest()
     counts = []
     for x in (180, 210, 240):
+        qtbot.waitUntil(lambda: not view._repaints._timer.isActive())
+        come_to_rest()
         drawn.clear()
         QTest.mouseMove(view, QPoint(x, 150))
         assert not drawn

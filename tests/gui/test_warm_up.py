@@ -24,10 +24,10 @@ def work(monkeypatch):
 
         def __call__(self, compiling, stopped):
             self.stopped, self.thread = stopped, current_thread()
-            assert self.compile.wait(20)
+            assert self.compile.wait(100)
             compiling()
             compiling()
-            assert self.end.wait(20)
+            assert self.end.wait(100)
 
     made = Work()
     made.compile, made.end = Event(), Event()
@@ -62,7 +62,7 @@ def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work)
 
 def test_a_job_that_waits_for_compilation_says_so(window, qtbot, work):
     text, end = window.run_panel.text, Event()
-    window.running.start_job("Reading a.su2", lambda _: None, lambda *_: end.wait(20))
+    window.running.start_job("Reading a.su2", lambda _: None, lambda *_: end.wait(100))
     window.warmup.start()
     assert text.text() == "Reading a.su2"
     work.compile.set()

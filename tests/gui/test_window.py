@@ -27,6 +27,7 @@ from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import end_parts
 from slideviz.session.runs_words import describe_run
+from tests.windows import come_to_rest
 
 pytestmark = pytest.mark.window("shared")
 DONE = "he motion could go "
@@ -118,7 +119,7 @@ def test_dropping_a_file_opens_it_and_so_does_the_menu(driver, passage_file, ans
     QApplication.sendEvent(
         driver.window, QDropEvent(QPointF(500, 300), action, data, buttons, keys)
     )
-    driver.qtbot.waitUntil(lambda: driver.session.mesh is not None, timeout=20_000)
+    driver.qtbot.waitUntil(lambda: driver.session.mesh is not None)
     assert driver.session.path == Path(passage_file)
     assert not driver.window.view.acceptDrops(), "the view would read the file in its own way"
     other = Path(passage_file).rename(Path(passage_file).with_name("other.su2"))
@@ -719,11 +720,11 @@ def test_cancel_keeps_the_steps_that_are_done(ready, answers, tmp_path):
     window = ready.window
     window.store.change(changes.set_case, steps=2000)
     ready.click(window.run_panel.run)
-    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 3, timeout=60_000)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 3)
     assert window.run_panel.cancel.isVisible()
     assert not window.run_panel.run.isVisible()
     ready.click(window.run_panel.cancel)
-    ready.settle(5_000)
+    ready.settle()
     count = len(ready.session.frames)
     assert 3 < count < 2000
     assert ready.session.deformed.step.index == count - 1
@@ -891,9 +892,9 @@ def test_opening_while_running_cancels_the_run(ready, passage_file, answers):
     answers("ask_unsaved", "discard")
     ready.window.store.change(changes.set_case, steps=2000)
     ready.click(ready.window.run_panel.run)
-    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1, timeout=60_000)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1)
     ready.window.files.open_path(Path(passage_file))
-    ready.qtbot.waitUntil(lambda: ready.session.path == Path(passage_file), timeout=20_000)
+    ready.qtbot.waitUntil(lambda: ready.session.path == Path(passage_file))
     ready.settle()
     assert len(ready.session.frames) == 1
 
@@ -903,7 +904,7 @@ def test_closing_while_running_ends_the_run(ready, answers):
     asked = answers("ask_unsaved", "discard")
     ready.window.store.change(changes.set_case, steps=2000)
     ready.click(ready.window.run_panel.run)
-    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1, timeout=60_000)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1)
     assert ready.window.close()
     assert len(asked) == 1
     assert not ready.window.isVisible()
@@ -915,7 +916,7 @@ def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkey
     window = ready.window
     window.store.change(changes.set_case, steps=2000)
     ready.click(window.run_panel.run)
-    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 2, timeout=60_000)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 2)
     replies, asked = iter(["cancel", "again", "run", "cancel", "discard"]), []
 
     def reply(_parent, question, can_save, now):
@@ -1003,11 +1004,11 @@ def test_a_saved_view_is_shown_again_after_it_was_opened_in_a_narrower_window(
     answers("ask_save", tmp_path / "a.cfg")
     window.actions_table.by_name["save_case"].trigger()
     window.resize(900, size.height())
-    opened.qtbot.wait(50)
+    come_to_rest()
     opened.open(tmp_path / "a.cfg")
     assert camera.place[9] > 1.2 * saved[9], "all its width is seen"
     window.resize(size)
-    opened.qtbot.wait(50)
+    come_to_rest()
     assert camera.place == pytest.approx(saved, abs=1e-9)
 
 
@@ -1159,7 +1160,7 @@ def test_themes_change_the_view_and_are_remembered(opened, settings):
 def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     window = ready.window
     window.resize(1280, 800)
-    ready.qtbot.wait(50)
+    come_to_rest()
     assert (window.width(), window.height()) == (1280, 800)
     for name in ("motion", "method"):
         window.docks[name].raise_()
@@ -1173,7 +1174,7 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     places, before = set(), window.run_panel.text.text()
     for lines in (1, 2, 3, 5, 8):
         window.run_panel.text.setText("<br>".join(["A line."] * lines))
-        ready.qtbot.wait(30)
+        come_to_rest()
         places.add(window.run_panel.run.mapTo(window, QPoint(0, 0)).y())
     assert len(places) == 1
     window.run_panel.text.setText(before)
@@ -1199,7 +1200,7 @@ def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
     view, drawn = opened.window.view, []
     checks = (opened.window.intersection_check, opened.window.limit_check)
     opened.qtbot.waitUntil(lambda: not any(check.busy for check in checks))
-    opened.qtbot.wait(50)
+    opened.qtbot.waitUntil(lambda: not view._repaints._timer.isActive())
     monkeypatch.setattr(view, "update", lambda: drawn.append(1))
     for name in ("inflow", "outflow", "inflow"):
         opened.window.store.change(changes.select, (name,))
