@@ -18,10 +18,9 @@ import numpy as np
 from numba import prange
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf import compiled
-from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_cos
+from slideviz.rbf.compiled import OPTIONS, squared_distance
 from slideviz.rbf.constraint_rows import merge
-from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
+from slideviz.rbf.evaluate import Basis, Tick, no_tick, padded_rows, summed
 from slideviz.rbf.methods import largest_norm, within
 from slideviz.rbf.operations import columns
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
@@ -62,28 +61,15 @@ def weighted_means(
     (k, n), as ``Frame.features`` gives them. ``values`` and ``weights``: v_j (n, d) and g_j (n,).
     ``power``: c. ``tick``: called between chunks with the fraction done; may raise to stop.
     """
-    # Features 1 and 2 of a rotational period are sine and cosine, not lengths: they are not scaled.
-    scale = np.full((4, 1), 1.0 / basis.radius)
-    if basis.period > 0:
-        scale[1:3] = 1.0
-    x = padded_rows(targets, 4) * scale
-    c = padded_rows(sources, 4) * scale
+    c = padded_rows(sources, 4)
     v = padded_rows(values.T, 3)
     g = np.ascontiguousarray(weights, float)
-    total = x.shape[1]
-    out = np.empty((3, total))
-    size = max(1, CHUNK // max(1, c.shape[1]))
-    for start in range(0, total, size):
-        part = np.ascontiguousarray(x[:, start : start + size])
-        result = np.empty_like(part[:3])
-        with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
-            if basis.period > 0:
-                weigh_rotational(part, c, v, g, power, basis.period_over_pi, result)
-            else:
-                weigh(part, c, v, g, power, result)
-        out[:, start : start + size] = result
-        tick(min(1.0, (start + size) / total))
-    return np.ascontiguousarray(out[: values.shape[1]].T)
+    metric = basis.period_over_pi, 1.0 / basis.radius**2
+
+    def add_up(x: FloatArray, out: FloatArray) -> None:
+        weigh(x, c, v, g, power, *metric, out)
+
+    return summed(add_up, targets, c, values.shape[1], tick)
 
 
 def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
@@ -170,12 +156,9 @@ def _weight(squared, power):  # type: ignore[no-untyped-def]
     return squared ** (-0.5 * power)
 
 
-@njit(parallel=True, **OPTIONS)
-def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
-    """Write the weighted means at targets x (4, N) to out (3, N), for the Euclidean distance.
-
-    Of values w (3, n) at sources c (4, n), with weights g (n,) besides that of the distance.
-    """
+@njit(inline="always", **OPTIONS)
+def _mean(x, c, w, g, power, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
+    """Write the weighted mean at one target x (4,) to out (3,); parameters as of ``weigh``."""
     c0 = c[0]
     c1 = c[1]
     c2 = c[2]
@@ -183,93 +166,38 @@ def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
     w0 = w[0]
     w1 = w[1]
     w2 = w[2]
-    for i in prange(x.shape[1]):
-        x0 = x[0, i]
-        x1 = x[1, i]
-        x2 = x[2, i]
-        x3 = x[3, i]
-        s0 = 0.0
-        s1 = 0.0
-        s2 = 0.0
-        total = 0.0
-        for j in range(c.shape[1]):
-            d0 = x0 - c0[j]
-            d1 = x1 - c1[j]
-            d2 = x2 - c2[j]
-            d3 = x3 - c3[j]
-            squared = max(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3, TINY)
-            p = g[j] * _weight(squared, power)
-            s0 += w0[j] * p
-            s1 += w1[j] * p
-            s2 += w2[j] * p
-            total += p
-        out[0, i] = s0 / total
-        out[1, i] = s1 / total
-        out[2, i] = s2 / total
-
-
-@njit(**OPTIONS)
-def _squares(x, c, start, count, period_over_pi, q):  # type: ignore[no-untyped-def]
-    """Write squared distances from one target x (4,) to ``count`` sources from ``start`` to q.
-
-    With a rotational period, as ``compiled.distances``; at least ``TINY``.
-    """
-    c0 = c[0, start : start + count]
-    c1 = c[1, start : start + count]
-    c2 = c[2, start : start + count]
-    c3 = c[3, start : start + count]
-    r = x[0]
-    sine = x[1]
-    cosine = x[2]
-    z = x[3]
-    for j in range(count):
-        dr = r - c0[j]
-        dz = z - c3[j]
-        chord = 2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
-        q[j] = max(dr * dr + chord + dz * dz, TINY)
-
-
-@njit(**OPTIONS)
-def _weigh(q, count, power):  # type: ignore[no-untyped-def]
-    """Replace the first ``count`` squared distances in q by distance^-power."""
-    if power == 2.0:
-        for j in range(count):
-            q[j] = 1.0 / q[j]
-    elif power == 3.0:
-        for j in range(count):
-            q[j] = 1.0 / (q[j] * np.sqrt(q[j]))
-    else:
-        for j in range(count):
-            q[j] = q[j] ** (-0.5 * power)
+    x0 = x[0]
+    x1 = x[1]
+    x2 = x[2]
+    x3 = x[3]
+    s0 = 0.0
+    s1 = 0.0
+    s2 = 0.0
+    total = 0.0
+    for j in range(c.shape[1]):
+        squared = squared_distance(x0, x1, x2, x3, c0[j], c1[j], c2[j], c3[j], period_over_pi, True)
+        p = g[j] * _weight(max(squared * scale, TINY), power)
+        s0 += w0[j] * p
+        s1 += w1[j] * p
+        s2 += w2[j] * p
+        total += p
+    out[0] = s0 / total
+    out[1] = s1 / total
+    out[2] = s2 / total
 
 
 @njit(parallel=True, **OPTIONS)
-def weigh_rotational(x, c, w, g, power, period_over_pi, out):  # type: ignore[no-untyped-def]
-    """Write the means as ``weigh`` does, for features (r, sin, cos, z) and Eq. 2.15's distance.
+def weigh(x, c, w, g, power, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
+    """Write the weighted means at targets x (4, N) to out (3, N).
 
-    ``period_over_pi`` is theta_p / pi. Sources are walked in blocks that stay in the first-level
-    cache: with the longer distance the choice of the power would keep one loop from being
-    vectorised.
+    Of values w (3, n) at sources c (4, n), with weights g (n,) besides that of the distance.
+    ``period_over_pi`` is theta_p / pi; ``scale`` is the factor of squared distances. The usual
+    powers have loops of their own, which the compiler vectorises.
     """
-    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
-    for task in prange(tasks):
-        q = np.empty(BLOCK)
-        first = task * TARGETS_PER_TASK
-        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
-            s0 = 0.0
-            s1 = 0.0
-            s2 = 0.0
-            total = 0.0
-            for start in range(0, c.shape[1], BLOCK):
-                count = min(BLOCK, c.shape[1] - start)
-                _squares(x[:, i], c, start, count, period_over_pi, q)
-                _weigh(q, count, power)
-                for j in range(count):
-                    p = g[start + j] * q[j]
-                    s0 += w[0, start + j] * p
-                    s1 += w[1, start + j] * p
-                    s2 += w[2, start + j] * p
-                    total += p
-            out[0, i] = s0 / total
-            out[1, i] = s1 / total
-            out[2, i] = s2 / total
+    for i in prange(x.shape[1]):
+        if power == 2.0:
+            _mean(x[:, i], c, w, g, 2.0, period_over_pi, scale, out[:, i])
+        elif power == 3.0:
+            _mean(x[:, i], c, w, g, 3.0, period_over_pi, scale, out[:, i])
+        else:
+            _mean(x[:, i], c, w, g, power, period_over_pi, scale, out[:, i])

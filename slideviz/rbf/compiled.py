@@ -66,15 +66,43 @@ def one_minus_cos(g):  # type: ignore[no-untyped-def]
     return t * p
 
 
-@njit(parallel=True, **OPTIONS)
-def sum_three(x, c, w, scale, out):  # type: ignore[no-untyped-def]
-    """Write s at targets x (3, N) to out (3, N), for Wendland C2 and three Euclidean features.
+@njit(inline="always", **OPTIONS)
+def squared_distance(x0, x1, x2, x3, c0, c1, c2, c3, period_over_pi, fourth):  # type: ignore[no-untyped-def]
+    """Return the squared distance of features x and c; without ``fourth`` they are three.
 
-    From controls c (3, n) and weights w (3, n); ``scale`` is 1 / R, here and below.
+    With a rotational period it is (r - r')^2 + (z - z')^2 + 2 r r' (1 - cos g), g = theta_p / pi
+    sin(pi (theta - theta') / theta_p) (Eq. 2.15), the sine by the addition theorem. The same
+    formula is in ``double_double._distances``, its slope in ``slopes``. What decides is the same
+    for all pairs, so that the compiler divides a loop over them.
     """
+    d0 = x0 - c0
+    if period_over_pi > 0.0:
+        d3 = x3 - c3
+        return (
+            d0 * d0 + 2.0 * x0 * c0 * one_minus_cos(period_over_pi * (x1 * c2 - x2 * c1)) + d3 * d3
+        )
+    d1 = x1 - c1
+    d2 = x2 - c2
+    total = d0 * d0 + d1 * d1 + d2 * d2
+    if fourth:
+        d3 = x3 - c3
+        total += d3 * d3
+    return total
+
+
+@njit(parallel=True, **OPTIONS)
+def sum_plain(x, c, w, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
+    """Write s at targets x (k, N) to out (3, N), for Wendland C2 and three or four features.
+
+    From controls c (k, n) and weights w (3, n); ``scale`` is 1 / R, here and below.
+    ``period_over_pi`` is theta_p / pi, and 0 for Euclidean features.
+    """
+    last = len(c) - 1
+    fourth = last == 3
     c0 = c[0]
     c1 = c[1]
     c2 = c[2]
+    c3 = c[last]
     w0 = w[0]
     w1 = w[1]
     w2 = w[2]
@@ -82,82 +110,17 @@ def sum_three(x, c, w, scale, out):  # type: ignore[no-untyped-def]
         x0 = x[0, i]
         x1 = x[1, i]
         x2 = x[2, i]
+        x3 = x[last, i]
         s0 = 0.0
         s1 = 0.0
         s2 = 0.0
         for j in range(c.shape[1]):
-            d0 = x0 - c0[j]
-            d1 = x1 - c1[j]
-            d2 = x2 - c2[j]
-            p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2, scale)
-            s0 += w0[j] * p
-            s1 += w1[j] * p
-            s2 += w2[j] * p
-        out[0, i] = s0
-        out[1, i] = s1
-        out[2, i] = s2
-
-
-@njit(parallel=True, **OPTIONS)
-def sum_four(x, c, w, scale, out):  # type: ignore[no-untyped-def]
-    """Write s as ``sum_three`` does, for four features (translational period in 3D)."""
-    c0 = c[0]
-    c1 = c[1]
-    c2 = c[2]
-    c3 = c[3]
-    w0 = w[0]
-    w1 = w[1]
-    w2 = w[2]
-    for i in prange(x.shape[1]):
-        x0 = x[0, i]
-        x1 = x[1, i]
-        x2 = x[2, i]
-        x3 = x[3, i]
-        s0 = 0.0
-        s1 = 0.0
-        s2 = 0.0
-        for j in range(c.shape[1]):
-            d0 = x0 - c0[j]
-            d1 = x1 - c1[j]
-            d2 = x2 - c2[j]
-            d3 = x3 - c3[j]
-            p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3, scale)
-            s0 += w0[j] * p
-            s1 += w1[j] * p
-            s2 += w2[j] * p
-        out[0, i] = s0
-        out[1, i] = s1
-        out[2, i] = s2
-
-
-@njit(parallel=True, **OPTIONS)
-def sum_rotational(x, c, w, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
-    """Write s as ``sum_three`` does, for rotational features (r, sin, cos, z).
-
-    ``period_over_pi`` is theta_p / pi. The distance is that of ``distances``.
-    """
-    c0 = c[0]
-    c1 = c[1]
-    c2 = c[2]
-    c3 = c[3]
-    w0 = w[0]
-    w1 = w[1]
-    w2 = w[2]
-    for i in prange(x.shape[1]):
-        r = x[0, i]
-        sine = x[1, i]
-        cosine = x[2, i]
-        z = x[3, i]
-        s0 = 0.0
-        s1 = 0.0
-        s2 = 0.0
-        for j in range(c.shape[1]):
-            dr = r - c0[j]
-            dz = z - c3[j]
-            chord = (
-                2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
+            p = _wendland_c2(
+                squared_distance(
+                    x0, x1, x2, x3, c0[j], c1[j], c2[j], c3[j], period_over_pi, fourth
+                ),
+                scale,
             )
-            p = _wendland_c2(dr * dr + chord + dz * dz, scale)
             s0 += w0[j] * p
             s1 += w1[j] * p
             s2 += w2[j] * p
@@ -191,11 +154,13 @@ TARGETS_PER_TASK = 64
 
 @njit(**OPTIONS)
 def _apply(kind, q, count):  # type: ignore[no-untyped-def]
-    """Replace xi by phi(xi) in the first ``count`` entries of q.
-
-    ``kind`` is the kernel's code; that of Wendland C2, 0, is in none of the branches.
-    """
-    if kind == 1:
+    """Replace xi by phi(xi) in the first ``count`` entries of q; ``kind`` is the kernel's code."""
+    if kind == 0:
+        for j in range(count):
+            u = max(1.0 - q[j], 0.0)
+            u = u * u
+            q[j] = u * u * (4.0 * q[j] + 1.0)
+    elif kind == 1:
         for j in range(count):
             u = max(1.0 - q[j], 0.0)
             q[j] = u * u
@@ -247,13 +212,7 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-untyped-def]
-    """Write xi, distance over R, from one target x (4,) to ``count`` controls from ``start`` on.
-
-    With a rotational period the square of the distance is (r - r')^2 + (z - z')^2 +
-    2 r r' (1 - cos g), g = theta_p / pi sin(pi (theta - theta') / theta_p) (Eq. 2.15), the sine by
-    the addition theorem. The same formula is in ``sum_rotational``, ``double_double._distances``,
-    ``slopes`` and ``idw._squares``.
-    """
+    """Write xi, distance over R, from one target x (4,) to ``count`` controls from ``start`` on."""
     c0 = c[0, start : start + count]
     c1 = c[1, start : start + count]
     c2 = c[2, start : start + count]
@@ -262,19 +221,9 @@ def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-
     x1 = x[1]
     x2 = x[2]
     x3 = x[3]
-    if period_over_pi > 0.0:
-        for j in range(count):
-            d0 = x0 - c0[j]
-            d3 = x3 - c3[j]
-            chord = 2.0 * x0 * c0[j] * one_minus_cos(period_over_pi * (x1 * c2[j] - x2 * c1[j]))
-            q[j] = np.sqrt(d0 * d0 + chord + d3 * d3) * scale
-    else:
-        for j in range(count):
-            d0 = x0 - c0[j]
-            d1 = x1 - c1[j]
-            d2 = x2 - c2[j]
-            d3 = x3 - c3[j]
-            q[j] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3) * scale
+    for j in range(count):
+        squared = squared_distance(x0, x1, x2, x3, c0[j], c1[j], c2[j], c3[j], period_over_pi, True)
+        q[j] = np.sqrt(squared) * scale
 
 
 @njit(parallel=True, **OPTIONS)
@@ -297,10 +246,13 @@ def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyp
                 count = min(BLOCK, c.shape[1] - start)
                 distances(x[:, i], c, start, count, period_over_pi, scale, q)
                 _apply(kind, q, count)
+                w0 = w[0, start : start + count]
+                w1 = w[1, start : start + count]
+                w2 = w[2, start : start + count]
                 for j in range(count):
-                    s0 += w[0, start + j] * q[j]
-                    s1 += w[1, start + j] * q[j]
-                    s2 += w[2, start + j] * q[j]
+                    s0 += w0[j] * q[j]
+                    s1 += w1[j] * q[j]
+                    s2 += w2[j] * q[j]
             out[0, i] = s0
             out[1, i] = s1
             out[2, i] = s2
@@ -319,13 +271,7 @@ def fill_matrix(x, c, across, along, period_over_pi, scale, kind, out):  # type:
     for a in prange(x.shape[1]):
         row = out[a]
         distances(x[:, a], c, 0, n, period_over_pi, scale, row)
-        if kind == 0:
-            for b in range(n):
-                u = max(1.0 - row[b], 0.0)
-                u = u * u
-                row[b] = u * u * (4.0 * row[b] + 1.0)
-        else:
-            _apply(kind, row, n)
+        _apply(kind, row, n)
         if d > 0:
             for b in range(n):
                 dot = 0.0

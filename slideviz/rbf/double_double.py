@@ -111,7 +111,7 @@ def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-def]
-    """Write xi from node i to all nodes x (4, n) to q + ql, as ``compiled.distances`` does."""
+    """Write xi from node i to all nodes x (4, n) to q + ql, by ``compiled.squared_distance``."""
     c0 = x[0]
     c1 = x[1]
     c2 = x[2]

@@ -69,30 +69,44 @@ def evaluate(
         if len(near):
             out[near] = evaluate(basis, targets[:, near], controls, weights, tick)
         return out
-    rotational = basis.period > 0
     kind = KERNELS[basis.kernel].code
-    rows = 4 if rotational or kind or len(targets) == 4 else 3
+    rows = 4 if basis.period > 0 or kind or len(targets) == 4 else 3
     c = padded_rows(controls, rows)
     w = padded_rows(weights.T, 3)
+    metric = basis.period_over_pi, 1.0 / basis.radius
+
+    def add_up(x: FloatArray, out: FloatArray) -> None:
+        if kind:
+            compiled.sum_any(x, c, w, *metric, kind, out)
+        else:
+            compiled.sum_plain(x, c, w, *metric, out)
+
+    return summed(add_up, targets, c, weights.shape[1], tick)
+
+
+def summed(
+    add_up: Callable[[FloatArray, FloatArray], object],
+    targets: FloatArray,
+    controls: FloatArray,
+    width: int,
+    tick: Tick = no_tick,
+) -> FloatArray:
+    """Return what ``add_up(x, out)`` writes to out (3, N) for targets x (k, N), (N, width).
+
+    Targets are divided, so that ``tick`` is called often; ``controls`` (k, n) are contiguous rows.
+    """
+    rows, count = controls.shape
     total = targets.shape[1]
-    scale = 1.0 / basis.radius
-    out = np.empty((total, weights.shape[1]))
-    size = max(1, CHUNK // max(1, c.shape[1]))
+    found = np.empty((total, width))
+    size = max(1, CHUNK // max(1, count))
     for start in range(0, total, size):
-        part = padded_rows(targets[:, start : start + size], rows)
-        result = np.empty_like(part[:3])
-        with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
-            if kind:
-                compiled.sum_any(part, c, w, basis.period_over_pi, scale, kind, result)
-            elif rotational:
-                compiled.sum_rotational(part, c, w, basis.period_over_pi, scale, result)
-            elif rows == 4:
-                compiled.sum_four(part, c, w, scale, result)
-            else:
-                compiled.sum_three(part, c, w, scale, result)
-        out[start : start + size] = result[: weights.shape[1]].T
+        x = padded_rows(targets[:, start : start + size], rows)
+        out = np.empty_like(x[:3])
+        with compiled.one_at_a_time(x.shape[1] * count):
+            add_up(x, out)
+        found[start : start + size] = out[:width].T
         tick(min(1.0, (start + size) / total))
-    return out
+    return found
 
 
 WIDER = 4

@@ -13,7 +13,7 @@ Distances are computed from *features*, a few numbers for each node:
 * Rotational period (Eq. 2.15): ``(r, sin(pi theta/theta_p), cos(pi theta/theta_p), z)``, z = 0 in
   2D. The distance is not Euclidean in these features: its square is
   ``(r - r')^2 + 2 r r' (1 - cos(theta_p/pi sin(pi (theta - theta')/theta_p))) + (z - z')^2``
-  (``compiled.distances``, which names the copies of this formula).
+  (``compiled.squared_distance``, which names the copies of this formula).
 """
 
 from __future__ import annotations

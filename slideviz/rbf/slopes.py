@@ -5,7 +5,7 @@
 The derivative of phi with respect to the square of the distance is phi'(xi) / (2 xi R^2), which
 needs no square root and has no 0/0 for smooth functions. A node that is a control node itself
 stays at distance zero from itself, so that pair adds nothing, whatever the function. The distance
-is that of ``compiled.distances``.
+is that of ``compiled.squared_distance``.
 
 Both loops run over targets; the gradient with respect to control nodes is the same loop with
 targets and controls exchanged, because the square of the distance is symmetric.
