@@ -12,7 +12,6 @@ import numpy as np
 from slideviz.mesh.jacobians import (
     LANES,
     NODE,
-    add3,
     corners,
     cross3,
     dot3,
@@ -260,20 +259,21 @@ def _pull_heights(coords, count, sides, heights, factors, slope):  # type: ignor
     ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cells, ``heights`` (h, 2) those
     of w, ``factors`` (3, h, ...).
     """
+    edges = np.empty((4, 3, LANES))
     products = np.empty((3, 3, LANES))
     total = np.zeros((3, 3, LANES))
-    for c in range(count):
-        u0 = edge(coords, sides[0, 0], sides[0, 1], c)
-        v0 = edge(coords, sides[1, 0], sides[1, 1], c)
-        u1 = edge(coords, sides[2, 0], sides[2, 1], c)
-        v1 = edge(coords, sides[3, 0], sides[3, 1], c)
-        low = cross3(u0, v0)
-        top = cross3(u1, v1)
-        middle = half_sum(cross3(u0, v1), cross3(u1, v0))
+    # Numbers of nodes are read before loops over cells, which are not vectorised else.
+    for k in range(4):
+        start, stop = sides[k]
         for axis in range(3):
-            products[0, axis, c] = low[axis]
-            products[1, axis, c] = middle[axis]
-            products[2, axis, c] = top[axis]
+            for c in range(count):
+                edges[k, axis, c] = coords[axis, stop, c] - coords[axis, start, c]
+    for axis in range(3):
+        for c in range(count):
+            products[0, axis, c] = _cross(edges[0], edges[1], axis, c)
+            middle = _cross(edges[0], edges[3], axis, c) + _cross(edges[2], edges[1], axis, c)
+            products[1, axis, c] = 0.5 * middle
+            products[2, axis, c] = _cross(edges[2], edges[3], axis, c)
     for h in range(len(heights)):
         one, two = heights[h]
         for axis in range(3):
@@ -289,21 +289,26 @@ def _pull_heights(coords, count, sides, heights, factors, slope):  # type: ignor
                 slope[axis, two, c] += value
     for k in range(4):
         # By u0 and u1: v0 x a + v1 x b, v1 x d + v0 x b; by v0 and v1: a x u0 + b x u1, ...
-        upper = k // 2
+        upper = 2 * (k // 2)
         across = 1 - k % 2
-        own, other = (across, 2 + across) if upper == 0 else (2 + across, across)
-        for c in range(count):
-            x = edge(coords, sides[own, 0], sides[own, 1], c)
-            y = edge(coords, sides[other, 0], sides[other, 1], c)
-            far = total[2 * upper, 0, c], total[2 * upper, 1, c], total[2 * upper, 2, c]
-            half = 0.5 * total[1, 0, c], 0.5 * total[1, 1, c], 0.5 * total[1, 2, c]
-            if across == 1:
-                value = add3(cross3(x, far), cross3(y, half))
-            else:
-                value = add3(cross3(far, x), cross3(half, y))
-            for axis in range(3):
-                slope[axis, sides[k, 0], c] -= value[axis]
-                slope[axis, sides[k, 1], c] += value[axis]
+        near = edges[upper + across]
+        far = edges[2 - upper + across]
+        sign = 2.0 * across - 1.0
+        start, stop = sides[k]
+        for axis in range(3):
+            for c in range(count):
+                value = _cross(near, total[upper], axis, c)
+                value = sign * (value + 0.5 * _cross(far, total[1], axis, c))
+                slope[axis, start, c] -= value
+                slope[axis, stop, c] += value
+
+
+@njit(inline="always", **OPTIONS)
+def _cross(a, b, axis, c):  # type: ignore[no-untyped-def]
+    """Return a component of the cross product of vectors (3, ...) of cell ``c``."""
+    one = (axis + 1) % 3
+    two = (axis + 2) % 3
+    return a[one, c] * b[two, c] - a[two, c] * b[one, c]
 
 
 @njit(**OPTIONS)

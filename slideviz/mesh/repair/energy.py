@@ -43,10 +43,10 @@ class Targets:
 
     vtk: int
     nodes: IntArray  # (m, n)
-    scale: FloatArray  # (k, m): factors of the coefficients that make D of them
+    scale: FloatArray  # (b, k, LANES): factors of the coefficients that make D of them, in blocks
     shape: FloatArray
-    """(c, 1 + s, m): of each corner, the factor of its Jacobian, and the matrix G with
-    ``tr(JᵀJ) = Σ G_ij e_i·e_j``: diagonal, then 01 (2D) or 01, 12, 20 (3D)."""
+    """(b, c, 1 + d d, LANES): of each corner, the factor of its Jacobian, and the matrix G with
+    ``tr(JᵀJ) = Σ G_ij e_i·e_j``, row by row."""
 
 
 def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Targets:
@@ -76,13 +76,21 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     dual /= jacobian[..., None, None]
     inverse = dual @ np.swapaxes(dual, 2, 3)
     inverse[flat], jacobian[flat] = _opened(gram[flat], length[flat])
-    shape = np.empty((len(table), 1 + d * (d + 1) // 2, m))
+    shape = np.empty((len(table), 1 + d * d, m))
     shape[:, 0] = signs / jacobian.T
-    for k, (i, j) in enumerate([(i, i) for i in range(d)] + [(0, 1), (1, 2), (2, 0)][: 2 * d - 3]):
-        shape[:, 1 + k] = inverse[..., i, j].T
+    shape[:, 1:] = inverse.reshape(m, -1, d * d).transpose(1, 2, 0)
     mean = np.maximum(found.mean(axis=0), LEAST_SCALE * jacobian.mean(axis=1))
     scale = signs / np.maximum(found, LEAST_SCALE * mean)
-    return Targets(vtk, np.ascontiguousarray(nodes), scale, shape)
+    return Targets(vtk, np.ascontiguousarray(nodes), _in_blocks(scale), _in_blocks(shape))
+
+
+def _in_blocks(values: FloatArray) -> FloatArray:
+    """Return values (..., m) of cells as (b, ..., LANES), filled up with zeros."""
+    count = -(-values.shape[-1] // LANES)
+    out = np.zeros((*values.shape[:-1], count * LANES))
+    out[..., : values.shape[-1]] = values
+    blocks = out.reshape(*values.shape[:-1], count, LANES)
+    return np.ascontiguousarray(np.moveaxis(blocks, -2, 0))
 
 
 def _opened(gram: FloatArray, length: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,39 +114,29 @@ def _chi(depth, epsilon):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _squares(at, corner, shape, count, total):  # type: ignore[no-untyped-def]
-    """Write ``tr(JᵀJ)`` of a corner of cells into ``total`` (LANES,); ``shape`` (1 + s, LANES)."""
+def _write_pulls(at, corner, shape, count, pulls, total):  # type: ignore[no-untyped-def]
+    """Write ``tr(JᵀJ)`` of a corner of cells, and half its slopes by the edges of the corner.
+
+    ``shape`` (1 + d d, LANES): of the corner, as of `Targets`.
+    ``pulls``, ``total`` (d, d, LANES), (LANES,): the slopes by each edge, and the values.
+    """
     d = at.shape[0]
+    pulls[:] = 0.0
     total[:] = 0.0
-    for s in range(d * (d + 1) // 2):
-        o = corner[0]
-        a = corner[1 + s % d]
-        b = corner[1 + (s if s < d else (s - d + 1) % d)]
-        factor = 1.0 if s < d else 2.0
+    # Numbers of nodes are read before loops over cells, which are not vectorised else.
+    start = corner[0]
+    for j in range(d):
+        stop = corner[1 + j]
+        for i in range(d):
+            for axis in range(d):
+                for c in range(count):
+                    edge = at[axis, stop, c] - at[axis, start, c]
+                    pulls[i, axis, c] += shape[1 + d * i + j, c] * edge
+    for i in range(d):
+        stop = corner[1 + i]
         for axis in range(d):
             for c in range(count):
-                one = at[axis, a, c] - at[axis, o, c]
-                two = at[axis, b, c] - at[axis, o, c]
-                total[c] += factor * shape[1 + s, c] * (one * two)
-
-
-@njit(**OPTIONS)
-def _pull_squares(at, corner, shape, count, weight, slope):  # type: ignore[no-untyped-def]
-    """Add the slopes of ``tr(JᵀJ)`` of a corner, times ``weight`` (LANES,), to (d, n, LANES)."""
-    d = at.shape[0]
-    for s in range(d * (d + 1) // 2):
-        o = corner[0]
-        a = corner[1 + s % d]
-        b = corner[1 + (s if s < d else (s - d + 1) % d)]
-        share = 1.0 if s < d else 2.0
-        for axis in range(d):
-            for c in range(count):
-                factor = share * weight[c] * shape[1 + s, c]
-                one = factor * (at[axis, b, c] - at[axis, o, c])
-                two = factor * (at[axis, a, c] - at[axis, o, c])
-                slope[axis, a, c] += one
-                slope[axis, b, c] += two
-                slope[axis, o, c] -= one + two
+                total[c] += pulls[i, axis, c] * (at[axis, stop, c] - at[axis, start, c])
 
 
 @njit(**OPTIONS)
@@ -151,7 +149,7 @@ def write_energy(  # type: ignore[no-untyped-def]
     """
     d = points.shape[1]
     n = nodes.shape[1]
-    parts = len(scale)
+    parts = scale.shape[1]
     outer = len(table)
     power = 2.0 / d
     at = np.empty((d, n, LANES))
@@ -163,27 +161,27 @@ def write_energy(  # type: ignore[no-untyped-def]
     weight = np.empty(LANES)
     value = np.empty(LANES)
     lowest = np.empty(LANES)
-    factors = np.empty((parts, LANES))
-    shapes = np.empty((*shape.shape[:2], LANES))
+    pulls = np.empty((d, d, LANES))
     for first in range(low, high, LANES):
         count = min(LANES, high - first)
+        factors = scale[first // LANES]
+        shapes = shape[first // LANES]
         gather(points, nodes, first, count, at)
-        factors[:, :count] = scale[:, first : first + count]
-        shapes[:, :, :count] = shape[:, :, first : first + count]
         write_coefficients(vtk, at, table, count, found)
         value[:] = 0.0
         lowest[:] = np.inf
         for k in range(parts):
             for c in range(count):
-                depth = factors[k, c] * found[k, c]
+                factor = factors[k, c]
+                depth = factor * found[k, c]
                 chi, root = _chi(depth, epsilon)
                 g = (1.0 + depth * depth) / chi
                 value[c] += 0.5 / parts * g
-                pull[k, c] = 0.5 / parts * factors[k, c] * (2.0 * depth / chi - g / root)
+                pull[k, c] = 0.5 / parts * factor * (2.0 * depth / chi - g / root)
                 lowest[c] = min(lowest[c], depth)
         slope[:] = 0.0
         for k in range(outer):
-            _squares(at, table[k], shapes[k], count, total)
+            _write_pulls(at, table[k], shapes[k], count, pulls, total)
             at_corner = corner_at[k]
             for c in range(count):
                 chi, root = _chi(shapes[k, 0, c] * found[at_corner, c], epsilon)
@@ -193,7 +191,14 @@ def write_energy(  # type: ignore[no-untyped-def]
                 weight[c] = 0.5 / outer / weight[c]
                 value[c] += weight[c] * total[c]
                 pull[at_corner, c] -= power * weight[c] * total[c] / root * shapes[k, 0, c]
-            _pull_squares(at, table[k], shapes[k], count, weight, slope)
+            start = table[k, 0]
+            for i in range(d):
+                stop = table[k, 1 + i]
+                for axis in range(d):
+                    for c in range(count):
+                        share = 2.0 * weight[c] * pulls[i, axis, c]
+                        slope[axis, stop, c] += share
+                        slope[axis, start, c] -= share
         pull_proof(vtk, at, table, count, pull, none, slope)
         for c in range(count):
             values[first + c] = value[c]
@@ -213,7 +218,7 @@ def write_curvatures(  # type: ignore[no-untyped-def]
     """
     d = points.shape[1]
     n = nodes.shape[1]
-    parts = len(scale)
+    parts = scale.shape[1]
     outer = len(table)
     power = 2.0 / d
     at = np.empty((d, n, LANES))
@@ -223,33 +228,35 @@ def write_curvatures(  # type: ignore[no-untyped-def]
     none = np.zeros((parts, LANES))
     total = np.empty(LANES)
     bend = np.empty((parts, LANES))
+    pulls = np.empty((d, d, LANES))
     blocks = np.empty((n, d, d, LANES))
     for first in range(low, high, LANES):
         count = min(LANES, high - first)
+        factors = scale[first // LANES]
+        shapes = shape[first // LANES]
         gather(points, nodes, first, count, at)
         write_coefficients(vtk, at, table, count, found)
         blocks[:] = 0.0
         for k in range(parts):
             for c in range(count):
-                factor = scale[k, first + c]
+                factor = factors[k, c]
                 chi, root = _chi(factor * found[k, c], epsilon)
                 bent = (1.0 - factor * found[k, c] / root) ** 2 + 1.0 / (root * root)
                 bend[k, c] = factor * factor / parts * bent / chi
         for k in range(outer):
-            here = np.ascontiguousarray(shape[k, :, first : first + count])
-            _squares(at, table[k], here, count, total)
+            _write_pulls(at, table[k], shapes[k], count, pulls, total)
             for c in range(count):
-                factor = here[0, c]
+                factor = shapes[k, 0, c]
                 chi, root = _chi(factor * found[corner_at[k], c], epsilon)
                 part = 0.5 / outer / (chi if d == 2 else np.cbrt(chi * chi))
                 bent = power * (power + 1.0) * part * total[c] / (root * root)
                 bend[corner_at[k], c] += factor * factor * bent
-                for s in range(len(here) - 1):
-                    stiff = (2.0 if s < d else 4.0) * part * here[1 + s, c]
+                for s in range(d * d):
+                    stiff = 2.0 * part * shapes[k, 1 + s, c]
                     for a in range(d):
                         blocks[table[k, 0], a, a, c] += stiff
-                        if s < d:
-                            blocks[table[k, 1 + s], a, a, c] += stiff
+                        if s // d == s % d:
+                            blocks[table[k, 1 + s % d], a, a, c] += stiff
         for k in range(parts):
             unit[:] = 0.0
             unit[k] = 1.0
