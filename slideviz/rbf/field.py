@@ -7,16 +7,22 @@ parts, and in any order.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, column_bounds
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
+from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from scipy.spatial import cKDTree
+
+BOXES = 128  # most boxes of a `Vicinity` along an axis
 
 TIE = 1e-4
 """Boundary nodes count as equally near when their distances differ by less than this part: far
@@ -39,6 +45,48 @@ def share(q: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
+class Vicinity:
+    """The boxes of a grid that come near to points: in all others no search for these is needed."""
+
+    low: FloatArray  # (d,): the lowest corner of the grid
+    size: float  # of a box, along each axis
+    marked: NDArray[np.bool_]  # one entry, along d axes, for each box
+
+    @classmethod
+    def of(cls, points: FloatArray, reach: float) -> Vicinity:
+        """Return the boxes of a grid that may have places within ``reach`` of points (n, d)."""
+        low, high = column_bounds(points)
+        reach = 1.001 * reach + 1e-12 * float(max(-low.min(), high.max()))  # more than rounding
+        low = low - reach
+        size = max(4.0 * reach, float((high + reach - low).max()) / BOXES)
+        # Within reach of a point are two boxes along each axis, at most.
+        ends = [((points + by - low) / size).astype(np.int64) for by in (-reach, reach)]
+        marked = np.zeros(ends[1].max(axis=0) + 1, bool)
+        for columns in product(*zip(*(end.T for end in ends), strict=True)):
+            marked[columns] = True
+        return cls(low, size, marked)
+
+    def inside(self, places: FloatArray) -> IntArray:
+        """Return which places (m, d) are in one of the boxes, (k,)."""
+        found = np.empty(len(places), bool)
+        _look_up(places, self.low, self.size, self.marked.shape, self.marked.ravel(), found)
+        return np.flatnonzero(found)
+
+
+@njit(**OPTIONS)
+def _look_up(places, low, size, counts, marked, found):  # type: ignore[no-untyped-def]
+    """Write which places (m, d) are in marked boxes of a `Vicinity` into ``found`` (m,)."""
+    for i in range(len(places)):
+        inside = True
+        box = 0
+        for axis in range(places.shape[1]):
+            at = (places[i, axis] - low[axis]) / size
+            inside = inside and 0.0 <= at < counts[axis]
+            box = box * counts[axis] + (np.int64(at) if inside else 0)
+        found[i] = inside and marked[box if inside else 0]
+
+
+@dataclass(frozen=True, eq=False)
 class Correction:
     """The boundary correction: spreads errors at boundary nodes to the nodes near them (Eq. 2.30).
 
@@ -54,6 +102,11 @@ class Correction:
     lacking: FloatArray
     """(s, d): the error of each source: prescribed less interpolated displacement, in the frame."""
     radius: float  # Distance at which the correction ends, in the mesh's length unit (Eq. 2.31).
+
+    @cached_property
+    def _vicinity(self) -> Vicinity:
+        """Return the boxes of a grid outside of which no place is within the radius."""
+        return Vicinity.of(np.asarray(self.tree.data), self.radius)
 
     def near(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return which points (m, d) are within reach of a source, (h,), and their part, (h, d).
@@ -96,12 +149,13 @@ class Correction:
 
         Ties (t,) are places among the h points where the second source is equally near (`TIE`).
         """
-        near = self.tree.query(points, k=2, distance_upper_bound=self.radius)
+        some = self._vicinity.inside(points)
+        near = self.tree.query(points[some], k=2, distance_upper_bound=self.radius)
         distance, index = map(np.asarray, near)
         hit = np.flatnonzero(np.isfinite(distance[:, 0]))
         distance = distance[hit]
         tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])
-        return hit, distance[:, 0], index[hit, 0], tied
+        return some[hit], distance[:, 0], index[hit, 0], tied
 
     def _means(self, points: FloatArray, distance: FloatArray) -> FloatArray:
         """Return the mean (m, d) of the errors of all sources equally near to points (m, d)."""
