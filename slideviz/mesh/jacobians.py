@@ -287,13 +287,18 @@ def write_hexahedron(coords, count, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
-    """Write the corner Jacobians of cells, ``nodes`` (m, n), into ``alpha`` (k, m)."""
+def add_corners(points, nodes, table, sums):  # type: ignore[no-untyped-def]
+    """Write the sums of the corner Jacobians of cells, ``nodes`` (m, n), into ``sums`` (m,)."""
     coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    alpha = np.empty((len(table), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, coords)
-        corners(coords, table, count, alpha[:, first : first + count])
+        corners(coords, table, count, alpha)
+        sums[first : first + count] = alpha[0, :count]
+        for k in range(1, len(table)):
+            for c in range(count):
+                sums[first + c] += alpha[k, c]
 
 
 @njit(**OPTIONS)
@@ -310,12 +315,14 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
     """
     coords = np.empty((points.shape[1], nodes.shape[1], LANES))
     coefficients = np.empty((3, 3, 3, LANES))
+    jacobians = np.empty((len(table), LANES))
+    products = np.empty((len(table), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         here = slice(first, first + count)
         gather(points, nodes, first, count, coords)
-        corners(coords, table, count, alpha[:, here])
-        spreads(vtk, coords, table, count, spread[:, here])
+        corners(coords, table, count, jacobians)
+        spreads(vtk, coords, table, count, products)
         sides = turn[here]
         states = status[here]
         states[:] = VALID
@@ -325,20 +332,26 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         elif vtk == 13:
             write_prism(coords, count, coefficients[0])
             _mark(coefficients[0, 1], sides, states, UNPROVEN)
+        # After the coefficients, for a corner that is negative or NaN decides.
+        _mark(jacobians, sides, states, INVERTED)
         for k in range(len(table)):
             for c in range(count):
-                alpha[k, first + c] *= sides[c]
-        # After the coefficients, for a corner that is negative or NaN decides.
-        _mark(alpha[:, here], np.ones_like(sides), states, INVERTED)
+                alpha[k, first + c] = jacobians[k, c] * sides[c]
+                spread[k, first + c] = products[k, c]
 
 
 @njit(**OPTIONS)
 def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
     """Set ``states`` (m,) to ``as_`` where not all ``values * sides`` (k, m) are in 0 < v < inf."""
+    least = np.full(len(states), np.inf)
+    total = np.zeros(len(states))  # not finite where a value is not
     for k in range(len(values)):
         for c in range(len(states)):
             value = values[k, c] * sides[c]
-            states[c] = states[c] if 0.0 < value < np.inf else as_
+            least[c] = min(least[c], value)
+            total[c] += value
+    for c in range(len(states)):
+        states[c] = states[c] if least[c] > 0.0 and total[c] < np.inf else as_
 
 
 @njit(**OPTIONS)

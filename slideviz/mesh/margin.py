@@ -25,17 +25,13 @@ from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
     LEVELS,
-    NODE,
     add3,
     cross3,
     dot3,
-    edge,
     gather,
-    half_sum,
-    minus3,
     write_coefficients,
 )
-from slideviz.mesh.model import Cells
+from slideviz.mesh.model import Cells, largest_coordinate
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import OPTIONS, njit
 from slideviz.terms import FARTHEST
@@ -59,15 +55,6 @@ THIRD = 1 / 3  # a multiplication with it is faster than a division
 
 BOUNDED = np.array([1 / 8, 1 / 4, 1 / 2, 1])
 """Parts of the largest margin that is looked for, up to which margins are bounded from below."""
-
-ALONG = np.array(
-    [
-        [[NODE[0, j, k], NODE[1, j, k]] for j in range(2) for k in range(2)],
-        [[NODE[j, 0, k], NODE[j, 1, k]] for j in range(2) for k in range(2)],
-        [[NODE[j, k, 0], NODE[j, k, 1]] for j in range(2) for k in range(2)],
-    ]
-)
-"""(3, 4, 2): nodes of the four edges of a hexahedron along each direction."""
 
 
 def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
@@ -191,11 +178,14 @@ def least_margin(
     cells = after.cells
     ends = cap * BOUNDED
     bounded = np.zeros(len(cells), np.int8)
+    nodes_far = largest_coordinate(before.points)
+    far = np.array([nodes_far, nodes_far + largest_coordinate(after.points)])
 
     def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
         if vtk == 12:
             values = np.empty(len(nodes), np.int8)
-            _write_bounds(before.points, after.points, nodes, signs[rows].copy(), ends, values)
+            turn = signs[rows].copy()
+            _write_bounds(before.points, after.points, nodes, turn, far, ends, values)
             bounded[rows] = values
 
     cells.in_parts(of_part)
@@ -256,104 +246,105 @@ def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
 
 
 @njit(**OPTIONS)
-def _write_bounds(before, after, nodes, turn, ends, found):  # type: ignore[no-untyped-def]
+def _write_bounds(before, after, nodes, turn, far, ends, found):  # type: ignore[no-untyped-def]
     """Write how many of the ascending ``ends`` the margins of hexahedra surely reach, (m,).
 
     Of the four edges along each direction take the mean, U + s F, and the largest distance from it,
-    r + s q. All coefficients of the proof are means of triple products of such edges, so they
-    differ from det(U + s F, V + s G, W + s H) by at most ∏(aᵢ + rᵢ + s qᵢ) - ∏aᵢ with
-    a₁ = |U| + s |F|, which is largest at the end of an interval.
+    at most r + s q (`_write_modes`). All coefficients of the proof are means of triple products of
+    such edges, so they differ from det(U + s F, V + s G, W + s H) by at most ∏(aᵢ + rᵢ + s qᵢ) -
+    ∏aᵢ with a₁ = |U| + s |F|, which is largest at the end of an interval.
+    ``far`` (2,): the largest coordinates of all nodes, and of all their displacements.
     """
-    start, stop = np.empty((2, 3, 8, LANES))
-    mean = np.empty((2, 3, 3, LANES))
-    off = np.empty((2, 3, LANES))
-    errors = np.empty((2, 2, LANES))
+    start, motion = np.empty((2, 3, 8, LANES))
+    modes = np.empty((2, 7, 3, LANES))
+    lengths = np.empty((2, 7, LANES))
+    spare = np.empty(LANES)
     level = np.empty(LANES, np.int8)
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(before, nodes, first, count, start)
-        gather(after, nodes, first, count, stop)
+        gather(after, nodes, first, count, motion)
         for axis in range(3):
             for j in range(8):
                 for c in range(count):
-                    stop[axis, j, c] -= start[axis, j, c]
-        _write_sizes(start, count, errors[0])
-        _write_sizes(stop, count, errors[1])
-        _write_means(start, count, mean[0], off[0])
-        _write_means(stop, count, mean[1], off[1])
+                    motion[axis, j, c] -= start[axis, j, c]
+        _write_modes(start, count, modes[0], lengths[0])
+        _write_modes(motion, count, modes[1], lengths[1])
         level[:count] = 0
-        open_ = count
         for k in range(len(ends) - 1, -1, -1):
-            if open_ == 0:
+            if level[:count].min() > 0:
                 break
-            open_ = 0
+            _write_spare(modes, lengths, turn[first : first + count], far, ends[k], spare)
             for c in range(count):
-                reaches = _is_bounded(mean, off, errors, turn[first + c], ends[k], c)
-                level[c] = max(level[c], k + 1 if reaches else 0)
-                open_ += level[c] == 0
+                if 0.0 < spare[c] < np.inf:
+                    level[c] = max(level[c], k + 1)
         found[first : first + count] = level[:count]
 
 
 @njit(**OPTIONS)
-def _write_sizes(at, count, sizes):  # type: ignore[no-untyped-def]
-    """Write the largest coordinate, and the largest difference from the first node, (2, ...)."""
-    sizes[:] = 0.0
+def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
+    """Write the modes (7, 3, ...) of hexahedra, and their lengths: what edges are sums of.
+
+    The first three are the mean edges U, V and W along each direction. The edges along the first
+    are U ± UV ± UW ± UVW, and so on, with the other modes UV, UW, VW and UVW.
+    """
     for axis in range(3):
-        for j in range(8):
-            for c in range(count):
-                x = at[axis, j, c]
-                sizes[0, c] = max(sizes[0, c], abs(x))
-                sizes[1, c] = max(sizes[1, c], abs(x - at[axis, 0, c]))
+        for c in range(count):
+            a = at[axis, 1, c] - at[axis, 0, c]
+            b = at[axis, 2, c] - at[axis, 3, c]
+            d = at[axis, 5, c] - at[axis, 4, c]
+            e = at[axis, 6, c] - at[axis, 7, c]
+            v0 = (at[axis, 3, c] - at[axis, 0, c]) + (at[axis, 2, c] - at[axis, 1, c])
+            v1 = (at[axis, 7, c] - at[axis, 4, c]) + (at[axis, 6, c] - at[axis, 5, c])
+            w0 = (at[axis, 4, c] - at[axis, 0, c]) + (at[axis, 5, c] - at[axis, 1, c])
+            w1 = (at[axis, 7, c] - at[axis, 3, c]) + (at[axis, 6, c] - at[axis, 2, c])
+            modes[0, axis, c] = 0.25 * ((a + b) + (d + e))
+            modes[1, axis, c] = 0.25 * (v0 + v1)
+            modes[2, axis, c] = 0.25 * (w0 + w1)
+            modes[3, axis, c] = 0.25 * ((b - a) + (e - d))
+            modes[4, axis, c] = 0.25 * ((d + e) - (a + b))
+            modes[5, axis, c] = 0.25 * (v1 - v0)
+            modes[6, axis, c] = 0.25 * ((e - d) - (b - a))
+    for k in range(7):
+        for c in range(count):
+            mode = modes[k, 0, c], modes[k, 1, c], modes[k, 2, c]
+            lengths[k, c] = np.sqrt(dot3(mode, mode))
 
 
 @njit(**OPTIONS)
-def _write_means(at, count, mean, off):  # type: ignore[no-untyped-def]
-    """Write the mean (3, 3, ...) of the edges along each direction, and the largest distance."""
-    for along in range(3):
-        for c in range(count):
-            a = edge(at, ALONG[along, 0, 0], ALONG[along, 0, 1], c)
-            b = edge(at, ALONG[along, 1, 0], ALONG[along, 1, 1], c)
-            d = edge(at, ALONG[along, 2, 0], ALONG[along, 2, 1], c)
-            e = edge(at, ALONG[along, 3, 0], ALONG[along, 3, 1], c)
-            squared = 0.0
-            middle = half_sum(half_sum(a, b), half_sum(d, e))
-            for each in (a, b, d, e):
-                away = minus3(each, middle)
-                squared = max(squared, dot3(away, away))
-            mean[along, 0, c], mean[along, 1, c], mean[along, 2, c] = middle
-            off[along, c] = np.sqrt(squared)
-
-
-@njit(inline="always", **OPTIONS)
-def _is_bounded(mean, off, errors, turn, end, c):  # type: ignore[no-untyped-def]
-    """Return whether all coefficients of a cell are surely positive up to ``end``."""
-    u = mean[0, 0, 0, c], mean[0, 0, 1, c], mean[0, 0, 2, c]
-    v = mean[0, 1, 0, c], mean[0, 1, 1, c], mean[0, 1, 2, c]
-    w = mean[0, 2, 0, c], mean[0, 2, 1, c], mean[0, 2, 2, c]
-    f = end * mean[1, 0, 0, c], end * mean[1, 0, 1, c], end * mean[1, 0, 2, c]
-    g = end * mean[1, 1, 0, c], end * mean[1, 1, 1, c], end * mean[1, 1, 2, c]
-    h = end * mean[1, 2, 0, c], end * mean[1, 2, 1, c], end * mean[1, 2, 2, c]
-    uv = cross3(u, v)
-    fg = cross3(f, g)
-    mixed = add3(cross3(u, g), cross3(f, v))
-    one = dot3(uv, h) + dot3(mixed, w)
-    two = dot3(fg, w) + dot3(mixed, h)
-    # Bernstein coefficients of the cubic on the interval.
-    first = turn * dot3(uv, w)
-    second = first + turn * one * THIRD
-    third = first + turn * (2 * one + two) * THIRD
-    last = first + turn * (one + two + dot3(fg, h))
-    low = min(first, second, third, last)
-    a = np.sqrt(dot3(u, u)) + np.sqrt(dot3(f, f))
-    b = np.sqrt(dot3(v, v)) + np.sqrt(dot3(g, g))
-    d = np.sqrt(dot3(w, w)) + np.sqrt(dot3(h, h))
-    p = off[0, 0, c] + end * off[1, 0, c]
-    q = off[0, 1, c] + end * off[1, 1, c]
-    r = off[0, 2, c] + end * off[1, 2, c]
-    change = p * (b + q) * (d + r) + a * q * (d + r) + a * b * r
-    far = errors[0, 0, c] + end * errors[1, 0, c]
-    size = errors[0, 1, c] + end * errors[1, 1, c]
-    return change + 2 * ROUNDING * far * size * size < low < np.inf
+def _write_spare(modes, lengths, turn, far, end, spare):  # type: ignore[no-untyped-def]
+    """Write by how much the coefficients of cells, if positive, surely exceed 0 up to ``end``."""
+    for c in range(len(turn)):
+        u = modes[0, 0, 0, c], modes[0, 0, 1, c], modes[0, 0, 2, c]
+        v = modes[0, 1, 0, c], modes[0, 1, 1, c], modes[0, 1, 2, c]
+        w = modes[0, 2, 0, c], modes[0, 2, 1, c], modes[0, 2, 2, c]
+        f = end * modes[1, 0, 0, c], end * modes[1, 0, 1, c], end * modes[1, 0, 2, c]
+        g = end * modes[1, 1, 0, c], end * modes[1, 1, 1, c], end * modes[1, 1, 2, c]
+        h = end * modes[1, 2, 0, c], end * modes[1, 2, 1, c], end * modes[1, 2, 2, c]
+        uv = cross3(u, v)
+        fg = cross3(f, g)
+        mixed = add3(cross3(u, g), cross3(f, v))
+        one = dot3(uv, h) + dot3(mixed, w)
+        two = dot3(fg, w) + dot3(mixed, h)
+        # Bernstein coefficients of the cubic on the interval.
+        first = turn[c] * dot3(uv, w)
+        second = first + turn[c] * one * THIRD
+        third = first + turn[c] * (2 * one + two) * THIRD
+        last = first + turn[c] * (one + two + dot3(fg, h))
+        low = min(first, second, third, last)
+        a = lengths[0, 0, c] + end * lengths[1, 0, c]
+        b = lengths[0, 1, c] + end * lengths[1, 1, c]
+        d = lengths[0, 2, c] + end * lengths[1, 2, c]
+        uv_ = lengths[0, 3, c] + end * lengths[1, 3, c]
+        uw_ = lengths[0, 4, c] + end * lengths[1, 4, c]
+        vw_ = lengths[0, 5, c] + end * lengths[1, 5, c]
+        uvw = lengths[0, 6, c] + end * lengths[1, 6, c]
+        p = uv_ + uw_ + uvw
+        q = uv_ + vw_ + uvw
+        r = uw_ + vw_ + uvw
+        change = p * (b + q) * (d + r) + a * q * (d + r) + a * b * r
+        size = a + p + b + q + d + r  # no nodes are farther apart
+        spare[c] = low - change - 2 * ROUNDING * (far[0] + end * far[1]) * size * size
 
 
 @njit(**OPTIONS)

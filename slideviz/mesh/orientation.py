@@ -13,9 +13,8 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import components
-from slideviz.mesh.jacobians import CORNERS, write_corners
+from slideviz.mesh.jacobians import CORNERS, add_corners
 from slideviz.mesh.model import Mesh, sealed
-from slideviz.mesh.skew import ordered_sum
 from slideviz.system.weak_cache import weak_cache
 
 if TYPE_CHECKING:
@@ -44,9 +43,9 @@ def corner_sums(mesh: Mesh) -> FloatArray:
     sums = np.empty(len(mesh.cells))
 
     def add(vtk: int, rows: Index, nodes: IntArray) -> None:
-        alpha = np.empty((len(CORNERS[vtk]), len(nodes)))
-        write_corners(mesh.points, nodes, CORNERS[vtk], alpha)
-        sums[rows] = ordered_sum(alpha)
+        of_part = np.empty(len(nodes))
+        add_corners(mesh.points, nodes, CORNERS[vtk], of_part)
+        sums[rows] = of_part
 
     mesh.cells.in_parts(add)
     return sums

@@ -23,9 +23,9 @@ from slideviz.mesh.jacobians import (
     UNPROVEN,
     VALID,
     check_cells,
+    corners,
     decide_unproven,
     measure,
-    write_corners,
 )
 from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
@@ -376,7 +376,8 @@ def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
     begin, end = mesh.cells.offsets[cell : cell + 2]
     table = CORNERS[int(mesh.cells.types[cell])]
     alpha = np.empty((len(table), 1))
-    write_corners(mesh.points, mesh.cells.connectivity[None, begin:end], table, alpha)
+    coords = mesh.points[mesh.cells.connectivity[begin:end], :, None].swapaxes(0, 1)
+    corners(np.ascontiguousarray(coords), table, 1, alpha)
     return sign * alpha[:, 0]
 
 

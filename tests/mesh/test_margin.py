@@ -154,7 +154,8 @@ def test_a_bound_never_exceeds_the_margin_of_a_cell():
     mesh, points, motion = random_cells(12, 20_000, seed=4)
     after, levels = points + 0.02 * motion, np.empty(20_000, np.int8)
     nodes, turn = mesh.cells.by_type[12][1], np.ones(20_000, np.int8)
-    _write_bounds(points, after, nodes, turn, CAP * BOUNDED, levels)
+    far = np.array([np.abs(points).max(), np.abs(after - points).max()])
+    _write_bounds(points, after, nodes, turn, far, CAP * BOUNDED, levels)
     found = margins(points, after - points, mesh.cells, CAP)
     assert (found >= np.append(0.0, CAP * BOUNDED)[levels]).all()
     assert (np.bincount(levels, minlength=5) > 100).all()  # neither all nor none are bounded
