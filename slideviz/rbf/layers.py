@@ -74,6 +74,10 @@ CORNER = 0.6
 """Largest distance from a point of a facet to its nearest corner over the diagonal of its box; in
 an equilateral triangle it is 1 / sqrt(3) of an edge."""
 
+RIGID = 0.99
+"""Nodes that walls carry with a share above this stay where they carry them in relaxation and
+repair."""
+
 EDGES = 0.01  # weight of the edges of the facets at a wall node over that of their normals, in 3D
 
 
@@ -497,6 +501,11 @@ class LayerZone:
         frame = self.walls.frame
         here = points(frame, coords + by)
         return by + difference_from(frame, here, multiply(self.start - here, self.share) + carried)
+
+    @property
+    def rigid(self) -> IntArray:
+        """Return the nodes (r,) that walls carry nearly alone."""
+        return self.nodes[self.share[:, 0] > RIGID]
 
     def summary(self) -> KeptLayers:
         """Return what a report says of the zone."""

@@ -216,8 +216,6 @@ def _remedy(case: Case, mesh: Mesh, name: str, point: FloatArray) -> str:
         return "METHOD= rbf with LAYERS= AUTO keeps it"
     if case.layers == "no":
         return "LAYERS= AUTO keeps it"
-    if case.repair != "no" and case.repair_below > Case().repair_below:
-        return "repair moves nodes of layers, too; REPAIR_BELOW= 0 mends folded cells only"
     for other in case.markers_with("sliding"):
         if other != name and (mesh.points[mesh.marker(other).nodes] == point).all(axis=1).any():
             return f"{name} leans more against {other} there; move it less"

@@ -1,8 +1,9 @@
 """Repair as a stage: which nodes may move to mend bad cells, and what became of these.
 
-The nodes that the case moves or fixes stay to the bit, and so do all away from bad cells. Others
-move freely inside the mesh, along the boundary that they slide on, and as their periodic images and
-copies do. Here a boundary with the role internal is one to slide on: its nodes stay on its surface.
+The nodes that the case moves or fixes stay to the bit, and so do all away from bad cells. Those of
+layers move only where cells stay folded else. Others move freely inside the mesh, along the
+boundary that they slide on, and as their periodic images and copies do. Here a boundary with the
+role internal is one to slide on: its nodes stay on its surface.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, quality_ratings, repair_mesh
 from slideviz.mesh.zones import spellings, with_zones, zones_of
 from slideviz.solver.domain import find_domain
+from slideviz.solver.layers import layer_zone
 from slideviz.solver.prescribed import BoundaryConditions
 from slideviz.solver.remedies import MOST_NAMES
 from slideviz.solver.setup import Setup, elastic_body, setup_of
@@ -209,16 +211,18 @@ def mend(
         return _mended_zones(case, mesh, now, reference, tick)
     domain, cells = without_halo(now)
     shapes = None if reference is None else without_halo(reference)[0]
-    found = quality(domain, shapes, case.quality_metric)
+    metric = case.quality_metric
+    found = quality(domain, shapes, metric)
     limit = case.repair_below
     if shapes is not None:
-        limit = min(limit, quality(shapes, metric=case.quality_metric).min)
+        limit = min(limit, quality(shapes, metric=metric).min)
     if not (quality_ratings(found) < limit).any():
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
+    layers = _layers(case, mesh) if setup is None else setup.rigid
     done = repair_mesh(
-        domain, freedom, shapes, below=limit, metric=case.quality_metric, report=tick
+        domain, freedom, shapes, layers=layers, below=limit, metric=metric, report=tick
     )
     points = done.points
     if now.halo is not None:
@@ -240,8 +244,28 @@ def mend(
         before,
         done.largest_move,
         unmendable,
-        (*warnings, *slide_advice(case, mesh, poor, limit)),
+        (*warnings, *moved_layers(np.isin(layers, moved)), *slide_advice(case, mesh, poor, limit)),
     )
+
+
+def _layers(case: Case, mesh: Mesh) -> IntArray:
+    """Return the nodes of layers (LAYERS) of an undeformed mesh without the setup of its run."""
+    domain = find_domain(case, mesh)
+    known = np.concatenate([domain.classes.moving, domain.classes.fixed])
+    zone = layer_zone(case, mesh, domain, known)
+    return known[:0] if zone is None else zone.rigid
+
+
+def moved_layers(moved: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Return the warning that nodes of layers were moved, or (); ``moved`` (l,): of each node."""
+    if not moved.any():
+        return ()
+    sentence = (
+        f"{counted(int(moved.sum()), 'node')} of layers moved to mend folded cells, which the "
+        "others could not: first heights change there; move the boundary less, or set a smaller "
+        "LAYER_THICKNESS"
+    )
+    return (sentence,)
 
 
 def _mended_zones(
@@ -274,7 +298,8 @@ def unmendable_words(
     def on(ones: Sequence[Impossible]) -> str:
         wrong = np.concatenate([one.nodes for one in ones])
         names = [name for name, some in nodes.items() if np.isin(wrong, some).any()]
-        return f"held on {' and '.join(names)}" if names else "held"
+        layers = " in layers" if any(one.layered for one in ones) else ""
+        return f"held on {' and '.join(names)}{layers}" if names else f"held{layers}"
 
     cells = [one.cell if number is None else int(number[one.cell]) for one in impossible]
     reasons = [f"its nodes are {on([one])}" for one in impossible]

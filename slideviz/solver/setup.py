@@ -178,6 +178,11 @@ class Setup(Domain):
         """
         return self if is_last or self.relaxation is None else replace(self, relaxation=None)
 
+    @property
+    def rigid(self) -> IntArray:
+        """Return the nodes (r,) that walls carry nearly alone."""
+        return self.known[:0] if self.zone is None else self.zone.rigid
+
     @cached_property
     def largest(self) -> float:
         """Return the largest displacement that is asked for, in the frame."""

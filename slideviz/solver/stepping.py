@@ -31,9 +31,6 @@ from slideviz.solver.setup import Setup
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
 
-RIGID = 0.99
-"""Nodes that walls carry with a share above this stay where they carry them in relaxation."""
-
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
 ALIKE = 1.1  # a shorter step may go farther than the straight paths of a longer one by this factor
 
@@ -307,17 +304,9 @@ def one_step(
     relaxed = None
     if setup.relaxation is not None:
         displacement, relaxed = setup.relaxation.relaxed(
-            problem, displacement, _rigid(setup), setup.constraints, tie, timer
+            problem, displacement, setup.rigid, setup.constraints, tie, timer
         )
     return replace(solution, displacement=displacement, relaxed=relaxed)
-
-
-def _rigid(setup: Setup) -> IntArray:
-    """Return the nodes (r,) that walls carry nearly alone."""
-    zone = setup.zone
-    if zone is None:
-        return setup.known[:0]
-    return zone.nodes[zone.share[:, 0] > RIGID]
 
 
 def keep_layers(

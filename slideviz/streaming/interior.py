@@ -106,6 +106,20 @@ class InteriorDisplacer:
             zone.walls, nodes, self.setup.frame.points(start[nodes]), np.zeros(len(nodes), bool)
         )
 
+    def rigid(self, nodes: IntArray, points: FloatArray) -> IntArray:
+        """Return the places (l,) in ``nodes`` of those that walls carry nearly alone.
+
+        ``nodes`` (m,), ``points`` (m, d): as of `after_steps`.
+        """
+        frame = self.setup.frame
+        start = frame.coords(points)
+        at, where = self._in_skin(nodes)
+        inner = ~on_axis(frame, start)
+        inner[at] = False
+        zone = self._zone(start, inner)
+        skin = at[np.isin(where, self.setup.rigid)]
+        return skin if zone is None else np.concatenate([skin, zone.rigid])
+
     def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
         """Return the places (b,) in ``nodes`` of those that are in the skin, and in the skin (b,).
 

@@ -297,9 +297,11 @@ class _ZoneRuns:
         displacer = self._displacers[zone]
         found = self._measured[zone] = self._out.measure(zone, self._listed, displacer)
         points = displacer.steps[-1].mesh.points
-        numbers = skin, setup, points, found.before.quality(), found.after.quality()
+        numbers = setup, points, found.before.quality(), found.after.quality()
         done = self._out.change(
-            zone, "repair", lambda at, file, tick: mend_file(case, at, file, tick, *numbers)
+            zone,
+            "repair",
+            lambda at, file, tick: mend_file(case, at, file, tick, skin, displacer.rigid, *numbers),
         )
         self._displacers[zone] = displacer.repaired(done)
         if len(done.nodes):

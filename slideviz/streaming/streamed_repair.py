@@ -18,6 +18,7 @@ from slideviz.mesh.repair.repair import Region, mend_cells
 from slideviz.solver.deform import free_memory
 from slideviz.solver.repair_stage import (
     find_freedom,
+    moved_layers,
     slide_advice,
     unmarked_sides,
     unmendable_words,
@@ -32,6 +33,9 @@ BYTES = 3000  # of memory that repair takes for each cell of a region: measured 
 Chosen = Callable[[ElementBlock, IntArray], NDArray[np.bool_]]
 """Takes cells (k,) of a file, and where the nodes of each begin; returns which of them count."""
 
+Layers = Callable[[IntArray, FloatArray], IntArray]
+"""Takes nodes (m,) and their undeformed points (m, d); returns the places of those of layers."""
+
 
 class FileRegions:
     """A deformed mesh in a file, of which one region is in memory at a time.
@@ -40,6 +44,7 @@ class FileRegions:
     ``file``: descriptor of the file of its points, to which moved ones are written.
     ``skin`` and ``freedom``: the boundary and the cells at it, and the freedom of its nodes.
     ``facets`` (f, 2 or 4): the sides that are on a boundary, by nodes of the skin.
+    ``layers``: which nodes move only where cells stay folded else.
     ``going_on``: called with each block of cells; what it raises ends the work.
     """
 
@@ -50,6 +55,7 @@ class FileRegions:
         skin: Mesh,
         freedom: Freedom,
         facets: IntArray,
+        layers: Layers,
         going_on: Callable[[], object],
     ) -> None:
         self._source = source
@@ -58,9 +64,12 @@ class FileRegions:
         self._skin = skin.numbering.points
         self._freedom = freedom
         self._facets = facets
+        self._layers = layers
         self.nodes = self._skin[:0]
         self.before = np.empty((0, skin.dim))
-        """`nodes`, `before` (m,), (m, d): nodes in regions that were moved, and where they were."""
+        self.moved_layers = self._skin[:0]
+        """`nodes`, `before`, `moved_layers` (m,), (m, d), (l,): nodes in regions that were moved,
+        where they were, and which of them are of layers."""
         self.warnings: tuple[str, ...] = ()
 
     def near(self, cells: IntArray, rings: int) -> Region | None:
@@ -94,7 +103,9 @@ class FileRegions:
         assert self._source.base is not None
         mesh = Mesh(self._source.points.at(nodes), table, name=self._source.file.name)
         reference = mesh.with_points(self._source.base.at(nodes))
-        return Region(ids, nodes, mesh, reference, self._freedom_of(nodes, near[nodes], reference))
+        freedom = self._freedom_of(nodes, near[nodes], reference)
+        layers = self._layers(nodes, reference.points)
+        return Region(ids, nodes, mesh, reference, freedom, layers)
 
     def cells(self, which: IntArray) -> Cells:
         """Return the cells with some numbers (k,), ascending."""
@@ -109,6 +120,7 @@ class FileRegions:
         """Write the points (n, d) of the nodes of a region that were moved."""
         moved = np.flatnonzero((points != region.mesh.points).any(axis=1))
         nodes = region.nodes[moved]
+        self.moved_layers = np.union1d(self.moved_layers, nodes[np.isin(moved, region.layers)])
         new = ~np.isin(nodes, self.nodes)
         every = np.concatenate([self.nodes, nodes[new]])
         order = np.argsort(every)
@@ -161,6 +173,7 @@ def mend_file(
     file: int,
     tick: Tick,
     skin: Mesh,
+    layers: Layers,
     setup: Setup,
     points: FloatArray,
     before: Quality,
@@ -170,6 +183,7 @@ def mend_file(
 
     ``source`` and ``file``: as of `FileRegions`.
     ``skin`` and ``setup``: the undeformed skin, with its cells, and its setup.
+    ``layers``: as of `FileRegions`.
     ``points`` (k, d): of the deformed skin.
     ``before`` and ``after``: quality of all cells, undeformed and deformed.
     """
@@ -190,7 +204,7 @@ def mend_file(
 
     freedom = find_freedom(case, skin, points, setup)
     facets = setup.boundary.facets
-    regions = FileRegions(source, file, skin, freedom, facets, lambda: tick(done))
+    regions = FileRegions(source, file, skin, freedom, facets, layers, lambda: tick(done))
     ratings = np.where(np.isin(bad, folded), -1.0, after.values[bad])
     left, still, impossible = mend_cells(regions, bad, ratings, below, case.quality_metric, report)
     if regions.warnings and not len(regions.nodes):
@@ -207,6 +221,8 @@ def mend_file(
     # Later regions may have moved a node back to where it was.
     kept = np.flatnonzero(way > 0.0)
     unmendable, warnings = unmendable_words(impossible, skin)
+    kept_nodes = regions.nodes[kept]
+    layers_moved = moved_layers(np.isin(regions.moved_layers, kept_nodes))
     advice = tuple[str, ...]()
     if len(poor := np.setdiff1d(left, still)):
         advice = slide_advice(case, skin, regions.cells(poor), below)
@@ -216,9 +232,9 @@ def mend_file(
         left,
         folded,
         still,
-        regions.nodes[kept],
+        kept_nodes,
         regions.before[kept],
         float(way.max(initial=0.0)),
         unmendable,
-        (*warnings, *advice, *regions.warnings),
+        (*warnings, *layers_moved, *advice, *regions.warnings),
     )

@@ -23,6 +23,7 @@ from slideviz.session.state import Run, StepFrame
 from slideviz.solver.layers import height_warnings
 from slideviz.solver.prepare import prepare
 from slideviz.solver.remedies import remedies
+from slideviz.solver.repair_stage import mended_frame
 from slideviz.solver.setup import make_setup
 from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
@@ -460,12 +461,37 @@ def test_the_sides_of_a_sharp_edge_in_3d_turn_by_themselves():
     assert sv.quality(last.mesh, mesh).inverted == 0
 
 
-@pytest.mark.parametrize("below", [0.0, 0.9])
-def test_heights_that_repair_changed_have_its_remedy(below):
+@pytest.mark.parametrize("afterwards", [False, True])
+def test_repair_of_poor_cells_keeps_first_heights(afterwards):
     mesh = around(ellipse, 40, 80)
     x = mesh.points[mesh.marker("w").nodes, 0]
     stretched = np.stack([0.5 * x * np.abs(x), 0 * x], axis=1)
-    case, last = deformed(mesh, lambda _: stretched, repair="yes", repair_below=below)
-    said = "\n".join(height_warnings(case, sv.walls(last.mesh, mesh), last.mesh))
-    assert ("beyond 0.67 to 1.5: repair moves nodes of layers" in said) == (below > 0.0)
-    assert bool(said) == (below > 0.0)
+    case, plain = deformed(mesh, lambda _: stretched)
+    case = case.change(repair="yes", repair_below=0.9)
+    if afterwards:
+        last = mended_frame(case, mesh, plain, lambda _: None)
+    else:
+        *_, last = sv.deform(case, mesh)
+    heights = [
+        sv.walls(step.mesh, mesh).summary()["w"]["first_height"]["ratio"] for step in (plain, last)
+    ]
+    assert len(last.repaired.nodes)
+    assert heights[0] == heights[1]
+    assert not height_warnings(case, sv.walls(last.mesh, mesh), last.mesh)
+    assert not any("of layers" in text for text in last.warnings)
+
+
+def test_layers_move_where_cells_stay_folded_else_and_a_warning_says_so():
+    """A bump leaves less room in a channel than the first layers of both walls need."""
+    mesh = builders.grid((30, 20), place=lambda p: p * [1 / 30, 0.01])
+    wall = mesh.marker("y_m").nodes
+    bump = 0.185 * np.sin(np.pi * mesh.points[wall, 0]) ** 2
+    motion = Prescribed(wall, np.stack([0 * bump, bump], axis=1), "y_m")
+    case = Case(roles={"y_m": "moving"}, motions=(motion,), layers="keep", repair="yes")
+    *_, plain = sv.deform(case.change(repair="no"), mesh)
+    *_, last = sv.deform(case, mesh)
+    assert sv.quality(plain.mesh, mesh).inverted
+    assert not sv.quality(last.mesh, mesh).inverted
+    (said,) = [text for text in last.warnings if "of layers moved to mend folded cells" in text]
+    rigid = make_setup(prepare(case, mesh)).rigid
+    assert said.startswith(f"{np.isin(rigid, last.repaired.nodes).sum()} nodes")

@@ -295,6 +295,28 @@ def test_nodes_on_sides_without_a_marker_stay(tmp_path):
     assert np.array_equal(bits(sv.read(tmp_path / "out.su2b").points), bits(last.mesh.points))
 
 
+@pytest.mark.parametrize("height", [0.15, 0.185])
+def test_repair_holds_layers_as_in_memory_where_no_cell_stays_folded(tmp_path, height):
+    mesh, path = grid((30, 20), place=lambda p: p * [1 / 30, 0.01]), tmp_path / "mesh.su2b"
+    sv.write(path, mesh)
+    case = sv.Case(
+        mesh_file=path,
+        roles={"y_m": "moving", "x_p": "internal"},
+        motions=(sv.Rotate("y_m", np.degrees(height), (0.0, 0.0)),),
+        layers="keep",
+        repair="yes",
+        repair_below=0.4,
+    )
+    mesh = sv.read(path)
+    *_, last = sv.deform(case, mesh)
+    said = [text for text in last.warnings if "of layers moved" in text]
+    assert len(said) == (height > 0.15)
+    assert len(last.repaired.nodes)
+    done = stream(case, tmp_path / "out.su2b")
+    assert np.array_equal(bits(sv.read(tmp_path / "out.su2b").points), bits(last.mesh.points))
+    assert done.steps[-1].warnings == last.warnings
+
+
 def test_bad_cells_stay_where_their_repair_does_not_fit_into_memory(tmp_path, monkeypatch):
     sets = "STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none", "REPAIR=YES"
     case = made(tmp_path, "square", 25, sets)

@@ -80,7 +80,8 @@ class Impossible:
     """A cell that no motion of free nodes mends."""
 
     cell: int
-    nodes: IntArray  # (k,): its nodes that are held and make it fold, ascending
+    nodes: IntArray  # (k,): its nodes that are held and make it bad, ascending
+    layered: bool  # whether some of these are nodes of layers
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,7 @@ class Region:
     mesh: Mesh
     reference: Mesh | None  # `mesh`, `reference`: the region itself, as it is now and undeformed
     freedom: Freedom
+    layers: IntArray  # (l,): of its nodes those of layers, which move only where cells stay folded
 
 
 class Regions(Protocol):
@@ -144,6 +146,7 @@ def repair_mesh(
     freedom: Freedom,
     reference: Mesh | None = None,
     *,
+    layers: IntArray | tuple[()] = (),
     below: float = BELOW,
     metric: SkewMetric = "knupp",
     report: Report = lambda _: None,
@@ -155,6 +158,7 @@ def repair_mesh(
     ``freedom``: which of its nodes may move, and how.
     ``reference``: the undeformed mesh, whose shapes the cells shall have. Without it they shall
     have the ideal shape of their type, in the local size.
+    ``layers`` (l,): nodes that move only where cells stay folded else.
     ``below``: limit of the quality, from 0 to 1; with 0, only cells that are not proved valid are
     bad.
     ``metric``: of the quality (`slideviz.mesh.quality.Quality`).
@@ -163,7 +167,7 @@ def repair_mesh(
     shapes = None if reference is None else checked_reference(reference, mesh)
     ratings = quality_ratings(quality(mesh, shapes, metric))
     before = np.flatnonzero(ratings < below)
-    whole = _Whole(mesh, shapes, freedom)
+    whole = _Whole(mesh, shapes, freedom, np.array(layers, np.int64))
     after, folded, impossible = mend_cells(whole, before, ratings[before], below, metric, report)
     points = whole.points
     way = np.linalg.norm(points - mesh.points, axis=1)
@@ -181,11 +185,13 @@ def repair_mesh(
 class _Whole:
     """A mesh in memory: one region."""
 
-    def __init__(self, mesh: Mesh, reference: Mesh | None, freedom: Freedom) -> None:
+    def __init__(
+        self, mesh: Mesh, reference: Mesh | None, freedom: Freedom, layers: IntArray
+    ) -> None:
         self.points = np.array(mesh.points)
-        self._region = Region(
-            np.arange(len(mesh.cells)), np.arange(len(mesh.points)), mesh, reference, freedom
-        )
+        cells = np.arange(len(mesh.cells))
+        nodes = np.arange(len(mesh.points))
+        self._region = Region(cells, nodes, mesh, reference, freedom, layers)
 
     def near(self, _cells: IntArray, _rings: int) -> Region:
         return replace(self._region, mesh=self._region.mesh.with_points(self.points))
@@ -205,7 +211,8 @@ def mend_cells(
     """Mend the bad cells (k,) of a mesh, in rounds whose limit rises to ``below``.
 
     Each round begins with the mesh of the one before. So a limit that cannot be reached loses
-    nothing, and a stricter one ends with no worse mesh.
+    nothing, and a stricter one ends with no worse mesh. Nodes of layers stay, but near cells that
+    are folded after these rounds: there they move as well, until the cells are unfolded.
 
     Return those that are bad then, those that are not proved valid, and those that cannot be
     mended.
@@ -214,7 +221,7 @@ def mend_cells(
     """
     report(0.0)
     first, *others = [*(limit for limit in LIMITS if limit < below), below]
-    begin, smaller, *ticks = equal_shares(report, len(others) + 2)
+    begin, smaller, unfold, lift, *ticks = equal_shares(report, len(others) + 4)
     with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
         mending = _Rounds(regions, bad, ratings, below, metric, pool)
         mending.mend(first, begin)
@@ -226,6 +233,10 @@ def mend_cells(
         for limit, tick in zip(others, ticks, strict=True):
             if limit == below or mending.reached:
                 mending.mend(limit, tick)
+        if mending.layered and (mending.ratings < 0.0).any():
+            mending.mend(0.0, unfold, layers_stay=False)
+            if not (mending.ratings < 0.0).any():
+                mending.mend(below, lift)
     impossible = tuple(sorted(mending.impossible.values(), key=lambda one: one.cell))
     return mending.cells, mending.cells[mending.ratings < 0.0], impossible
 
@@ -235,6 +246,7 @@ class _Rounds:
 
     ``cells`` (k,): the cells that are rated below ``below``, ascending, with ``ratings`` (k,).
     ``impossible``: those that cannot be mended, by number.
+    ``layered``: whether nodes of layers were held near them.
     """
 
     def __init__(
@@ -253,21 +265,27 @@ class _Rounds:
         self.metric = metric
         self.pool = pool
         self.impossible = dict[int, Impossible]()
+        self.layered = False
         self.reached = True  # whether no cell that can be mended is below the limit of the round
 
-    def mend(self, limit: float, report: Report) -> None:
+    def mend(self, limit: float, report: Report, layers_stay: bool = True) -> None:
         """Mend the cells that are rated below a limit, in patches that grow."""
         bad = self.cells[self.ratings < limit]
         for stage, tick in enumerate(equal_shares(report, len(RINGS))):
             region = self.regions.near(bad, RINGS[stage]) if len(bad) else None
             if region is None:
                 return
+            self.layered |= len(region.layers) > 0
+            if layers_stay:
+                region = replace(region, freedom=region.freedom.without(region.layers))
             mesh = region.mesh
             reference = region.reference
             sums, signs = reference_of(mesh if reference is None else reference)
             wanted = np.isin(region.cells, bad)
             points = np.array(mesh.points)
             if not stage:
+                for cell in bad:
+                    self.impossible.pop(cell, None)
                 for one in _impossible(region, wanted, signs, sums, self.metric):
                     self.impossible[one.cell] = one
             hopeless = np.isin(region.cells, list(self.impossible))
@@ -328,8 +346,9 @@ def _impossible(
             if wrong is None and not proved:
                 wrong = _fold(vtk, own, held[own], points[own], int(signs[cell]))
             if wrong is not None:
+                layered = bool(np.isin(wrong, region.layers).any())
                 wrong = sealed(np.sort(region.nodes[wrong]))
-                out.append(Impossible(int(region.cells[cell]), wrong))
+                out.append(Impossible(int(region.cells[cell]), wrong, layered))
     return out
 
 
