@@ -24,7 +24,7 @@ class Message:
     place: tuple[str | Path, ...] = ()  # from the outermost: a file, a zone, a motion, a key
     line: int = 0  # of the file, from 1; 0 for none
     value: str = ""  # in quotes; empty where the rule has it
-    keys: tuple[str, ...] = ()  # of the case file, that contradict each other
+    keys: tuple[str, ...] = ()  # of the case file, that it is about
     level: Level = "warning"  # a note is harmless and asks for no change
 
     def __str__(self) -> str:
@@ -43,12 +43,25 @@ class Message:
         return f"{sentence}; {self.remedy}" if self.remedy else sentence
 
 
+@dataclass(frozen=True)
+class Doubt(Message):
+    """A message that a motion hardly does what is meant: the likely cause of whatever else fails.
+
+    Errors begin with it, and its remedy comes before others.
+    """
+
+
 Remark = str | Message  # a text is a message without a place
 
 
 def note(text: str) -> Message:
     """Return a harmless message, which asks for no change."""
     return Message(text, level="note")
+
+
+def doubts_of(remarks: Iterable[Remark]) -> tuple[Doubt, ...]:
+    """Return those of some remarks that are doubts."""
+    return tuple(one for one in remarks if isinstance(one, Doubt))
 
 
 def messages_of(remarks: Iterable[Remark]) -> tuple[Message, ...]:
@@ -148,8 +161,14 @@ def not_one_of(value: object, known: Iterable[str]) -> str:
     return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean X?`` with the known name most similar to ``name``; "" if none is."""
+def most_similar(name: str, known: Iterable[str]) -> str:
+    """Return the known name most similar to ``name``; "" if none is."""
     by_lower = {other.lower(): other for other in known}
     close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[close[0]]}?" if close else ""
+    return by_lower[close[0]] if close else ""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean X?`` with the known name most similar to ``name``; "" if none is."""
+    close = most_similar(name, known)
+    return f"; did you mean {close}?" if close else ""

@@ -583,6 +583,38 @@ def test_what_is_harmless_is_a_note_and_no_warning(square, capsys):
         assert "slideviz: warning: SLIDING_MODE= none: " in told
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("MARKER_MOVING", "( BLOK )", ": MARKER_MOVING: mesh.su2 has no marker 'BLOK'; did you"),
+        ("MARKER_PERIODIC", "( LOWER )", ": MARKER_PERIODIC has an odd number of markers"),
+        ("SUPPORT_RADIUS", "1e30", ": SUPPORT_RADIUS: 1e+30 does not fit mesh.su2"),
+        ("MOTION", "(BLOCK, translate, 1, 2, 3)", ": motion 2: the shift has 3 components"),
+        ("LIMITS", "growth@BLOK < 2", ": LIMITS: mesh.su2 has no marker 'BLOK'"),
+    ],
+)
+def test_what_does_not_fit_the_mesh_has_its_line_in_the_case(square, capsys, key, value, said):
+    path = square / "square.cfg"
+    entries = dict(line.split("= ") for line in path.read_text().splitlines() if "= " in line)
+    lines = [f"{name}= {old}" for name, old in (entries | {key: value}).items()]
+    path.write_text("\n".join(lines))
+    assert run(["run", str(path)]) == 1
+    line = next(at for at, text in enumerate(lines, 1) if text.startswith(f"{key}="))
+    assert f"{path}:{line}{said}" in capsys.readouterr().err
+    path.write_text("\n".join(text for text in lines if not text.startswith(f"{key}=")))
+    assert run(["run", str(path), "--set", f"{key}={value}"]) == 1
+    assert f"{path}{said}" in capsys.readouterr().err
+
+
+def test_a_missing_list_is_called_missing(square, capsys):
+    path = square / "square.cfg"
+    lines = [*path.read_text().splitlines(), "MOTION= (BLOCK, translate, 0.1, 0)"]
+    path.write_text("\n".join(line for line in lines if not line.startswith("MARKER_MOVING")))
+    assert run(["run", str(path)]) == 1
+    said = f"{path}: no marker moves: MARKER_MOVING is missing; write MARKER_MOVING= (BLOCK)"
+    assert capsys.readouterr().err.strip() == f"slideviz: {said}"
+
+
 def test_roles_that_the_method_does_not_use_are_told(square, capsys):
     argv = ["run", str(square / "square.cfg"), "--set", "STEPS=3", "--set", "SLIDING_MODE=none"]
     run([*argv, "--set", "PERIODIC_MODE=none", "--json", "-"])

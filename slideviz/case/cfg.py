@@ -16,7 +16,7 @@ from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, entries_of, listed, read_text, require_no_mesh
-from slideviz.errors import CaseError, Message, nearest, raise_all, shown
+from slideviz.errors import CaseError, Message, most_similar, nearest, raise_all, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
@@ -135,15 +135,12 @@ def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tup
         else:
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
-    twice = _second_roles(rows, values)
-    # A mistyped key, or two roles of a marker, make contradictions that are not reported as well.
-    said = " ".join(problem.text for problem in problems)
-    doubtful = {key for key in KEYS if f"did you mean {key}?" in said}
-    doubtful |= {"MARKER_MOVING"} if twice else set()
-    problems += twice
+    problems += _second_roles(rows, values)
+    # A mistyped key makes contradictions that are not reported as well.
+    mistyped = {most_similar(key, KEYS) for key in names - KEYS.keys()}
     for message in contradictions(case):
         keys = message.keys
-        if doubtful.intersection(keys):
+        if mistyped.intersection(keys):
             continue
         # A key that could not be read is reported already; what follows from it need not be.
         if all(key in values for key in keys if key in rows):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from slideviz.case.ffd_keys import ffd_contradictions
@@ -15,7 +16,7 @@ from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.zone_cases import with_marker_names, zone_cases
-from slideviz.errors import CaseError, Message, nearest, note
+from slideviz.errors import CaseError, Doubt, Message, most_similar, note
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
 from slideviz.terms import KERNELS, ROLES, SLIDES
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
 
 _LISTED = 12
+_INTERFACES = "MARKER_ZONE_INTERFACE"
 
 
-def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
+def check_case(case: Case, mesh: Mesh) -> tuple[Message, ...]:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
     case = with_marker_names(case, mesh)
     if isinstance(mesh, Assembly):
@@ -34,8 +36,9 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     return (
         *_radius_problems(case, mesh),
         *_method_problems(case),
-        *map(str, contradictions(case, exact=True)),
+        *contradictions(case),
         *marker_problems(case, mesh),
+        *_motions_of_others(case, mesh),
         *motion_problems(case, mesh),
         *_zone_problems(case, mesh),
         *_periodic_problems(case, mesh),
@@ -43,73 +46,61 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     )
 
 
-def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[str]:
+def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[Message]:
     """Yield why a mesh of all zones cannot be deformed, of the case and of zones that move."""
     if len(case.interfaces) % 2:
-        yield f"MARKER_ZONE_INTERFACE: {', '.join(case.interfaces)} are not pairs of boundaries"
+        rule = f"{', '.join(case.interfaces)} are not pairs of boundaries"
+        yield Message(rule, place=(_INTERFACES,), keys=(_INTERFACES,))
         return
-    moved = {name: "MOTION" for motion in case.motions for name in named(motion.marker)}
-    keys = moved | _keys_of_markers(case) | dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE")
+    interfaces = dict.fromkeys(case.interfaces, _INTERFACES)
+    keys = _moved(case) | _keys_of_markers(case) | interfaces
     several = {name: key for name, key in keys.items() if _of_several_zones(mesh, name)}
     if several:  # what else is wrong may be so by these names only
         yield from unknown_markers(mesh, several)
         return
-    yield from map(str, contradictions(case, exact=True))
+    yield from contradictions(case)
     yield from marker_problems(case, mesh)
-    yield from unknown_markers(mesh, dict.fromkeys(case.interfaces, "MARKER_ZONE_INTERFACE"))
+    yield from _motions_of_others(case, mesh)
+    yield from unknown_markers(mesh, interfaces)
     yield from _zone_problems(case, mesh)
     if not case.markers_with("periodic"):
         yield from _periodic_problems(case, mesh)
-    if unmoved := _without_motion(case):  # which zones have without the numbers of their names
+    if unmoved := _without_motion(
+        case, mesh
+    ):  # which zones have without the numbers of their names
         yield from unmoved
         return
     try:
         cases = zone_cases(case, mesh, False)
     except CaseError as problem:
-        yield str(problem)
+        yield from problem.messages
         return
     for number, (one, part) in enumerate(zip(cases, mesh.parts, strict=True), 1):
         if one.markers_with("moving"):
-            yield from (f"zone {number}: {text}" for text in check_case(one, part.mesh))
+            yield from CaseError(*check_case(one, part.mesh)).within(f"zone {number}")
 
 
-def _method_problems(case: Case) -> Iterator[str]:
+def _method_problems(case: Case) -> Iterator[Message]:
     """Yield why the method of a case cannot relax or keep layers, as it is asked to."""
     if case.method == "rbf":
         return
     for key, value in (("RELAX", case.relax), ("LAYERS", case.layers)):
         if value in ("yes", "keep"):
-            yield (
+            yield Message(
                 f"{key}= {value.upper()} acts after METHOD= rbf only, and METHOD= {case.method} "
-                f"is there to be compared with as it is; use {key}= AUTO or NO, or METHOD= rbf"
+                "is there to be compared with as it is",
+                f"use {key}= AUTO or NO, or METHOD= rbf",
+                keys=(key,),
             )
 
 
-def contradictions(case: Case, *, exact: bool = False) -> list[Message]:
+def contradictions(case: Case) -> list[Message]:
     """Return a message for keys that contradict each other, whatever the mesh.
 
     What else a run needs is found by `check_case`: a case without it can be read from a file, and
-    put right with ``--set``. Unless ``exact``, 1:blade may be another spelling of blade.
+    put right with ``--set``.
     """
     problems = list[Message]()
-    moving = case.markers_with("moving")
-    spelt = () if exact else {without_zone(name) for name in moving}
-    seen: set[str] = set()
-    for place, motion in enumerate(case.motions, start=1):
-        for name in named(motion.marker):
-            if name in moving or name in seen or without_zone(name) in spelt:
-                continue
-            seen.add(name)
-            remedy = f"one of the two is wrong{nearest(name, moving)}"
-            several = name.split("+")
-            if set(several) <= set(moving):
-                markers = ", ".join(several)
-                remedy = f"write several in brackets, e.g. (({markers}), translate, ...)"
-            sentence = (
-                f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
-                f"({', '.join(moving)}) does not have it; {remedy}"
-            )
-            problems.append(Message(sentence, keys=("MOTION", "MARKER_MOVING")))
     if case.periodic_type == "rotational" and case.direction in (0, 2):
         name = "r" if case.direction == 0 else "z"
         sentence = (
@@ -126,20 +117,34 @@ def contradictions(case: Case, *, exact: bool = False) -> list[Message]:
     return problems + ffd_contradictions(case)
 
 
-def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return a sentence for each marker of the case that the mesh lacks, and if no marker moves."""
+def marker_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+    """Return a message for each marker of the case that the mesh lacks, and if no marker moves."""
     there = [limit for limit in case.limits if limit.marker in mesh.marker_names]
     unknown = unknown_markers(mesh, _keys_of_markers(case))
-    problems = (*unknown, *not_walls(there, case.walls(mesh.marker_names)))
+    unfit = not_walls(there, case.walls(mesh.marker_names))
+    problems = (*unknown, *(replace(limit, keys=("LIMITS",)) for limit in unfit))
     if case.markers_with("moving"):
         return problems
-    return (*problems, "no marker moves; name one in MARKER_MOVING")
+    names = ", ".join(name for name in _moved(case) if name in mesh.marker_names)
+    return (
+        *problems,
+        Message(
+            "no marker moves: MARKER_MOVING is missing",
+            f"write MARKER_MOVING= ({names or '...'})",
+            keys=("MARKER_MOVING",),
+        ),
+    )
 
 
 def _keys_of_markers(case: Case) -> dict[str, str]:
     """Return the key that names each marker with a role or a limit."""
     roles = {name: ROLES[role].key for name, role in case.roles.items()}
     return roles | {limit.marker: "LIMITS" for limit in case.limits if limit.marker}
+
+
+def _moved(case: Case) -> dict[str, str]:
+    """Return ``MOTION`` for each marker that a motion names."""
+    return {name: "MOTION" for motion in case.motions for name in named(motion.marker)}
 
 
 def _of_several_zones(mesh: Mesh, marker: str) -> str:
@@ -149,37 +154,76 @@ def _of_several_zones(mesh: Mesh, marker: str) -> str:
     return " or ".join(name for name in mesh.marker_names if without_zone(name) == marker)
 
 
-def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
-    """Return a sentence for each marker of ``named`` (to the key that names it) the mesh lacks."""
-    known = mesh.marker_names
-    names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
-    has = f"it has {names}" if known else "it has none"
+def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[Message]:
+    """Return a message for each marker of ``named`` (to the key that names it) the mesh lacks."""
     return [
-        f"{key}: several zones of {mesh.name} have a marker {marker!r}; write {joined}"
-        if (joined := _of_several_zones(mesh, marker))
-        else f"{key}: {mesh.name} has no marker {marker!r}{nearest(marker, known) or f'; {has}'}"
+        Message(*_unknown_marker(mesh, marker), place=(key,), keys=(key,))
         for marker, key in named.items()
-        if marker not in known
+        if marker not in mesh.marker_names
     ]
 
 
-def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return a sentence for each moving marker without motion, and each motion that is unfit."""
-    found = _without_motion(case)
+def _unknown_marker(mesh: Mesh, marker: str) -> tuple[str, str]:
+    """Return that a mesh has no such marker, and the remedy."""
+    if joined := _of_several_zones(mesh, marker):
+        return f"several zones of {mesh.name} have a marker {marker!r}", f"write {joined}"
+    known = mesh.marker_names
+    several = marker.split("+")
+    if set(several) <= {*known}:
+        remedy = f"write several in brackets, e.g. (({', '.join(several)}), translate, ...)"
+    elif close := most_similar(marker, known):
+        remedy = f"did you mean {close}?"
+    else:
+        names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
+        remedy = f"it has {names or 'none'}"
+    return f"{mesh.name} has no marker {marker!r}", remedy
+
+
+def motion_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+    """Return a message for each motion that is unfit, and each marker that lacks its motion.
+
+    Markers that the mesh does not have are told by `marker_problems`.
+    """
+    found = _without_motion(case, mesh)
     for place, motion in enumerate(case.motions):
         wrong = motion.incomplete() or _text_problem(motion)
         problems = [wrong] if wrong else motion.problems(case, mesh, place)
-        found += [f"motion {place + 1}: {text}" for text in problems]
+        found += [
+            Message(text, place=(f"motion {place + 1}",), keys=("MOTION",)) for text in problems
+        ]
     return tuple(found)
 
 
-def motion_doubts(case: Case, mesh: Mesh) -> Iterator[Message]:
-    """Yield a message for each motion that can be made, but hardly does what is meant."""
+def _motions_of_others(case: Case, mesh: Mesh) -> list[Message]:
+    """Return a message for each marker that a motion names, but that does not move."""
     moving = case.markers_with("moving")
-    for place, motion in enumerate(case.motions, 1):
-        names = [name for name in moving if applies_to(motion, name)]
-        if names:
-            yield from CaseError(*motion.doubts(mesh, names)).within(f"motion {place}")
+    others = {name: key for name, key in _moved(case).items() if name not in moving}
+    unknown = {name: key for name, key in others.items() if name not in case.roles}
+    problems = unknown_markers(mesh, unknown)
+    if problems or not moving or not {*moving} <= {*mesh.marker_names}:
+        return problems  # the others may be right then
+    return [
+        Message(
+            f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
+            f"({', '.join(moving)}) does not have it",
+            "one of the two is wrong",
+            keys=("MOTION",),
+        )
+        for place, motion in enumerate(case.motions, start=1)
+        for name in named(motion.marker)
+        if name in others
+    ]
+
+
+def motion_doubts(case: Case, mesh: Mesh) -> tuple[Doubt, ...]:
+    """Return a doubt about each motion that can be made, but hardly does what is meant."""
+    moving = case.markers_with("moving")
+    return tuple(
+        replace(doubt, place=(f"motion {place}",))
+        for place, motion in enumerate(case.motions, 1)
+        if (names := [name for name in moving if applies_to(motion, name)])
+        for doubt in motion.doubts(mesh, names)
+    )
 
 
 def _text_problem(motion: Motion) -> str:
@@ -195,14 +239,19 @@ def _text_problem(motion: Motion) -> str:
     return ""
 
 
-def _without_motion(case: Case) -> list[str]:
+def _without_motion(case: Case, mesh: Mesh) -> list[Message]:
     boxed = bool(box_motions(case))
     of_all = ", or move all moving markers in the box with (*, ffd, ...)" if boxed else ""
     return [
-        f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
-        f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
+        Message(
+            f"moving marker {marker!r} has no motion",
+            f"add MOTION= ({marker}, translate, ...) or DEFORMATION_FILENAME, or name it in "
+            f"MARKER_FIXED instead if it stays{of_all}",
+            keys=("MARKER_MOVING",),
+        )
         for marker in case.markers_with("moving")
-        if not any(applies_to(motion, marker) for motion in case.motions)
+        if marker in mesh.marker_names
+        and not any(applies_to(motion, marker) for motion in case.motions)
     ]
 
 
@@ -220,44 +269,52 @@ def key_problems(case: Case) -> Iterator[Message]:
             yield Message(str(problem), place=(key.name,))
 
 
-def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+def _radius_problems(case: Case, mesh: Mesh) -> Iterator[Message]:
     low = mesh.extent * FACTORS[0]
     high = mesh.extent * FACTORS[1]
     if case.support_radius is not None and not low < case.support_radius < high:
-        yield (
+        yield Message(
             f"SUPPORT_RADIUS: {case.support_radius!r} does not fit {mesh.name}, whose extent is "
-            f"{mesh.extent:g}; expected a length above {low:g} and below {high:g}"
+            f"{mesh.extent:g}",
+            f"expected a length above {low:g} and below {high:g}",
+            keys=("SUPPORT_RADIUS",),
         )
 
 
-def _zone_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+def _zone_problems(case: Case, mesh: Mesh) -> Iterator[Message]:
     if case.zone is not None and case.zone != mesh.zone:
         is_zone = f"{mesh.name} is {f'zone {mesh.zone} of' if mesh.zone else 'all'} {mesh.zones}"
-        yield f"ZONE= {case.zone}, but {is_zone}; read that zone or change ZONE"
+        rule = f"ZONE= {case.zone}, but {is_zone}"
+        yield Message(rule, "read that zone or change ZONE", keys=("ZONE",))
 
 
-def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[Message]:
     markers = case.markers_with("periodic")
     if case.periodic != "none" and not markers:
-        yield (
+        yield Message(
             f"PERIODIC_MODE= {case.periodic} needs MARKER_PERIODIC: name the boundaries that "
-            "repeat, or choose none"
+            "repeat, or choose none",
+            keys=("PERIODIC_MODE",),
         )
     if len(markers) % 2:
-        yield (
-            f"MARKER_PERIODIC has an odd number of markers ({', '.join(markers)}); they come in "
-            "pairs: name the partner too"
+        yield Message(
+            f"MARKER_PERIODIC has an odd number of markers ({', '.join(markers)})",
+            "they come in pairs: name the partner too",
+            keys=("MARKER_PERIODIC",),
         )
     if case.periodic == "moving" and case.sliding == "none":
-        yield (
+        yield Message(
             f"PERIODIC_MODE= moving needs a sliding method: set SLIDING_MODE= {SLIDES}, or "
-            "choose PERIODIC_MODE= fixed"
+            "choose PERIODIC_MODE= fixed",
+            keys=("PERIODIC_MODE",),
         )
     if mesh.dim == 2 and case.periodic != "none":
         if case.direction == 2:
-            yield "PERIODIC_DIRECTION= 2 is z, and the mesh has 2 dimensions; choose x or y"
+            rule = "PERIODIC_DIRECTION= 2 is z, and the mesh has 2 dimensions"
+            yield Message(rule, "choose x or y", keys=("PERIODIC_DIRECTION",))
         if case.periodic_type != "translational" and any(case.axis[:2]):
-            yield f"PERIODIC_AXIS= {case.axis} leaves the plane; in 2D it is z"
+            rule = f"PERIODIC_AXIS= {case.axis} leaves the plane"
+            yield Message(rule, "in 2D it is z", keys=("PERIODIC_AXIS",))
 
 
 def idle_roles(case: Case) -> tuple[str, ...]:
@@ -287,11 +344,15 @@ _SLIDES = {
 }
 
 
-def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return a sentence for each moving halo copy of a boundary that does not move."""
+def _halo_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+    """Return a message for each moving halo copy of a boundary that does not move."""
     return tuple(
-        f"{mesh.name}: {copy} is a halo copy of {origin} (SEND_RECEIVE) and cannot move by itself; "
-        f"make {origin} moving"
+        Message(
+            f"{mesh.name}: {copy} is a halo copy of {origin} (SEND_RECEIVE) and cannot move by "
+            "itself",
+            f"make {origin} moving",
+            keys=("MARKER_MOVING",),
+        )
         for copy, origin in (mesh.halo.sides if mesh.halo is not None else ())
         if case.roles.get(copy) == "moving" != case.roles.get(origin)
     )

@@ -18,7 +18,7 @@ import numpy as np
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.case.values import Kind
 from slideviz.case.words import first_of, name_text, number
-from slideviz.errors import CaseError, Message, nearest, not_one_of, raise_all, shown
+from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, raise_all, shown
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
@@ -352,7 +352,9 @@ def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[Limit
     Raises CaseError for a limit on a number that compares with the undeformed mesh where there is
     none, and for one at a boundary that is not a wall.
     """
-    problems = [] if measured.boundaries is None else not_walls(limits, measured.boundaries)
+    problems = list[Remark]()
+    if measured.boundaries is not None:
+        problems += not_walls(limits, measured.boundaries)
     if measured.reference is None and measured.mesh is not None:
         problems += [
             f"LIMITS: {limit} compares with the undeformed mesh; give it (--reference UNDEFORMED)"
@@ -363,12 +365,15 @@ def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[Limit
     return tuple(_result(limit, measured) for limit in limits)
 
 
-def not_walls(limits: Iterable[Limit], walls: Sequence[str]) -> list[str]:
-    """Return a sentence for each limit at a boundary that is none of the ``walls``."""
+def not_walls(limits: Iterable[Limit], walls: Sequence[str]) -> list[Message]:
+    """Return a message for each limit at a boundary that is none of the ``walls``."""
     named = ", ".join(walls) or "none: all boundaries are periodic or internal"
     return [
-        f"LIMITS: {limit}: {limit.marker} is periodic or internal, so it has no wall layers; "
-        f"walls are {named}"
+        Message(
+            f"{limit}: {limit.marker} is periodic or internal, so it has no wall layers",
+            f"walls are {named}",
+            place=("LIMITS",),
+        )
         for limit in limits
         if limit.marker and limit.marker not in walls
     ]

@@ -7,12 +7,10 @@
 from __future__ import annotations
 
 from slideviz.case.motions.kinds import KIND_OF, KINDS
-from slideviz.case.motions.motion import Motion, Target, named
+from slideviz.case.motions.motion import ALL_MOVING, Motion, Target
 from slideviz.case.values import Kind
-from slideviz.case.words import Word, is_none, name_text, words_of
+from slideviz.case.words import Word, is_none, words_of
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
-
-ALL_MOVING = "*"
 
 
 def read_motions(text: str) -> tuple[Motion, ...]:
@@ -33,7 +31,7 @@ def read_motions(text: str) -> tuple[Motion, ...]:
 
 def write_motions(motions: tuple[Motion, ...]) -> str:
     """Return the value of ``MOTION``, a line for each motion; CaseError if one has no such form."""
-    return " ; \\\n    ".join(_motion_text(motion) for motion in motions) or "( )"
+    return " ; \\\n    ".join(motion.text for motion in motions) or "( )"
 
 
 def _groups(words: list[Word], text: str) -> list[list[Word]]:
@@ -89,19 +87,6 @@ def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
     if len(set(names)) < len(names):
         raise CaseError(f"({', '.join(names)}) names a marker twice; name each once")
     return names if len(names) > 1 else names[0], items[end + 1 :]
-
-
-def _motion_text(motion: Motion) -> str:
-    return f"({', '.join([_target_text(motion.marker), motion.verb, *motion.arguments()])})"
-
-
-def _target_text(target: Target) -> str:
-    names = [name_text(name) for name in named(target)]
-    if isinstance(target, str):
-        return names[0] if names else ALL_MOVING
-    if len(names) < 2 or len(set(names)) < len(names):
-        raise CaseError(f"{target} are not several markers; give a name, or two different ones")
-    return f"({', '.join(names)})"
 
 
 GRAMMAR = (

@@ -6,6 +6,7 @@ cancelled; 143 ended by SIGTERM.
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import re
@@ -63,7 +64,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
             note_compilation(arguments.quiet),
             holding() if arguments.holds else nullcontext() as arguments.begun,
         ):
-            return int(arguments.command(arguments))
+            return _called(arguments)
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):
@@ -96,6 +97,19 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
             "output of the same command under SLIDEVIZ_DEBUG=1",
             WRONG_INPUT,
         )
+
+
+def _called(arguments: argparse.Namespace) -> int:
+    """Call the command of the arguments; its errors get the lines of the case file."""
+    try:
+        return int(arguments.command(arguments))
+    except SlidevizError as problem:
+        if any(message.keys and not message.line for message in problem.messages):
+            # Late: NumPy takes 0.1 s.
+            from slideviz.cli.inputs import with_lines
+
+            problem.args = with_lines(problem.messages, arguments)
+        raise
 
 
 PACKAGES = {

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from slideviz import Case, read
 from slideviz.case.cfg import set_key
 from slideviz.case.check import idle_roles
+from slideviz.case.lines import entries_of, read_text
 from slideviz.case.motions.motion import named
 from slideviz.case.zone_cases import with_marker_names
 from slideviz.cli.output_paths import OutputPath, add_case_inputs, require_output_paths
@@ -92,6 +94,25 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     raise_all((*problems, *_taken(case, taken)))
     added = [warning for warning in case.warnings if warning not in before]
     return case.change(warnings=(*added, *idle_roles(case)))
+
+
+def with_lines(messages: Iterable[Message], arguments: Namespace) -> tuple[Message, ...]:
+    """Return the messages about keys with the case file of the arguments, and the line there."""
+    path = getattr(arguments, "case", None)
+    if path is None:
+        return tuple(messages)
+    lines = {entry.key: entry.line for entry in entries_of(read_text(path, "case file")[0])[0]}
+    for text in getattr(arguments, "set", ()):
+        lines.pop(text.partition("=")[0].strip().upper(), None)
+
+    def placed(message: Message) -> Message:
+        files = [place for place in message.place if isinstance(place, Path)]
+        if not message.keys or message.line or files not in ([], [path]):
+            return message
+        line = next((lines[key] for key in message.keys if key in lines), 0)
+        return replace(message, place=(*([] if files else [path]), *message.place), line=line)
+
+    return tuple(map(placed, messages))
 
 
 def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:

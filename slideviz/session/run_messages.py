@@ -132,18 +132,18 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> s
     """Return sentences on a run's inverted cells: their first step, and remedies.
 
     ``run``: a run with inverted cells after its last step. ``mesh``: the undeformed mesh.
-    ``folding``: ``Session.folding``: where what moves crosses itself, which only another motion can
-    mend.
+    ``folding``: ``Session.folding``: only another motion can mend that.
     """
     if folding:
-        return f"{folding.rule}, so more steps cannot help; another motion, or a smaller one, may."
+        return with_field_labels(f"{folding}.")
     assert mesh is not None
     beside: tuple[str, ...] = ()
     if run.last is not None:
         beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
     pitch = beyond_pitch(run.case, mesh)
     helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, run.last_step))
-    words = (_last_valid_words(run), f"{pitch}." if pitch else "", f"What may help: {helps}.")
+    helps = with_field_labels(f"What may help: {helps}.")
+    words = (_last_valid_words(run), f"{pitch}." if pitch else "", helps)
     return " ".join(filter(None, words))
 
 
@@ -253,7 +253,7 @@ def tolerance_warning(case: Case, extent: float, largest: float) -> str:
 
 def _problems(session: Session) -> list[str]:
     assert session.mesh is not None
-    said = (with_field_labels(text) for text in check_case(session.case, session.mesh))
+    said = (with_field_labels(str(each)) for each in check_case(session.case, session.mesh))
     return [text[:1].upper() + text[1:] for text in said]
 
 

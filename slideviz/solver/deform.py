@@ -22,7 +22,7 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.tape import value
 from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
-from slideviz.solver.prepare import Prepared, prepare
+from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
@@ -97,14 +97,15 @@ def deform(
     report = progress or (lambda _: None)
     prepared = prepare(case, mesh)
     check_limits = partial(rated_limits, prepared.case, mesh)
-    if isinstance(mesh, Assembly):
-        motion = InterfaceMotion(prepared, mesh)
-        runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)
-        steps = joined_steps(motion, runs)
-    else:
-        steps = _steps_of_zone(prepared, report, setup, certify=certify)
-    for step in steps:
-        yield replace(step, check_limits=check_limits)
+    with beginning_with(prepared.doubts):
+        if isinstance(mesh, Assembly):
+            motion = InterfaceMotion(prepared, mesh)
+            runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)
+            steps = joined_steps(motion, runs)
+        else:
+            steps = _steps_of_zone(prepared, report, setup, certify=certify)
+        for step in steps:
+            yield replace(step, check_limits=check_limits)
 
 
 def _steps_of_zone(

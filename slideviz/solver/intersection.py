@@ -183,7 +183,8 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     other = names[two]
     where = "itself" if first == other else other
     place = ", ".join(f"{value:.4g}" for value in hit[0])
-    return Message(f"{first} goes through {where} near ({place})", "cells will overlap there")
+    rule = f"{first} goes through {where} near ({place}), so cells will overlap there"
+    return Message(rule, "more steps cannot help: move it otherwise, or move it less")
 
 
 def _affine(points: FloatArray, vectors: FloatArray) -> bool:

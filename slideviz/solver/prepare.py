@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
-from slideviz.case.check import check_case
+from slideviz.case.check import check_case, motion_doubts
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone
 from slideviz.case.zone_cases import with_marker_names, zone_cases
-from slideviz.errors import raise_all
+from slideviz.errors import CaseError, DeformError, Doubt, doubts_of, raise_all
 from slideviz.mesh.model import Mesh
 
 
@@ -19,6 +21,11 @@ class Prepared:
 
     case: Case  # with the names of the boundaries that the mesh has
     mesh: Mesh
+
+    @cached_property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What hardly does what is meant."""
+        return *doubts_of(self.case.warnings), *motion_doubts(self.case, self.mesh)
 
     @cached_property
     def alone(self) -> Case:
@@ -31,6 +38,16 @@ class Prepared:
         cases = zone_cases(self.alone, self.mesh)
         each = zip(cases, self.mesh.parts, strict=True)
         return tuple(Prepared(case, part.mesh) for case, part in each)
+
+
+@contextmanager
+def beginning_with(doubts: tuple[Doubt, ...]) -> Iterator[None]:
+    """Context whose errors begin with some doubts, since these may be the cause."""
+    try:
+        yield
+    except (CaseError, DeformError) as problem:
+        problem.args = *doubts, *problem.args
+        raise
 
 
 def prepare(case: Case, mesh: Mesh) -> Prepared:

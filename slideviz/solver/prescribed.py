@@ -120,7 +120,7 @@ def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
     """Return the `motion_messages` of a case of one zone before it runs, or a doubt about it."""
     moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
     problem, folded = motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
-    return problem, folded or next(motion_doubts(case, mesh), None)
+    return problem, folded or next(iter(motion_doubts(case, mesh)), None)
 
 
 def prescribe(
@@ -161,7 +161,7 @@ def prescribe(
             case, mesh, domain.boundary, domain.fans, frame, np.arange(len(mesh.points))
         )
         require_free(spread, follow, alone, domain.normals, allowed)
-    warnings = (*moved.warnings, *([f"{folded}; move it less"] if folded else []))
+    warnings = (*moved.warnings, *([folded] if folded else []))
     return BoundaryConditions(known, spread.at(known), moved, warnings)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.zone_cases import each_zone
-from slideviz.errors import SlidevizError, messages_of
+from slideviz.errors import SlidevizError, doubts_of, messages_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
@@ -44,7 +44,8 @@ def remedies(
     ``step``: the one with inverted cells, if it is known.
     ``folded``: whether there are inverted cells: repair is a remedy for these.
     """
-    found = []
+    doubts = doubts_of(step.messages) if step else ()
+    found = [Remedy(*[doubt.remedy] * 2) for doubt in doubts]
     roles = set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))

@@ -27,7 +27,7 @@ from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
 from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
-from slideviz.solver.prepare import Prepared, prepare
+from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step, step_timer
@@ -221,22 +221,23 @@ class _ZoneRuns:
     def deform_all(self, case: Case, read: Callable[[], Mesh]) -> None:
         """Deform all zones of the skin that ``read`` returns, and write all their points."""
         prepared = prepare(case, read())
-        skin = prepared.mesh
-        if not isinstance(skin, Assembly):
-            steps = self._deform(prepared, self._remaining)
-            del skin, prepared  # the cells are let go of on the way
-            deque(steps, 0)
-            return
-        self._joined = motion = InterfaceMotion(prepared, skin)
-        zone_runs(motion, self._deform, self._remaining)
-        last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
-        for zone, after in enumerate(zones_of(motion.after(last))):
-            if zone not in last:
-                self._remaining.next()
-                self._out.displace(zone, None)
-                self._remaining.next()
-            else:
-                self._close_gaps(zone, last[zone].mesh, after)
+        with beginning_with(prepared.doubts):
+            skin = prepared.mesh
+            if not isinstance(skin, Assembly):
+                steps = self._deform(prepared, self._remaining)
+                del skin, prepared  # the cells are let go of on the way
+                deque(steps, 0)
+                return
+            self._joined = motion = InterfaceMotion(prepared, skin)
+            zone_runs(motion, self._deform, self._remaining)
+            last = {zone: displacer.steps[-1] for zone, displacer in self._displacers.items()}
+            for zone, after in enumerate(zones_of(motion.after(last))):
+                if zone not in last:
+                    self._remaining.next()
+                    self._out.displace(zone, None)
+                    self._remaining.next()
+                else:
+                    self._close_gaps(zone, last[zone].mesh, after)
 
     def _close_gaps(self, zone: int, before: Mesh, after: Mesh) -> None:
         """Write those points of a skin into the file that interfaces have changed by rounding."""

@@ -431,7 +431,7 @@ def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combi
     for one in wanted:
         kind = one.method, one.periodic
         if kind not in problems:
-            problems[kind] = "; ".join(dict.fromkeys(check_case(one.applied(case), mesh)))
+            problems[kind] = "; ".join(map(str, dict.fromkeys(check_case(one.applied(case), mesh))))
         if problems[kind]:
             reason_of[one] = problems[kind]
     return reason_of

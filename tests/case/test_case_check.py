@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.check import check_case, contradictions
+from slideviz.case.check import check_case
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
@@ -51,7 +51,11 @@ def test_good_cases(square, case):
             good(roles={"HUB": "internal"}),
             "MARKER_INTERNAL: square.su2 has no marker 'HUB'; it has LOWER, RIGHT, UPPER, LEFT",
         ),
-        (Case(), "no marker moves; name one in MARKER_MOVING"),
+        (Case(), "no marker moves: MARKER_MOVING is missing; write MARKER_MOVING= (...)"),
+        (
+            Case(motions=(UP,)),
+            "no marker moves: MARKER_MOVING is missing; write MARKER_MOVING= (UPPER)",
+        ),
         (
             good(roles={"LOWER": "moving"}),
             (
@@ -68,10 +72,7 @@ def test_good_cases(square, case):
         ),
         (
             good(motions=(UP, Translate("UPER", (1.0, 0.0)))),
-            (
-                "motion 2 names 'UPER', which does not move: MARKER_MOVING= (UPPER) does not have "
-                "it; one of the two is wrong; did you mean UPPER?"
-            ),
+            "MOTION: square.su2 has no marker 'UPER'; did you mean UPPER?",
         ),
         (
             good(motions=(Translate("UPPER", (0.0, 0.0, 1.0)),)),
@@ -148,7 +149,7 @@ def test_good_cases(square, case):
     ],
 )
 def test_one_problem(square, case, words):
-    assert check_case(case, square) == (words,)
+    assert [str(message) for message in check_case(case, square)] == [words]
     with pytest.raises(CaseError) as caught:
         prepare(case, square)
     assert str(caught.value) == words
@@ -159,14 +160,15 @@ def test_a_mesh_of_many_or_no_markers(square):
         square, markers=tuple(replace(square.markers[0], name=f"M{i}") for i in range(40))
     )
     (first, *_) = check_case(Case(roles={"wall": "fixed"}), many)
-    assert first.endswith("it has M0, M1, M2, M3, M4, M5, M6, M7, M8, M9, M10, M11, ...")
+    assert str(first).endswith("it has M0, M1, M2, M3, M4, M5, M6, M7, M8, M9, M10, M11, ...")
     (first, *_) = check_case(Case(roles={"wall": "fixed"}), replace(square, markers=()))
-    assert first.endswith("has no marker 'wall'; it has none")
+    assert str(first).endswith("has no marker 'wall'; it has none")
 
 
 def test_dimensions_in_3d(cube):
     def problems(motion):
-        return check_case(Case(roles={"TOP": "moving"}, motions=(motion,)), cube)
+        case = Case(roles={"TOP": "moving"}, motions=(motion,))
+        return tuple(map(str, check_case(case, cube)))
 
     assert problems(Rotate("TOP", 5.0, (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))) == ()
     assert problems(Rotate("TOP", 5.0)) == ()
@@ -183,10 +185,26 @@ def test_all_problems_at_once(square):
     assert len(check_case(case, square)) == 4
     with pytest.raises(CaseError) as caught:
         prepare(case, square)
-    assert str(caught.value).splitlines() == list(check_case(case, square))
+    assert str(caught.value).splitlines() == [str(message) for message in check_case(case, square)]
 
 
-def test_several_markers_with_a_plus_are_told_their_brackets():
+@pytest.mark.parametrize(("mesh_has", "case_has"), [("airfoil", "AIRFOIL"), ("blade1", "blade_1")])
+@pytest.mark.parametrize("motion_too", [False, True])
+def test_the_list_that_the_mesh_contradicts_is_the_wrong_one(
+    square, mesh_has, case_has, motion_too
+):
+    first, *others = square.markers
+    mesh = replace(square, markers=(replace(first, name=mesh_has), *others))
+    motions = (Translate(case_has if motion_too else mesh_has, (0.0, 1.0)),)
+    (said,) = check_case(Case(roles={case_has: "moving"}, motions=motions), mesh)
+    words = f"square.su2 has no marker '{case_has}'; did you mean {mesh_has}?"
+    assert str(said) == f"MARKER_MOVING: {words}"
+    case = Case(roles={mesh_has: "moving"}, motions=(Translate(case_has, (0.0, 1.0)),))
+    assert str(check_case(case, mesh)[0]) == f"MOTION: {words}"
+
+
+def test_several_markers_with_a_plus_are_told_their_brackets(square):
     roles = dict.fromkeys(("UPPER", "LEFT"), "moving")
-    (said,) = contradictions(Case(roles=roles, motions=(Translate("UPPER+LEFT", (1.0, 0.0)),)))
+    case = Case(roles=roles, motions=(UP, UP.with_marker("LEFT"), UP.with_marker("UPPER+LEFT")))
+    (said,) = check_case(case, square)
     assert str(said).endswith("write several in brackets, e.g. ((UPPER, LEFT), translate, ...)")

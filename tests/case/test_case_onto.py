@@ -115,7 +115,7 @@ def test_it_comes_before_other_motions(shifted):
     turned = sv.Rotate("airfoil", 2.0)
     assert not motion_problems(onto.change(motions=(*onto.motions, turned)), mesh)
     (problem,) = motion_problems(onto.change(motions=(turned, *onto.motions)), mesh)
-    assert "motion 2: it begins at the undeformed places of 'airfoil'" in problem
+    assert "motion 2: it begins at the undeformed places of 'airfoil'" in str(problem)
     for limit in (-1.0, np.nan, np.inf):
         with pytest.raises(CaseError, match=f"the limit {limit:g} is not above 0; leave it out fo"):
             sv.Onto(shifted, "airfoil", limit)

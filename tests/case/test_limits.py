@@ -220,7 +220,7 @@ def test_cells_of_a_halo_do_not_count(measured):
 def test_a_boundary_that_the_mesh_lacks_is_told():
     case = Case(roles={"BLOCK": "moving"}, limits="growth@BLOK < 1.5")
     problems = check_case(case, grid((4, 4), hole=((1, 2), (1, 2))))
-    (problem,) = [text for text in problems if "LIMITS" in text]
+    (problem,) = [text for text in map(str, problems) if "LIMITS" in text]
     assert "has no marker 'BLOK'; did you mean BLOCK?" in problem
 
 
@@ -334,7 +334,8 @@ def test_a_missed_limit_of_walls_names_the_boundaries_where_it_fails(layered):
 
 def test_a_boundary_that_is_no_wall_cannot_be_limited(layered):
     case = Case(roles={"LOWER": "moving", "UPPER": "periodic"}, limits="growth@UPPER < 1.5")
-    (problem,) = [text for text in check_case(case, layered.mesh) if "LIMITS" in text]
+    problems = map(str, check_case(case, layered.mesh))
+    (problem,) = [text for text in problems if "LIMITS" in text]
     assert problem == (
         "LIMITS: growth@UPPER < 1.5: UPPER is periodic or internal, so it has no wall layers; "
         "walls are LOWER"

@@ -88,6 +88,7 @@ def test_a_chord_that_does_not_fit_is_told_before_a_run_and_after(kind, chord, t
     mesh = bent()
     moved = case(replace(KINDS[kind][0](*chord), height=1e-6))
     words = f"goes from x = {chord[0]:g} to {chord[1]:g}, but airfoil from 0 to 1; end its MOTION"
+    words += " with 0, 1 if all of it is meant: (airfoil, "
     messages = make_setup(prepare(moved, mesh)).warnings
     assert any(words in str(text) for text in messages) == told
     _, said = find_intersection(moved, mesh, lambda _: None, lambda: False)

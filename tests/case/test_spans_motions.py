@@ -123,11 +123,13 @@ def test_what_cannot_be_is_said_before_the_run(mesh):
     case = sv.Case(
         roles={"BLOCK": "moving"}, motions=(sv.SpanMotion("BLOCK", "lean", (0.0,), (1.0,)),)
     )
-    assert any("the mesh has none: it is 2D" in text for text in check_case(case, flat))
+    assert any("the mesh has none: it is 2D" in text for text in map(str, check_case(case, flat)))
     case = case_of(TWIST, span=("hub", "top"))
-    assert any("SPAN: plain 3D has no marker 'top'" in text for text in check_case(case, mesh))
+    assert any(
+        "SPAN: plain 3D has no marker 'top'" in text for text in map(str, check_case(case, mesh))
+    )
     case = case_of(TWIST, span=("hub", "per1"))
-    assert any("do not face each other" in text for text in check_case(case, mesh))
+    assert any("do not face each other" in text for text in map(str, check_case(case, mesh)))
 
 
 @pytest.mark.parametrize("angle", [5.0, pytest.param(12.0, marks=pytest.mark.slow)])

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.case.motion_text import read_motions
+from slideviz.case.moving_nodes import displacements
 from slideviz.cli import run
 from slideviz.design.su2.config import own_changes, read_config
 from slideviz.design.su2.surface import make_surface
@@ -372,18 +374,54 @@ def test_a_chord_that_is_not_that_of_su2_is_warned_about(here):
     assert not surface(bent(), ("airfoil",), camber).warnings
     small = bent().with_points(0.3 * bent().points)
     (said,) = surface(small, ("airfoil",), henne).warnings
-    assert said == (
-        "HICKS_HENNE: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes from 0 to 0.3"
+    assert str(said) == (
+        "HICKS_HENNE: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes from 0 to 0.3; "
+        "scale the mesh to that, by 1 / 0.3, or write MOTION= (airfoil, hicks-henne, upper, 0.5, "
+        "0.1, 0.0, 0.3) into a case file (slideviz run)"
     )
     (said,) = surface(small, ("airfoil",), camber).warnings
-    assert said.startswith("HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in")
+    assert str(said).startswith(
+        "HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in"
+    )
     # Where the marker begins at the nose, SU2 takes that for the trailing edge.
     mesh = bent()
     lines = np.roll(mesh.marker("airfoil").cells.by_type[3][1], 12, axis=0)
     part = sv.Marker("airfoil", sv.Cells.from_blocks([(3, lines)]))
     turned = replace(mesh, markers=(part, mesh.marker("far")))
     (said,) = surface(turned, ("airfoil",), camber).warnings
-    assert "it begins its search at the first node of the marker" in said
+    assert "it begins its search at the first node of the marker" in str(said)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters"), [("HICKS_HENNE", "0, 0.3"), ("CST", "1, 2, 4"), ("CST", "0, 1, 3")]
+)
+def test_the_motion_that_a_doubt_names_is_that_of_the_variable_on_a_longer_chord(
+    kind, parameters, here
+):
+    text = f"DV_KIND= {kind}\nDV_PARAM= ({parameters})\nDV_VALUE= 0.01\n"
+    unit = surface(bent(), ("airfoil",), text + "OPT_RELAX_FACTOR= 0.5\n")
+    mesh = bent().with_points(120.0 * bent().points)
+    large = text.replace("0.01", "1.2") + "OPT_RELAX_FACTOR= 0.5\n"
+    (doubt,) = surface(mesh, ("airfoil",), large).warnings
+    (motion,) = read_motions(doubt.remedy.partition("MOTION= ")[2].partition(" into")[0])
+    roles = {"airfoil": "moving"}
+    found = displacements(sv.Case(roles=roles, motions=(motion,)), mesh)
+    np.testing.assert_allclose(found.vectors, 120.0 * unit.displacement, atol=1e-9)
+
+
+def test_an_error_begins_with_the_doubt_that_may_be_its_cause(here):
+    mesh = bent().with_points(120.0 * bent().points)
+    moved = surface(mesh, ("airfoil",), "DV_KIND= CST\nDV_PARAM= (1, 1, 2)\nDV_VALUE= 50\n")
+    with pytest.raises(CaseError, match=r"\ACST: the chord is x from 0 (.|\n)*through far near"):
+        list(sv.deform(moved.case(), mesh))
+    roles = {"airfoil": "moving"}
+    case = sv.Case(roles=roles, motions=(sv.Cst("airfoil", 1e5, chord=(0.0, 60.0)),))
+    with pytest.raises(CaseError) as caught:
+        list(sv.deform(case, mesh))
+    assert len(caught.value.messages) == 1  # half of the airfoil may be meant
+    case = sv.Case(roles=roles, motions=(sv.Cst("airfoil", 1e5, chord=(0.0, 6.0)),))
+    with pytest.raises(CaseError, match=r"\Amotion 1: the chord goes (.|\n)*through far near"):
+        list(sv.deform(case, mesh))
 
 
 def test_an_angle_of_attack_alone_moves_nothing_and_has_its_gradient(here, capsys):

@@ -8,7 +8,7 @@ import pytest
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.cli.run_outcome import advice_for
-from slideviz.errors import Message
+from slideviz.errors import Doubt, Message
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import Reduction
@@ -82,11 +82,20 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
 
 
 def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
-    folding = Message("airfoil goes through itself near (0, 0)", "cells will overlap there")
-    assert remedy_for(run, passage.mesh, folding) == (
-        "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
-        "smaller one, may."
+    folding = Message("airfoil goes through itself near (0, 0)", "move it less")
+    assert remedy_for(run, passage.mesh, folding) == f"{folding}."
+
+
+def test_where_a_motion_is_doubtful_its_own_remedy_comes_first(run, passage):
+    doubt = Doubt("the chord goes from x = 0 to 1", "end its MOTION with 0, 120", ("motion 1",))
+    assert remedy_for(run, passage.mesh, doubt) == (
+        "motion 1: the chord goes from x = 0 to 1; end its Motion with 0, 120."
     )
+    bad = with_inverted(run, 1)
+    step = replace(bad.last.step, messages=("other", doubt))
+    told = replace(bad, frames=(*bad.frames[:-1], replace(bad.last, step=step)))
+    assert "What may help: end its Motion with 0, 120; " in remedy_for(told, passage.mesh)
+    assert "what may help: end its MOTION with 0, 120; " in advice_for(bad.case, step)
 
 
 def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_named(run, passage):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -22,13 +22,15 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.words import Word, counted, number
-from slideviz.errors import CaseError, Message, not_one_of
+from slideviz.errors import CaseError, Doubt, Message, not_one_of
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import vertex_normals
 from slideviz.terms import SIDES, Term
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from slideviz.case.model import Case
 
 EPS = 1e-16  # what SU2 adds to coordinates of `surface_bump`
@@ -79,17 +81,22 @@ class OnAirfoil(Motion):
             return f"{words}, chord {vector_words(self.chord, form)}"
         return words
 
-    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Message]:
+    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Doubt]:
         x = np.concatenate([mesh.points[mesh.marker(name).nodes, 0] for name in markers])
         low, high = self.chord
         size = np.ptp(x)
         covered = np.ptp(np.clip(self.chord, x.min(), x.max()))
         if covered < 0.5 * size or high - low > 2.0 * size:
-            yield Message(
+            yield Doubt(
                 f"the chord goes from x = {low:g} to {high:g}, but {' and '.join(markers)} from "
                 f"{x.min():.6g} to {x.max():.6g}",
-                "end its MOTION with these if all of it is meant",
+                f"end its MOTION with {x.min():.6g}, {x.max():.6g} if all of it is meant: "
+                f"{self.on_chord(x).text}",
             )
+
+    def on_chord(self, x: FloatArray) -> Self:
+        """Return the motion with the chord of nodes at ``x`` (m,), to six digits."""
+        return replace(self, chord=(float(f"{x.min():.6g}"), float(f"{x.max():.6g}")))
 
     @classmethod
     def placed(

@@ -13,8 +13,8 @@ import numpy as np
 
 from slideviz.argument_types import CheckedFields
 from slideviz.case.displacement import Displacements
-from slideviz.case.words import Word
-from slideviz.errors import CaseError, Message
+from slideviz.case.words import Word, name_text
+from slideviz.errors import CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
 from slideviz.terms import AXES, Term
 
@@ -28,6 +28,8 @@ Target = str | tuple[str, ...]
 """The markers a motion moves: one, several as one body, or, where it is empty, all moving ones."""
 Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
 """An axis: its direction, and a point on it."""
+
+ALL_MOVING = "*"  # what stands for the markers of an empty target
 
 ALONG = 1e-12
 """A direction is along an axis where the cosine of their angle differs from 1 by less than this."""
@@ -133,6 +135,11 @@ class Motion(CheckedFields):
         """Return the texts that follow the verb; raise CaseError if there is no such form."""
         raise NotImplementedError
 
+    @property
+    def text(self) -> str:
+        """Return the motion as it stands in ``MOTION``; CaseError if it has no such form."""
+        return f"({', '.join([_target_text(self.marker), self.verb, *self.arguments()])})"
+
     def described(self, dim: int, extent: float) -> str:
         """Return the motion in words, without what it moves.
 
@@ -162,7 +169,7 @@ class Motion(CheckedFields):
         """Yield why the motion, number ``place`` (from 0) of a case, does not fit case or mesh."""
         yield from ()
 
-    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Message]:
+    def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Doubt]:
         """Yield why the motion hardly does what is meant, of the moving ``markers`` it moves."""
         yield from ()
 
@@ -245,6 +252,15 @@ class Motion(CheckedFields):
     def with_marker(self, marker: Target) -> Self:
         """Return the same motion of other markers."""
         return replace(self, marker=marker)
+
+
+def _target_text(target: Target) -> str:
+    names = [name_text(name) for name in named(target)]
+    if isinstance(target, str):
+        return names[0] if names else ALL_MOVING
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise CaseError(f"{target} are not several markers; give a name, or two different ones")
+    return f"({', '.join(names)})"
 
 
 def _is_number(value: object) -> bool:

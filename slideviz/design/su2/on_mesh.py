@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -12,7 +12,7 @@ from slideviz.case.check import unknown_markers
 from slideviz.case.zone_cases import renamed, with_marker_names
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.design.su2.variables import NOTHING
-from slideviz.errors import CaseError, nearest, raise_all
+from slideviz.errors import CaseError, Remark, nearest, raise_all
 from slideviz.formats.files import read
 from slideviz.mesh.model import Assembly, IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
@@ -213,11 +213,11 @@ def zone_of(config: Su2Config, mesh: Mesh) -> tuple[IntArray, tuple[Marker, ...]
     return np.arange(points.start, points.stop), mesh.markers[markers]
 
 
-def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> list[str]:
+def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> Sequence[Remark]:
     """Return that nothing would move, if some are ``needed``, or each that the mesh lacks."""
     if needed and not config.markers:
         return [_NO_MARKER.format(config.source)]
-    return [f"{config.source}: {text}" for text in unknown_markers(mesh, config.named)]
+    return CaseError(*unknown_markers(mesh, config.named)).within(config.source)
 
 
 def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:

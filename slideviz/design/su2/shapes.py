@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from slideviz.case.motions.airfoil import (
+    Cst,
+    HicksHenne,
+    OneSided,
     hicks_henne,
     kulfan,
     normals_at,
     require_peak,
     side_of,
     surface_bump,
+    term_of,
 )
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable, angle_notes
-from slideviz.errors import CaseError, Remark
+from slideviz.errors import CaseError, Doubt, Remark
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.terms import Side
 
 UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
 """Kinds for which the airfoil lies between x = 0 and 1."""
@@ -116,15 +121,24 @@ class MovedNodes:
             raise CaseError("HICKS_HENNE_CAMBER: the chord of DV_MARKER is along y; turn the mesh")
         return leading, float(np.arctan((leading[1] - trailing[1]) / width))
 
-    def chord_notes(self, kinds: set[str]) -> list[str]:
-        """Return warnings where the chord is not that which variables of some kinds expect."""
+    def chord_doubts(self, variables: Sequence[DesignVariable], relaxation: float) -> list[Doubt]:
+        """Return a doubt where the chord is not that which some variables expect."""
         x = self.points[:, 0]
         notes = []
+        kinds = {each.kind for each in variables}
         unit = [kind for kind in UNIT_CHORD if kind in kinds]
         if unit and max(abs(x.min()), abs(x.max() - 1.0)) > OFF_CHORD:
+            motions = [_as_motion(each, self.markers, relaxation) for each in variables]
+            texts = [motion.on_chord(x).text for motion in motions if motion is not None]
+            remedy = f"scale the mesh to that, by 1 / {np.ptp(x):.4g}"
+            if texts:
+                remedy += f", or write MOTION= {' ; '.join(texts)} into a case file (slideviz run)"
             notes.append(
-                f"{', '.join(unit)}: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes "
-                f"from {x.min():.4g} to {x.max():.4g}"
+                Doubt(
+                    f"{', '.join(unit)}: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes "
+                    f"from {x.min():.4g} to {x.max():.4g}",
+                    remedy,
+                )
             )
         if "HICKS_HENNE_CAMBER" in kinds:
             leading, angle = self.chord
@@ -132,11 +146,29 @@ class MovedNodes:
             if abs(length - 1.0) > OFF_CHORD or leading[0] - x.min() > OFF_CHORD:
                 at = ", ".join(f"{value:.4g}" for value in leading)
                 notes.append(
-                    "HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in SU2, "
-                    f"which takes ({at}) for it, and DV_MARKER goes from {x.min():.4g} to "
-                    f"{x.max():.4g} in x; it begins its search at the first node of the marker"
+                    Doubt(
+                        "HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in SU2, "
+                        f"which takes ({at}) for it, and DV_MARKER goes from {x.min():.4g} to "
+                        f"{x.max():.4g} in x; it begins its search at the first node of the marker",
+                        "scale the mesh to that, or begin the marker at the trailing edge",
+                    )
                 )
         return notes
+
+
+def _as_motion(
+    variable: DesignVariable, markers: tuple[str, ...], relaxation: float
+) -> OneSided | None:
+    """Return a variable as a motion of a case, whose chord is free; None if there is none."""
+    on = markers[0] if len(markers) == 1 else markers
+    height = variable.value * relaxation
+    side: Side = "upper" if variable.parameter("side") else "lower"
+    if variable.kind == "HICKS_HENNE":
+        return HicksHenne(on, height, variable.parameter("x"), side)
+    if variable.kind == "CST":
+        term = term_of(variable.parameter("k"), variable.parameter("n"))
+        return Cst(on, height, term, side)
+    return None
 
 
 @dataclass(frozen=True)
@@ -274,18 +306,20 @@ class Shapes(Displacer):
         return MovedNodes(self.mesh, self.config.markers, self.nodes)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Remark, ...]:
         """Return what a variable does to the flow only, and where SU2 would do otherwise."""
         variables = self.config.variables
-        notes = angle_notes(variables, self.config.relaxation)
+        notes: list[Remark] = [*angle_notes(variables, self.config.relaxation)]
         heights = {each.numbers[2] for each in variables if each.kind == "ROTATION"}
         if self.mesh.dim == 3 and heights - {*variables[0].numbers[2:3]}:
             notes.append(
                 "SU2 turns all ROTATION about lines through the z0 of the first variable; here "
                 "each has its own"
             )
-        kinds = {each.kind for each in variables if not each.ignored}
-        return (*notes, *(self._surface.chord_notes(kinds) if len(self.nodes) else ()))
+        if len(self.nodes):
+            acting = [each for each in variables if not each.ignored]
+            notes += self._surface.chord_doubts(acting, self.config.relaxation)
+        return tuple(notes)
 
     @property
     def idle(self) -> tuple[bool, ...]:

@@ -29,6 +29,7 @@ from slideviz.session.run_messages import (
     remarks_of,
     remedy_for,
     run_requirements,
+    with_field_labels,
 )
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
@@ -152,7 +153,7 @@ class RunPanel(Panel):
     def _show_ready(self, text: str, session: Session) -> None:
         """Show ``text`` (or a warning that cells will fold), and the cost of the run."""
         folding = session.folding
-        full = f"{folding}." if folding else ""
+        full = with_field_labels(f"{folding}.") if folding else ""
         text = _shortened(full) if full else text
         text = html.escape(" ".join(filter(None, (text, self._cost))))
         self.text.setText(f"<a href='motion'>{text}</a>" if folding else text)
