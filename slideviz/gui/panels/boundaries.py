@@ -101,7 +101,7 @@ class BoundariesPanel(Panel):
         self.keep = push_button(
             "Keep all",
             "Confirm every guessed role.",
-            lambda: self.store.change(changes.confirm_guesses),
+            lambda: self.change(changes.confirm_guesses),
             "keep",
         )
         guesses = in_row(self.guess_text, self.keep, wide=[self.guess_text])
@@ -259,17 +259,17 @@ class BoundariesPanel(Panel):
         return tuple(self._rows[row][0] for row in rows if self._rows[row][0])
 
     def _selection_changed(self) -> None:
-        self.store.change(changes.select, self.selected())
+        self.change(changes.select, self.selected())
 
     def _item_changed(self, item: QTableWidgetItem) -> None:
         if item.column() != NAME:
             return
         shown = item.checkState() == Qt.CheckState.Checked
         names = self._boundaries(item.row())
-        self.store.change(changes.show_boundaries, names, shown)
+        self.change(changes.show_boundaries, names, shown)
 
     def _role_chosen(self, name: str, role: object) -> None:
-        self.store.change(changes.set_role, self._with_selected(name), role)
+        self.change(changes.set_role, self._with_selected(name), role)
 
     def _role_wanted(self, row: int) -> None:
         if (choice := self._choices[row]) is not None:

@@ -193,7 +193,7 @@ class CurvesPanel(Panel):
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
-        session = self.store.session
+        session = self.session
         kind = self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None
@@ -222,13 +222,13 @@ class CurvesPanel(Panel):
     def _other_plot(self) -> None:
         """Draw the newly selected plot; wipe the old one first, as its axes are other ones."""
         self.canvas.wipe()
-        self.sync(self.store.session)
+        self.sync(self.session)
 
     def _picked(self, value: float) -> None:
         if self.kind.currentData() == "steps" and not self.area.shows_text:
-            self.store.change(changes.show_frame, round(value))
+            self.change(changes.show_frame, round(value))
         elif self.canvas.draggable and round(value) > 0:
-            self.store.change(changes.scale_motions, part=round(value) / 100)
+            self.change(changes.scale_motions, part=round(value) / 100)
 
     def _save(self) -> None:
         name = self.kind.currentText().lower().replace(" ", "_")

@@ -287,7 +287,7 @@ class DesignsPanel(Panel):
 
     def _with_valid_results(self) -> DesignTable:
         """Return the table with only those results that are valid for the present case."""
-        return self.table.left(self.case, self.store.session.case)
+        return self.table.left(self.case, self.session.case)
 
     def put(self, table: DesignTable) -> None:
         """Show another table; forget the shown design if its values differ there."""
@@ -301,8 +301,8 @@ class DesignsPanel(Panel):
     def _sync(self) -> None:
         busy = self.runner.busy
         rows = bool(self.table.rows)
-        lacking = self.store.session.lacks_cells
-        opened = self.store.session.mesh is not None and not lacking
+        lacking = self.session.lacks_cells
+        opened = self.session.mesh is not None and not lacking
         count = 0 if busy else len(self.table.rows) - len(self._with_valid_results().results)
         self.rows.show_table(self.table, editable=not busy)
         self.plot.show_table(self.table.filled(self.case), self.shown)
@@ -372,7 +372,7 @@ class DesignsPanel(Panel):
 
         def crossed() -> DesignTable:
             values = values_of(self.rows.values.text())
-            read_designs(self.store.session.case, {name: values})
+            read_designs(self.session.case, {name: values})
             return self._replacing(self.table.crossed(name, values))
 
         if name is not None and not self.runner.busy:
@@ -380,7 +380,7 @@ class DesignsPanel(Panel):
 
     def _edited(self, row: int, column: int, text: str) -> None:
         def changed() -> DesignTable:
-            read_designs(self.store.session.case, {self.table.columns[column]: [text]})
+            read_designs(self.session.case, {self.table.columns[column]: [text]})
             return self.table.with_cell(row, column, text)
 
         self._apply(changed)
@@ -388,7 +388,7 @@ class DesignsPanel(Panel):
     def _load(self) -> None:
         path = questions.ask_table(self, self.services.files.folder())
         if path is not None:
-            self._apply(lambda: self._replacing(read_table(self.store.session.case, path)))
+            self._apply(lambda: self._replacing(read_table(self.session.case, path)))
 
     def _replacing(self, table: DesignTable) -> DesignTable:
         """Return another table, with the results it shares; this one if the user cancels."""
@@ -429,7 +429,7 @@ class DesignsPanel(Panel):
 
     def show_design(self, number: int) -> None:
         """Show the mesh of a design, numbered from 1, in the window: deform it as a run there."""
-        session = self.store.session
+        session = self.session
         row = self.table.results.get(number)
         other = session.mesh is not (self.mesh or session.mesh)
         if session.mesh is None or session.lacks_cells or other:
@@ -452,7 +452,7 @@ class DesignsPanel(Panel):
         self.services.viewing.refit()  # no job ends if the design was shown before
         self.shown = number
         self._show_status(f"Design {number} is being computed.")
-        self._say_shown(self.store.session)
+        self._say_shown(self.session)
         self._sync()
 
     def _say_shown(self, session: Session) -> None:
@@ -470,7 +470,7 @@ class DesignsPanel(Panel):
 
     # The job ---------------------------------------------------------------------------
     def start(self) -> None:
-        session = self.store.session
+        session = self.session
         table = self._with_valid_results()
         if self.runner.busy or session.mesh is None or session.lacks_cells:
             return
@@ -484,7 +484,7 @@ class DesignsPanel(Panel):
         self._sync()
 
     def _results_arrived(self, rows: list[DesignRow]) -> None:
-        if self.mesh is self.store.session.mesh:
+        if self.mesh is self.session.mesh:
             self.put(self.table.with_results(rows))
 
     def _progressed(self, words: str, fraction: float) -> None:

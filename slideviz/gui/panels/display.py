@@ -251,10 +251,10 @@ class DisplayPanel(Panel):
 
     # Widgets to state ------------------------------------------------------------------
     def _set(self, **values: Any) -> None:
-        self.store.change(changes.set_view, **values)
+        self.change(changes.set_view, **values)
 
     def _only(self, on: bool) -> None:
-        self._set(threshold=_worse_half(self.store.session) if on else None)
+        self._set(threshold=_worse_half(self.session) if on else None)
 
     def _passages(self, value: int) -> None:
         whole = bool(self.passages.around) and value == self.passages.maximum()

@@ -230,14 +230,14 @@ class HistogramPanel(Panel):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         # While the panel was behind another tab, the text was not updated.
-        if self._described_frame is None and self.store.session.frame is not None:
-            QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
+        if self._described_frame is None and self.session.frame is not None:
+            QTimer.singleShot(0, self, lambda: self._sync_words(self.session))
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
         log = self.log.isChecked()
         whole = self.whole.isChecked()
-        return partial(draw_histogram, self.store.session, log=log, full_range=whole)
+        return partial(draw_histogram, self.session, log=log, full_range=whole)
 
     # What the user does ----------------------------------------------------------------
     def _range_dragged(self, band: Range | None) -> None:
@@ -263,14 +263,14 @@ class HistogramPanel(Panel):
 
     def _apply_range(self) -> None:
         if self._pending_range is not None:
-            self.store.change(changes.set_view, threshold=self._pending_range)
+            self.change(changes.set_view, threshold=self._pending_range)
 
     def clear_range(self) -> None:
         """Show cells of any value again."""
         self._timer.stop()
         self._pending_range = None
-        if self.store.session.view.threshold is not None:
-            self.store.change(changes.set_view, threshold=None)
+        if self.session.view.threshold is not None:
+            self.change(changes.set_view, threshold=None)
         self.canvas.show_band(None)
 
     def _save(self) -> None:

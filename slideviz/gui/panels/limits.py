@@ -227,13 +227,13 @@ class LimitsPanel(Panel):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        session = self.store.session
+        session = self.session
         # While the panel was behind another tab, the table was not filled.
         if (session.frame, session.case.roles) != self._walls_key and session.frame is not None:
-            QTimer.singleShot(0, self, lambda: self._show_walls(self.store.session))
+            QTimer.singleShot(0, self, lambda: self._show_walls(self.session))
 
     def take_theme(self, _scheme: object) -> None:
-        self._show_limits(self.store.session)
+        self._show_limits(self.session)
 
     # What the user does ----------------------------------------------------------------
     def _typed(self) -> None:
@@ -244,26 +244,26 @@ class LimitsPanel(Panel):
             self.problem.show()
             return
         self.problem.hide()
-        if limits != self.store.session.case.limits:
-            self.store.change(changes.set_case, limits=limits)
+        if limits != self.session.case.limits:
+            self.change(changes.set_case, limits=limits)
 
     def _limit_clicked(self, item: QTreeWidgetItem) -> None:
-        session = self.store.session
+        session = self.session
         place = item.data(0, NAME)
         again = place == session.limit
-        self.store.change(replace, limit=None if again or place < 0 else place)
-        chosen = self.store.session.limit_chosen
+        self.change(replace, limit=None if again or place < 0 else place)
+        chosen = self.session.limit_chosen
         if chosen is not None and len(chosen.cells):
             cell = int(chosen.cells[0])
-            self.store.change(changes.mark_cell, cell)
+            self.change(changes.mark_cell, cell)
             self._fly_to(cell)
 
     def _wall_chosen(self) -> None:
         names = {item.data(0, NAME) for item in self.walls.selectedItems()}
-        self.store.change(changes.select, tuple(names))
+        self.change(changes.select, tuple(names))
 
     def _export(self) -> None:
-        session = self.store.session
+        session = self.session
         ask_and_write(
             self,
             "Export the table of walls",

@@ -271,16 +271,16 @@ class MethodPanel(Panel):
             "DATA_REDUCTION": self._reduce,
             "DATA_RED_TOLERANCE": self._put_tolerance,
         }
-        case = self.store.session.case
+        case = self.session.case
         new = special.get(key.name, key.put)(case, value)
         values = {field.name: getattr(new, field.name) for field in fields(Case)}
         changed = {name: now for name, now in values.items() if now != getattr(case, name)}
         if changed:
-            self.store.change(changes.set_case, **changed)
+            self.change(changes.set_case, **changed)
 
     def _reduce(self, case: Case, wanted: DataReduction) -> Case:
         # The settings from before it was switched off come back; else those for this mesh.
-        mesh = self.store.session.mesh
+        mesh = self.session.mesh
         first = self._reduction or AUTO
         if wanted == "YES" and first == AUTO and mesh is not None:
             first = suggested_reduction(mesh)

@@ -179,7 +179,7 @@ class MotionPanel(Panel):
         self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
         self.editor.box_wanted.connect(
-            lambda: self.store.change(changes.add_box, self.list.currentRow())
+            lambda: self.change(changes.add_box, self.list.currentRow())
         )
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
         parts = (buttons, self.list, self.editor, self.hint, None)
@@ -256,12 +256,12 @@ class MotionPanel(Panel):
         self.editor.set_extent(self._extent)
 
     def _chord(self, target: Target) -> tuple[float, float]:
-        moving = self.store.session.case.markers_with("moving")
+        moving = self.session.case.markers_with("moving")
         return (0.0, 1.0) if self._mesh is None else chord_of(self._mesh, named(target) or moving)
 
     def _centroid(self, target: Target) -> tuple[float, ...]:
         """Return the centroid of a target: the boundaries it names, or all moving ones."""
-        moving = self.store.session.case.markers_with("moving")
+        moving = self.session.case.markers_with("moving")
         assert self._mesh is not None
         return centroid(self._mesh, named(target) or moving)
 
@@ -302,30 +302,30 @@ class MotionPanel(Panel):
     # Widgets to state ------------------------------------------------------------------
     def _row_changed(self) -> None:
         self.editor.show_another()
-        session = self.store.session
+        session = self.session
         self._sync_editor(session)
         self._sync_buttons(session, session.case.markers_with("moving"))
 
     def _add(self, kind: type[Motion], *_checked: bool) -> None:
-        self._add_for(new_target(self.store.session), kind)
+        self._add_for(new_target(self.session), kind)
 
     def _add_for(self, target: Target, kind: type[Motion]) -> None:
         """Add a motion with zero displacement, and put the cursor into its first field."""
-        session = self.store.session
+        session = self.session
         boxes = box_names(session)
         machine = machine_axis(session)
         chord = self._chord(target)
         motion = kind.new(target, NewMotion(session.mesh.dim, machine, boxes, chord))
-        self.store.change(changes.add_motion, motion)
+        self.change(changes.add_motion, motion)
         self.editor.focus()
 
     def focus_requirement(self, missing: Requirement) -> None:
         """Put the cursor where a missing requirement is met; add a motion if one is missing."""
-        motions = self.store.session.case.motions
+        motions = self.session.case.motions
         if self.watch.focus():
             return
         if missing.marker:
-            self.store.change(changes.select, (missing.marker,))
+            self.change(changes.select, (missing.marker,))
             self._add_for(missing.marker, type(motions[-1]) if motions else Translate)
         elif motions:
             self.list.setCurrentRow(missing.motion)
@@ -333,15 +333,15 @@ class MotionPanel(Panel):
 
     def _insert(self, motion: Motion) -> None:
         row = self.list.currentRow() + 1
-        self.store.change(changes.add_motion, motion, row)
+        self.change(changes.add_motion, motion, row)
         self.list.setCurrentRow(row)
 
     def _duplicate(self) -> None:
-        self._insert(self.store.session.case.motions[self.list.currentRow()])
+        self._insert(self.session.case.motions[self.list.currentRow()])
 
     def _copy(self) -> None:
         """Copy the selected motion to the clipboard, written as in a case file."""
-        motion = self.store.session.case.motions[self.list.currentRow()]
+        motion = self.session.case.motions[self.list.currentRow()]
         try:
             QApplication.clipboard().setText(write_motions((motion,)))
         except SlidevizError as error:
@@ -349,7 +349,7 @@ class MotionPanel(Panel):
 
     def _paste(self) -> None:
         """Add the motions in the clipboard, as written in a case file, below the selected one."""
-        session = self.store.session
+        session = self.session
         moving = session.case.markers_with("moving")
         try:
             motions = read_motions(QApplication.clipboard().text().replace("\\\n", " "))
@@ -362,14 +362,14 @@ class MotionPanel(Panel):
             self._insert(motion if fits else replace(motion, marker=new_target(session)))
 
     def new_table(self) -> None:
-        marker = new_target(self.store.session)
+        marker = new_target(self.session)
         path = self._ask_table(marker, Path())
         if path is not None:
-            self.store.change(changes.add_motion, FromFile(path, marker))
+            self.change(changes.add_motion, FromFile(path, marker))
 
     def edit_table(self) -> None:
         row = self.list.currentRow()
-        motion = self.store.session.case.motions[row]
+        motion = self.session.case.motions[row]
         (before,) = motion.files
         path = self._ask_table(motion.marker, before)
         if path is None:
@@ -377,11 +377,11 @@ class MotionPanel(Panel):
         if path == before:
             # The file has other rows now, but the motion is equal: change it and back, so that
             # whoever caches the file's content reads it again.
-            self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
-        self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
+            self.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
+        self.change(changes.replace_motion, row, FromFile(path, motion.marker))
 
     def _ask_table(self, marker: Target, path: Path) -> Path | None:
-        session = self.store.session
+        session = self.session
         case = session.case
         mesh = session.mesh
         assert mesh is not None
@@ -397,14 +397,14 @@ class MotionPanel(Panel):
             return None
 
     def _edited(self, motion: object) -> None:
-        self.store.change(changes.replace_motion, self.list.currentRow(), motion)
+        self.change(changes.replace_motion, self.list.currentRow(), motion)
 
     def _remove(self) -> None:
-        self.store.change(changes.remove_motion, self.list.currentRow())
+        self.change(changes.remove_motion, self.list.currentRow())
 
     def _move(self, by: int) -> None:
         row = self.list.currentRow()
-        self.store.change(changes.move_motion, row, by)
+        self.change(changes.move_motion, row, by)
         self.list.setCurrentRow(row + by)
 
     def sizeHint(self) -> QSize:

@@ -161,14 +161,14 @@ class RunPanel(Panel):
 
     def _link(self, target: str) -> None:
         if target == NOTES:
-            run = self.store.session.run_shown
+            run = self.session.run_shown
             if run is not None:
                 text = "\n".join(f"Note: {note}" for note in remarks_of(run, "note"))
                 main_window(self).banner.show_message(text)
         elif target == REACH:
             self.requirement_clicked.emit(Requirement("", "curves"))
         elif target == SETTINGS:
-            self.store.change(changes.adopt_settings, self.store.session.shown)
+            self.change(changes.adopt_settings, self.session.shown)
         else:
             asked = Requirement("", "motion")
             self.requirement_clicked.emit((*self._missing, asked)[0])
@@ -188,7 +188,7 @@ class RunPanel(Panel):
         if what:
             self._show_progress_text(what)
             self.text.setToolTip("")
-        self.sync(self.store.session)
+        self.sync(self.session)
 
     def show_progress(self, progress: JobProgress) -> None:
         if not self._busy:

@@ -196,17 +196,17 @@ class RunsPanel(Panel):
         self.follow()
 
     def _connect(self) -> None:
-        self.tree.session = lambda: self.store.session
+        self.tree.session = lambda: self.session
         self.tree.currentItemChanged.connect(self._chosen)
         self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
         self.tree.beside_wanted.connect(self.actions_table.show_beside)
         self.tree.renamed.connect(
-            lambda number, name: self.store.change(changes.rename_run, number, name)
+            lambda number, name: self.change(changes.rename_run, number, name)
         )
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        self._fill(self.store.session)
+        self._fill(self.session)
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
@@ -289,11 +289,11 @@ class RunsPanel(Panel):
         if number is None:
             return
         if seen.run is None or seen.run == number:
-            self.store.change(changes.show_beside, None)
+            self.change(changes.show_beside, None)
             return
-        self.store.change(changes.show_run, seen.run)
-        self.store.change(changes.show_beside, None if seen.beside == number else number)
-        self.store.change(changes.show_frame, seen.frame)
+        self.change(changes.show_run, seen.run)
+        self.change(changes.show_beside, None if seen.beside == number else number)
+        self.change(changes.show_frame, seen.frame)
 
     def _menu_wanted(self, where: QPoint) -> None:
         item = self.tree.itemAt(where)

@@ -329,7 +329,7 @@ class SectionsPanel(Panel):
     def _make_tools(self) -> None:
         self.handle = check_box("Handle", "")
         self.flat = check_box("Flat view", "")
-        self.handle.clicked.connect(lambda on: self.store.change(changes.show_handle, on))
+        self.handle.clicked.connect(lambda on: self.change(changes.show_handle, on))
         views = self.services.section_views
         self.flat.clicked.connect(views.want_flat)
         self.look = tool_button("", views.look_along, image="along")
@@ -430,11 +430,11 @@ class SectionsPanel(Panel):
 
     # What is wanted --------------------------------------------------------------------
     def _add(self, kind: str, _checked: bool = False) -> None:
-        session = self.store.session
+        session = self.session
         assert session.mesh is not None
         pair = self._period.of(session)
         section = first_section(kind, session, pair)
-        self.store.change(changes.add_section, section)
+        self.change(changes.add_section, section)
         try:
             with_walls(section, session.mesh, session.case, session.pairs)
         except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
@@ -452,25 +452,25 @@ class SectionsPanel(Panel):
             self._want_picture(PageFormat.of_cm(*size))
 
     def _remove(self) -> None:
-        view = self.store.session.view
+        view = self.session.view
         if view.section is not None:
-            self.store.change(changes.remove_section, view.section_index)
+            self.change(changes.remove_section, view.section_index)
 
     def _replace(self, section: Section) -> None:
-        view = self.store.session.view
+        view = self.session.view
         if view.section is not None:
-            self.store.change(changes.replace_section, view.section_index, section)
+            self.change(changes.replace_section, view.section_index, section)
 
     def _checked(self, item: QListWidgetItem) -> None:
         row = self.list.row(item)
-        section = self.store.session.view.sections[row]
+        section = self.session.view.sections[row]
         shown = item.checkState() == Qt.CheckState.Checked
         if shown != section.shown:
-            self.store.change(changes.replace_section, row, replace(section, shown=shown))
+            self.change(changes.replace_section, row, replace(section, shown=shown))
 
     def _row_chosen(self, row: int) -> None:
         if row >= 0:
-            self.store.change(changes.choose_section, row)
+            self.change(changes.choose_section, row)
 
 
 def _shown(session: Session) -> object:

@@ -81,7 +81,7 @@ class WorstPanel(Panel):
         self.repair = push_button("Repair", mend.tip, lambda: mend.do(main_window(self)), "repair")
         parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self._timer = single_shot(self, lambda: self.sync(self.store.session))
+        self._timer = single_shot(self, lambda: self.sync(self.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
@@ -95,13 +95,13 @@ class WorstPanel(Panel):
         table = WorstTable(self.model)
         table.row_activated.connect(self._fly_to_row)
         table.clicked.connect(self._clicked)
-        self.model.modelReset.connect(lambda: self._sync_mark(self.store.session))
+        self.model.modelReset.connect(lambda: self._sync_mark(self.session))
         return table
 
     # State to widgets ------------------------------------------------------------------
     def take_theme(self, _scheme: ColorScheme) -> None:
         self._info_key = ()
-        self._sync_mark(self.store.session)
+        self._sync_mark(self.session)
 
     def sync(self, session: Session) -> None:
         """Show the worst cells of the session's step; during play, at most every `REST_MS`."""
@@ -171,32 +171,32 @@ class WorstPanel(Panel):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        session = self.store.session
+        session = self.session
         # While the panel was behind another tab, the list was not filled.
         if session.frame is not None and self._key(session) != self._listed_key:
-            QTimer.singleShot(0, self, lambda: self.sync(self.store.session))
+            QTimer.singleShot(0, self, lambda: self.sync(self.session))
 
     # What the user does ----------------------------------------------------------------
     def _fly_to_row(self, row: int) -> None:
         cell = self.model.cell(row)
-        self.store.change(changes.mark_cell, cell)
+        self.change(changes.mark_cell, cell)
         self._fly_to(cell)
 
     def show_worst(self) -> None:
-        self.store.change(changes.show_frame, len(self.store.session.frames) - 1)
-        self._fill(self.store.session)
+        self.change(changes.show_frame, len(self.session.frames) - 1)
+        self._fill(self.session)
         if self.model.worst is not None:
             self._fly_to_row(self.model.row_of(int(self.model.worst.cells[0])))
 
     def _clicked(self, index: QModelIndex) -> None:
-        if self.model.cell(index.row()) == self.store.session.view.marked_cell:
+        if self.model.cell(index.row()) == self.session.view.marked_cell:
             self.unmark()
         else:
             self._fly_to_row(index.row())
 
     def unmark(self) -> None:
-        if self.store.session.view.marked_cell is not None:
-            self.store.change(changes.mark_cell, None)
+        if self.session.view.marked_cell is not None:
+            self.change(changes.mark_cell, None)
 
     def copy_rows(self) -> None:
         """Copy the selected rows (all, if none is) to the clipboard, below the column names."""
@@ -209,7 +209,7 @@ class WorstPanel(Panel):
         QGuiApplication.clipboard().setText("\n".join("\t".join(line) for line in lines) + "\n")
 
     def _export(self) -> None:
-        self._fill(self.store.session)
+        self._fill(self.session)
         worst = self.model.worst
         if worst is None:
             return

@@ -81,6 +81,12 @@ class Panel(QWidget):
     def __init__(self, store: Store) -> None:
         super().__init__()
         self.store = store
+        self.change = store.change
+
+    @property
+    def session(self) -> Session:
+        """Return the session that is shown."""
+        return self.store.session
 
     def follow(
         self,
@@ -94,7 +100,7 @@ class Panel(QWidget):
         panel.
         """
         fill = sync or self.sync
-        shown = select(self.store.session)
+        shown = select(self.session)
 
         def changed(_old: Session, new: Session) -> None:
             nonlocal shown
@@ -104,7 +110,7 @@ class Panel(QWidget):
                 fill(new)
 
         self.store.listen(changed)
-        fill(self.store.session)
+        fill(self.session)
 
     def sync(self, session: Session) -> None:
         """Fill the widgets from the session."""

@@ -44,7 +44,7 @@ class SpanWalls(Panel):
         """Offer the walls of the zone that has these boundaries; where none has them, of all."""
         if blade != self._blade:
             self._blade = blade
-            self.sync(self.store.session)
+            self.sync(self.session)
 
     def sync(self, session: Session) -> None:
         mesh = session.mesh
@@ -75,4 +75,4 @@ class SpanWalls(Panel):
         shroud = self.ends[1].currentData()
         if hub and shroud:
             span = None if (hub, shroud) == self._by_name else (hub, shroud)
-            self.store.change(changes.set_case, span=span)
+            self.change(changes.set_case, span=span)
