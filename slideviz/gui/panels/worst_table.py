@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from qtpy.QtCore import QAbstractTableModel, Qt, Signal
@@ -14,18 +15,15 @@ from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.session.inspect import WorstCells, coordinates, decimals
-from slideviz.terms import COLOR_BY, SIZE_SKEW
+from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 """Short names of cell types."""
 
 COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
-"""The first columns; then come the zone if there are several, the coordinates, and the cell type
-if there are several."""
+"""The first columns."""
 
-ZONE = "Zone"  # titles of these columns
-LAST = "Type"
 ARROW = 20
 GAP = "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
@@ -36,11 +34,12 @@ _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
 FEWEST = 4  # decimals shown of a quality
 MOST = 5
 MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
-TIPS = {
-    CELL: "Number of the cell, from 0 as in an SU2 file",
-    QUALITY: "Quality of the step that is shown",
-    SINCE: "The first step at which the cell was at its worst",
-}
+TIPS = (
+    "Number of the cell, from 0 as in an SU2 file",
+    "Quality of the step that is shown",
+    "The first step at which the cell was at its worst",
+)
+"""Of the first columns."""
 
 
 def distinguishing_digits(values: FloatArray) -> int:
@@ -76,21 +75,78 @@ def spare_digits(places: FloatArray, digits: Sequence[int]) -> int:
     return MOST_MORE
 
 
+def place_texts(names: Sequence[str], places: FloatArray) -> Iterator[list[str]]:
+    """Yield the texts (n,) of each column of places (n, d), by their ``names``."""
+    digits = place_digits(names, places)
+    more = spare_digits(places, digits)
+    for column, usual in zip(places.T, digits, strict=True):
+        count = usual + more
+        if usual < 8:
+            # The sum turns -0 into 0.
+            yield [f"{round(value, count) + 0.0:.{count}f}" for value in column.tolist()]
+        else:  # tiny numbers, in scientific notation
+            yield [f"{value:.{3 + count - decimals(column)}g}" for value in column.tolist()]
+
+
+class Column(NamedTuple):
+    """A column of the table."""
+
+    title: str
+    tip: str
+    alignment: int
+    texts: list[str]
+    """`texts` (n,), `keys` (n,): of each cell, the worst first; and what it is sorted by."""
+    keys: np.ndarray
+
+
+def measure_title(what: ColorBy) -> str:
+    """Return the title of the column of values, in two lines if it is long."""
+    if what in SIZE_SKEW:
+        return COLUMNS[QUALITY]
+    words = COLOR_BY[what].label.partition(" (")[0]
+    return words.replace(" ", "\n").replace("-", "-\n", len(words) > 12).capitalize()
+
+
+def columns_of(worst: WorstCells, around: Pair | None) -> list[Column]:
+    """Return the columns for worst cells, in cylindrical coordinates about an axis if one is given.
+
+    The first are `CELL`, `QUALITY` and `SINCE`; then come the zone if there are several, the
+    coordinates, and the cell type if there are several.
+    """
+    digits = distinguishing_digits(worst.values[~worst.inverted])
+    rated = zip(worst.values.tolist(), worst.inverted, strict=True)
+    values = ["inverted" if bad else f"{value:.{digits}f}" for value, bad in rated]
+    known_as = worst.known_as
+    numbers = [str(number) for number in known_as]
+    since = [str(step) for step in worst.steps]
+    cell, quality, step = TIPS
+    columns = [
+        Column(COLUMNS[CELL], cell, _RIGHT, numbers, known_as),
+        Column(measure_title(worst.measure), quality, _RIGHT, values, np.arange(len(worst))),
+        Column(COLUMNS[SINCE], step, _MIDDLE, since, worst.steps),
+    ]
+    if worst.zones:
+        zones = [str(zone) for zone in worst.zones]
+        tip = "Zone of the mesh, from 1"
+        columns.append(Column("Zone", tip, _MIDDLE, zones, np.array(worst.zones)))
+    names, places = coordinates(worst.positions, around)
+    for name, place, texts in zip(names, places.T, place_texts(names, places), strict=True):
+        tip = f"{name} of the mean of its nodes, in mesh units or degrees"
+        columns.append(Column(name, tip, _RIGHT, texts, place))
+    kinds, keys = np.unique(np.array(worst.kinds), return_inverse=True)
+    if len(kinds) > 1:
+        short = [SHORT.get(kind, kind) for kind in worst.kinds]
+        columns.append(Column("Type", "Element type", _LEFT, short, keys))
+    return columns
+
+
 class WorstModel(QAbstractTableModel):
     """The Qt model of the worst cells."""
 
     def __init__(self) -> None:
         super().__init__()
         self.worst: WorstCells | None = None
-        self.names: tuple[str, ...] = ()
-        """Titles of the columns of coordinates."""
-        self.places = np.empty((0, 0))
-        """(n, d): the coordinates, in mesh units or degrees."""
-        self._decimals: list[int] = []
-        self._figures: list[int] = []
-        self._more = 0
-        self._mixed = False
-        self._digits = FEWEST
+        self.columns: list[Column] = []
         self.order = np.empty(0, np.int64)
         """(n,): the index in ``worst`` of the cell in each row."""
         self._by = QUALITY
@@ -100,17 +156,7 @@ class WorstModel(QAbstractTableModel):
         """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst
-        if worst is not None:
-            self.names, self.places = coordinates(worst.positions, around)
-            digits = place_digits(self.names, self.places)
-            self._more = spare_digits(self.places, digits)
-            self._decimals = [count + self._more for count in digits]
-            self._figures = [
-                3 + count - decimals(column)
-                for count, column in zip(self._decimals, self.places.T, strict=True)
-            ]
-            self._digits = distinguishing_digits(worst.values[~worst.inverted])
-            self._mixed = len(set(worst.kinds)) > 1
+        self.columns = [] if worst is None else columns_of(worst, around)
         self._sort_rows()
         self.endResetModel()
 
@@ -128,78 +174,41 @@ class WorstModel(QAbstractTableModel):
         return len(self.order) if parent is None or not parent.isValid() else 0
 
     def columnCount(self, _parent: ModelIndex | None = None) -> int:
-        return len(self.headers)
+        return len(self.columns)
 
     @property
     def headers(self) -> tuple[str, ...]:
-        first, _, since = COLUMNS
-        zone = (ZONE,) if self._zoned else ()
-        last = (LAST,) if self._mixed else ()
-        return (first, self._measure, since, *zone, *self.names, *last)
-
-    @property
-    def _zoned(self) -> bool:
-        return self.worst is not None and bool(self.worst.zones)
-
-    @property
-    def _measure(self) -> str:
-        """Return the title of the column of values, in two lines if it is long."""
-        if self.worst is None or self.worst.measure in SIZE_SKEW:
-            return COLUMNS[QUALITY]
-        words = COLOR_BY[self.worst.measure].label.partition(" (")[0]
-        return words.replace(" ", "\n").replace("-", "-\n", len(words) > 12).capitalize()
-
-    def _alignment(self, column: int) -> int:
-        if column == SINCE or self.headers[column] == ZONE:
-            return _MIDDLE
-        return _LEFT if self.headers[column] == LAST else _RIGHT
+        return tuple(column.title for column in self.columns)
 
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> object:
         if orientation != Qt.Orientation.Horizontal:
             return None
+        column = self.columns[section]
         if role == Qt.ItemDataRole.ToolTipRole:
-            place = f"{self.headers[section]} of the mean of its nodes, in mesh units or degrees"
-            others = {LAST: "Element type", ZONE: "Zone of the mesh, from 1"}
-            return others.get(self.headers[section]) or TIPS.get(section, place)
+            return column.tip
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return self._alignment(section)
+            return column.alignment
         if role != Qt.ItemDataRole.DisplayRole:
             return None
         # Qt draws the sort arrow right behind the last letter.
-        return self.headers[section] + (GAP if section == QUALITY == self._by else "")
+        return column.title + (GAP if section == QUALITY == self._by else "")
 
     def data(self, index: ModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         at = self.order[index.row()]
+        column = self.columns[index.column()]
         if role == Qt.ItemDataRole.DisplayRole:
-            return self._text(at, index.column())
-        if role == Qt.ItemDataRole.ToolTipRole:
-            where = ", ".join(f"{value:.8g}" for value in self.worst.positions[at])
-            return f"{self.worst.kinds[at]} at {'x, y, z'[: 3 * len(self.names) - 2]} = {where}"
-        if role == Qt.ItemDataRole.ForegroundRole and self.worst.inverted[at]:
-            return QBrush(QColor(alarm())) if index.column() == QUALITY else None
-        return (
-            self._alignment(index.column()) if role == Qt.ItemDataRole.TextAlignmentRole else None
-        )
-
-    def _text(self, at: int, column: int) -> str:
+            return column.texts[at]
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return column.alignment
         worst = self.worst
-        if column == QUALITY:
-            return "inverted" if worst.inverted[at] else f"{worst.values[at]:.{self._digits}f}"
-        if column in (CELL, SINCE):
-            return str((worst.known_as if column == CELL else worst.steps)[at])
-        if self.headers[column] == ZONE:
-            return str(worst.zones[at])
-        axis = column - len(COLUMNS) - self._zoned
-        if axis == len(self.names):
-            return SHORT.get(worst.kinds[at], worst.kinds[at])
-        value = float(self.places[at, axis])
-        digits = self._decimals[axis]
-        # The sum turns -0 into 0; a column of tiny numbers is shown in scientific notation.
-        if digits - self._more < 8:
-            return f"{round(value, digits) + 0.0:.{digits}f}"
-        return f"{value:.{self._figures[axis]}g}"
+        if role == Qt.ItemDataRole.ToolTipRole:
+            place = worst.positions[at]
+            where = ", ".join(f"{value:.8g}" for value in place)
+            return f"{worst.kinds[at]} at {'x, y, z'[: 3 * len(place) - 2]} = {where}"
+        alarming = role == Qt.ItemDataRole.ForegroundRole and index.column() == QUALITY
+        return QBrush(QColor(alarm())) if alarming and worst.inverted[at] else None
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         self._by = column
@@ -210,14 +219,7 @@ class WorstModel(QAbstractTableModel):
 
     def _sort_rows(self) -> None:
         """Sort the rows by the selected column; equal ones stay in the order of their quality."""
-        if self.worst is None:
-            self.order = np.empty(0, np.int64)
-            return
-        worst = self.worst
-        zones = [np.array(worst.zones)] if self._zoned else []
-        kinds = np.unique(np.array(worst.kinds), return_inverse=True)[1]
-        # In the order of `headers`.
-        keys = [worst.known_as, np.arange(len(worst)), worst.steps, *zones, *self.places.T, kinds]
+        keys = [column.keys for column in self.columns] or [self.order[:0]]
         key = keys[min(self._by, len(keys) - 1)]
         self.order = np.argsort(-key if self._down else key, kind="stable")
 
@@ -233,7 +235,7 @@ class WorstTable(QTableView):
         super().__init__()
         self.setObjectName("worst")
         self.setTabKeyNavigation(False)  # the tab key goes on to the next panel
-        self._shared: tuple[str, ...] = ()
+        self._titles: tuple[str, ...] = ()
         self._needed: list[int] = []
         self._given: list[int] = []
         self.setModel(model)
@@ -266,20 +268,19 @@ class WorstTable(QTableView):
         assert isinstance(model, WorstModel)
         if not model.rowCount():
             return
-        if model.headers != self._shared:
-            self._shared = model.headers
+        if model.headers != self._titles:
+            self._titles = model.headers
             self._given = []
-            self._needed = [0] * len(self._shared)
+            self._needed = [0] * len(self._titles)
         metrics = self.fontMetrics()
-        rows = range(model.rowCount())
         before = self._needed
         self._needed = []
-        for column, words in enumerate(self._shared):
-            texts = [model.index(row, column).data() for row in rows]
-            room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
+        for place, column in enumerate(model.columns):
+            texts = (*column.texts, *column.title.split())
+            room = max(metrics.horizontalAdvance(text) for text in texts)
             # Qt's own size hint is wider than the panel has room for.
-            room += 8 + (ARROW if column == QUALITY else 0)
-            self._needed.append(max(room, before[column]))
+            room += 8 + (ARROW if place == QUALITY else 0)
+            self._needed.append(max(room, before[place]))
         if self._needed != before:
             self._distribute_width()
 
