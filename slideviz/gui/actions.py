@@ -11,8 +11,7 @@ from qtpy.QtGui import QAction, QActionGroup
 from qtpy.QtWidgets import QLabel, QMenu, QMenuBar, QSizePolicy, QToolBar, QWidget
 
 from slideviz.gui.commands import COMMANDS, MENUS
-from slideviz.gui.widgets.build import tool_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, tool_button
 from slideviz.gui.widgets.command import CommandState, Menu, colored_by_value
 from slideviz.session import changes
 from slideviz.session.colors import not_drawable

@@ -23,6 +23,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
+    ElidedLabel,
     QuietBar,
     WrappingRow,
     as_widget,
@@ -30,9 +31,10 @@ from slideviz.gui.widgets.build import (
     in_column,
     in_row,
     push_button,
+    rich_label,
+    wrapped,
 )
 from slideviz.gui.widgets.icons import icon, logo, svg_pixmap
-from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 from slideviz.session.jobs import JobProgress
 
 WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read

@@ -36,11 +36,10 @@ from slideviz.gui.viewport.section_views import SectionViews
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
-from slideviz.gui.widgets.build import in_column, reveal
+from slideviz.gui.widgets.build import in_column, plain_labels, reveal, wrapped
 from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.error_reporter import ErrorReporter
 from slideviz.gui.widgets.icons import redraw_icons
-from slideviz.gui.widgets.labels import plain_labels, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
 from slideviz.rbf.reduction import Reduction

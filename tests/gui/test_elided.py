@@ -5,7 +5,7 @@ import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QListWidget
 
-from slideviz.gui.widgets.labels import ElidedLabel, elide_items
+from slideviz.gui.widgets.build import ElidedLabel, elide_items
 
 WORDS = "size-skew: min 0.8218, mean 0.9302; 1,608 cells cut"
 

@@ -16,7 +16,7 @@ from slideviz.case.motions.span import SpanMotion
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.panels.motions import TableDialog
-from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.vector_field import control_point_problem
 from slideviz.samples.table import write_sample
 from slideviz.session import changes, jobs

@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QFileDialog, QLabel, QMessageBox
 from slideviz.gui.panels.run import _shortened
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -240,7 +240,7 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
     monkeypatch.undo()
     from qtpy.QtWidgets import QDialogButtonBox
 
-    from slideviz.gui.widgets.choice import Choice
+    from slideviz.gui.widgets.build import Choice
     from slideviz.gui.widgets.fields import NumberBox
 
     seen = []

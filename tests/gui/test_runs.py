@@ -13,7 +13,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QLineEdit
 
 from slideviz.color_scheme import DARK
-from slideviz.gui.panels.runs_tree import INVERTED, MEAN, MIN, NUMBER, RUN, WORDS
+from slideviz.gui.panels.runs import INVERTED, MEAN, MIN, NUMBER, RUN, WORDS
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.panes import run_title

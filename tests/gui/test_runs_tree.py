@@ -3,7 +3,7 @@
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QTreeWidgetItem
 
-from slideviz.gui.panels.runs_tree import RUN, WORDS, RunTree
+from slideviz.gui.panels.runs import RUN, WORDS, RunTree
 
 
 class Paints(QObject):

@@ -17,8 +17,8 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui import running
 from slideviz.gui.dialogs.help import MOUSE, shortcut_rows
+from slideviz.gui.widgets.build import LETTERS, wrapped
 from slideviz.gui.widgets.fields import NumberField
-from slideviz.gui.widgets.labels import LETTERS, wrapped
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -16,7 +16,7 @@ from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.errors import Message, note
 from slideviz.export.picture_options import PictureOptions, headings
-from slideviz.gui.panels.worst_table import CELL
+from slideviz.gui.panels.worst import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.gui.widgets import questions

@@ -13,14 +13,15 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.formats.files import write
 from slideviz.gui.panels import worst
-from slideviz.gui.panels.worst import WorstPanel, info_text
-from slideviz.gui.panels.worst_table import (
+from slideviz.gui.panels.worst import (
     CELL,
     COLUMNS,
     QUALITY,
     SINCE,
     WorstModel,
+    WorstPanel,
     distinguishing_digits,
+    info_text,
     place_digits,
 )
 from slideviz.gui.widgets import plot_canvas

@@ -28,6 +28,7 @@ from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
 from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
+    Choice,
     as_widget,
     check_box,
     decimal_box,
@@ -39,7 +40,6 @@ from slideviz.gui.widgets.build import (
     on_screen,
     set_style,
 )
-from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import (
     copy_image,
     drawn_for,

@@ -25,6 +25,7 @@ from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
 from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets.build import (
+    Choice,
     QuietBar,
     as_widget,
     check_box,
@@ -36,7 +37,6 @@ from slideviz.gui.widgets.build import (
     on_screen,
     set_style,
 )
-from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 
 KINDS = {

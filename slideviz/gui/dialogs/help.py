@@ -29,11 +29,17 @@ from slideviz import __version__
 from slideviz.case.cfg import describe_keys
 from slideviz.case.words import counted
 from slideviz.gui.commands import MENUS
-from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row, push_button
+from slideviz.gui.widgets.build import (
+    dialog_buttons,
+    fixed_font,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+)
 from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.error_reporter import versions
 from slideviz.gui.widgets.icons import logo
-from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
 
 LOG_LINES = 40  # number of the log's last lines in a bug report

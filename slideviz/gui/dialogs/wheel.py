@@ -11,8 +11,7 @@ from qtpy.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QWidget
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.responsiveness.worker import PieceRunner, reraise
-from slideviz.gui.widgets.build import check_box, dialog_buttons, hint_label, in_column
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, check_box, dialog_buttons, hint_label, in_column
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes

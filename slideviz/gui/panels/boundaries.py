@@ -16,10 +16,8 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, hint_label, in_column, in_row, push_button, wrapped
 from slideviz.gui.widgets.icons import role_icon
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.zones import marker_zones
 from slideviz.session import changes

@@ -15,8 +15,7 @@ from qtpy.QtWidgets import QHBoxLayout, QWidget
 
 from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.errors import SlidevizError
-from slideviz.gui.widgets.build import as_widget, check_box, in_column, in_row, push_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, as_widget, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.mesh.model import FloatArray

@@ -18,9 +18,15 @@ from slideviz.gui.panels.designs_rows import DesignRows
 from slideviz.gui.responsiveness.timers import ROWS_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
-from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.labels import WideLabel
+from slideviz.gui.widgets.build import (
+    Choice,
+    QuietBar,
+    WideLabel,
+    in_column,
+    in_row,
+    push_button,
+    set_style,
+)
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.services import Services

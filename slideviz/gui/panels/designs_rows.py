@@ -12,10 +12,16 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QTabl
 from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import NUMBERS, DesignRow
-from slideviz.gui.widgets.build import Slot, hint_label, in_column, in_row, push_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import (
+    Choice,
+    Slot,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+    wrapped,
+)
 from slideviz.gui.widgets.fields import TextField
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable, column_choices

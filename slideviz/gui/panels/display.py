@@ -14,17 +14,17 @@ from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushBut
 
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
+    Choice,
     PanelScroll,
     check_box,
     grow_fields,
     in_column,
     in_row,
     push_button,
+    wrapped,
 )
-from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.fields import NumberBox, number_text
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.vector_field import VectorField

@@ -17,9 +17,15 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.limits import LimitResult, read_limits, write_limits
 from slideviz.errors import CaseError
-from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button, set_style
+from slideviz.gui.widgets.build import (
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+    set_style,
+    wrapped,
+)
 from slideviz.gui.widgets.fields import TextField
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of

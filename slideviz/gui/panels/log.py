@@ -8,7 +8,7 @@ import logging
 from qtpy.QtCore import QObject, Qt, Signal
 from qtpy.QtWidgets import QPlainTextEdit
 
-from slideviz.gui.widgets.labels import fixed_font
+from slideviz.gui.widgets.build import fixed_font
 
 LOGGERS = ("slideviz", "py.warnings")
 """The loggers shown: slideviz, with those of Qt and VTK below it, and Python's warnings."""

@@ -15,6 +15,7 @@ from slideviz.case.method_keys import get_reduction, nothing_slides, put_reducti
 from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import (
+    Choice,
     PanelScroll,
     as_widget,
     grow_fields,
@@ -23,10 +24,9 @@ from slideviz.gui.widgets.build import (
     in_row,
     set_style,
     tool_button,
+    wrapped,
 )
-from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.rbf.reduction import AUTO, Reduction

@@ -22,8 +22,7 @@ from slideviz.case.motions.motion import (
     named,
 )
 from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
-from slideviz.gui.widgets.build import as_widget, grow_fields, in_row, push_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, as_widget, grow_fields, in_row, push_button
 from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.gui.widgets.span_walls import SpanWalls

@@ -34,13 +34,15 @@ from slideviz.gui.responsiveness.timers import TABLE_MS, single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
     dialog_buttons,
+    elide_items,
+    fixed_font,
     hint_label,
     in_column,
     in_row,
     set_style,
     tool_button,
+    wrapped,
 )
-from slideviz.gui.widgets.labels import elide_items, fixed_font, wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.span_walls import SpanWalls
@@ -178,9 +180,7 @@ class MotionPanel(Panel):
         self.editor.changed.connect(self._edited)
         self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
-        self.editor.box_wanted.connect(
-            lambda: self.change(changes.add_box, self.list.currentRow())
-        )
+        self.editor.box_wanted.connect(lambda: self.change(changes.add_box, self.list.currentRow()))
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
         parts = (buttons, self.list, self.editor, self.hint, None)
         layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))

@@ -10,10 +10,17 @@ from qtpy.QtWidgets import QPushButton, QSizePolicy
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import Message
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
+from slideviz.gui.widgets.build import (
+    LinkLabel,
+    QuietBar,
+    in_column,
+    in_row,
+    push_button,
+    set_style,
+    wrapped,
+)
 from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.labels import LinkLabel, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes

@@ -26,20 +26,21 @@ from slideviz.export.flat_section import PageFormat
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
+    Choice,
     Part,
     as_widget,
     check_box,
+    elide_items,
     grow_fields,
     hint_label,
     in_column,
     in_row,
     push_button,
     tool_button,
+    wrapped,
 )
-from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.icons import set_icon
-from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.span_walls import SpanWalls

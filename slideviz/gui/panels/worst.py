@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from html import escape
+from typing import NamedTuple
 
-from qtpy.QtCore import QModelIndex, Qt, QTimer
-from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
-from qtpy.QtWidgets import QLabel, QStackedWidget
+import numpy as np
+from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, QTimer, Signal
+from qtpy.QtGui import (
+    QBrush,
+    QColor,
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QPaintEvent,
+    QResizeEvent,
+    QShortcut,
+)
+from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QStackedWidget, QTableView
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.panels.worst_table import SINCE, WorstModel, WorstTable
 from slideviz.gui.responsiveness.timers import REST_MS, single_shot
-from slideviz.gui.widgets.build import in_column, in_row, push_button
+from slideviz.gui.widgets.build import ModelIndex, in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of, main_window
@@ -23,8 +33,10 @@ from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.inspect import (
+    WorstCells,
     cell_info,
     coordinates,
+    decimals,
     measure,
     nearest_boundary,
     table_rows,
@@ -35,7 +47,297 @@ from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.csv_table import write_csv
-from slideviz.terms import COLOR_BY, SIZE_SKEW
+from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy
+
+SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
+"""Short names of cell types."""
+
+COLUMNS = ("Cell", "Quality", "Worst\nstep")
+CELL, QUALITY, SINCE = range(3)
+"""The first columns."""
+
+ARROW = 20
+GAP = "\N{NO-BREAK SPACE}"
+"""Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
+
+_RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+_MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
+FEWEST = 4  # decimals shown of a quality
+MOST = 5
+MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
+TIPS = (
+    "Number of the cell, from 0 as in an SU2 file",
+    "Quality of the step that is shown",
+    "The first step at which the cell was at its worst",
+)
+"""Of the first columns."""
+
+
+def distinguishing_digits(values: FloatArray) -> int:
+    """Return the number of decimals, `FEWEST` to `MOST`, that tell most of values (n,) apart."""
+    different = len(np.unique(values.round(MOST)))
+    for digits in range(FEWEST, MOST):
+        if not len(values) or len(np.unique(values.round(digits))) > 0.5 * different:
+            return digits
+    return MOST
+
+
+def place_digits(names: Sequence[str], places: FloatArray) -> list[int]:
+    """Return the number of decimals of each column of places (n, d), by their ``names``.
+
+    All lengths have equally many: enough for the smallest, but not many more than for the largest.
+    """
+    angles = ["°" in name for name in names]
+    each = [decimals(column) for column in places.T]
+    lengths = [n for n, angle in zip(each, angles, strict=True) if not angle and n]
+    length = min(max(lengths), min(lengths) + MOST_MORE) if lengths else 0
+    return [min(n, 2) if angle else length for n, angle in zip(each, angles, strict=True)]
+
+
+def spare_digits(places: FloatArray, digits: Sequence[int]) -> int:
+    """Return how many more digits than given tell places (n, d) apart, `MOST_MORE` at most."""
+    different = len(np.unique(places, axis=0))
+    for more in range(MOST_MORE):
+        rounded = [
+            column.round(count + more) for column, count in zip(places.T, digits, strict=True)
+        ]
+        if len(np.unique(np.column_stack(rounded), axis=0)) == different:
+            return more
+    return MOST_MORE
+
+
+def place_texts(names: Sequence[str], places: FloatArray) -> Iterator[list[str]]:
+    """Yield the texts (n,) of each column of places (n, d), by their ``names``."""
+    digits = place_digits(names, places)
+    more = spare_digits(places, digits)
+    for column, usual in zip(places.T, digits, strict=True):
+        count = usual + more
+        if usual < 8:
+            # The sum turns -0 into 0.
+            yield [f"{round(value, count) + 0.0:.{count}f}" for value in column.tolist()]
+        else:  # tiny numbers, in scientific notation
+            yield [f"{value:.{3 + count - decimals(column)}g}" for value in column.tolist()]
+
+
+class Column(NamedTuple):
+    """A column of the table."""
+
+    title: str
+    tip: str
+    alignment: int
+    texts: list[str]
+    """`texts` (n,), `keys` (n,): of each cell, the worst first; and what it is sorted by."""
+    keys: np.ndarray
+
+
+def measure_title(what: ColorBy) -> str:
+    """Return the title of the column of values, in two lines if it is long."""
+    if what in SIZE_SKEW:
+        return COLUMNS[QUALITY]
+    words = COLOR_BY[what].label.partition(" (")[0]
+    return words.replace(" ", "\n").replace("-", "-\n", len(words) > 12).capitalize()
+
+
+def columns_of(worst: WorstCells, around: Pair | None) -> list[Column]:
+    """Return the columns for worst cells, in cylindrical coordinates about an axis if one is given.
+
+    The first are `CELL`, `QUALITY` and `SINCE`; then come the zone if there are several, the
+    coordinates, and the cell type if there are several.
+    """
+    digits = distinguishing_digits(worst.values[~worst.inverted])
+    rated = zip(worst.values.tolist(), worst.inverted, strict=True)
+    values = ["inverted" if bad else f"{value:.{digits}f}" for value, bad in rated]
+    known_as = worst.known_as
+    numbers = [str(number) for number in known_as]
+    since = [str(step) for step in worst.steps]
+    cell, quality, step = TIPS
+    columns = [
+        Column(COLUMNS[CELL], cell, _RIGHT, numbers, known_as),
+        Column(measure_title(worst.measure), quality, _RIGHT, values, np.arange(len(worst))),
+        Column(COLUMNS[SINCE], step, _MIDDLE, since, worst.steps),
+    ]
+    if worst.zones:
+        zones = [str(zone) for zone in worst.zones]
+        tip = "Zone of the mesh, from 1"
+        columns.append(Column("Zone", tip, _MIDDLE, zones, np.array(worst.zones)))
+    names, places = coordinates(worst.positions, around)
+    for name, place, texts in zip(names, places.T, place_texts(names, places), strict=True):
+        tip = f"{name} of the mean of its nodes, in mesh units or degrees"
+        columns.append(Column(name, tip, _RIGHT, texts, place))
+    kinds, keys = np.unique(np.array(worst.kinds), return_inverse=True)
+    if len(kinds) > 1:
+        short = [SHORT.get(kind, kind) for kind in worst.kinds]
+        columns.append(Column("Type", "Element type", _LEFT, short, keys))
+    return columns
+
+
+class WorstModel(QAbstractTableModel):
+    """The Qt model of the worst cells."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.worst: WorstCells | None = None
+        self.columns: list[Column] = []
+        self.order = np.empty(0, np.int64)
+        """(n,): the index in ``worst`` of the cell in each row."""
+        self._by = QUALITY
+        self._down = False
+
+    def show(self, worst: WorstCells | None, around: Pair | None = None) -> None:
+        """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
+        self.beginResetModel()
+        self.worst = worst
+        self.columns = [] if worst is None else columns_of(worst, around)
+        self._sort_rows()
+        self.endResetModel()
+
+    def cell(self, row: int) -> int:
+        return int(self.worst.cells[self.order[row]])
+
+    def row_of(self, cell: int | None) -> int:
+        """Return the row of a cell of the mesh; -1 if it is not in the table."""
+        if self.worst is None or cell is None:
+            return -1
+        rows = np.flatnonzero(self.worst.cells[self.order] == cell)
+        return int(rows[0]) if len(rows) else -1
+
+    def rowCount(self, parent: ModelIndex | None = None) -> int:
+        return len(self.order) if parent is None or not parent.isValid() else 0
+
+    def columnCount(self, _parent: ModelIndex | None = None) -> int:
+        return len(self.columns)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        return tuple(column.title for column in self.columns)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> object:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        column = self.columns[section]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return column.tip
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return column.alignment
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        # Qt draws the sort arrow right behind the last letter.
+        return column.title + (GAP if section == QUALITY == self._by else "")
+
+    def data(self, index: ModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        at = self.order[index.row()]
+        column = self.columns[index.column()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return column.texts[at]
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return column.alignment
+        worst = self.worst
+        if role == Qt.ItemDataRole.ToolTipRole:
+            place = worst.positions[at]
+            where = ", ".join(f"{value:.8g}" for value in place)
+            return f"{worst.kinds[at]} at {'x, y, z'[: 3 * len(place) - 2]} = {where}"
+        alarming = role == Qt.ItemDataRole.ForegroundRole and index.column() == QUALITY
+        return QBrush(QColor(alarm())) if alarming and worst.inverted[at] else None
+
+    def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
+        self._by = column
+        self._down = order == Qt.SortOrder.DescendingOrder
+        self.beginResetModel()
+        self._sort_rows()
+        self.endResetModel()
+
+    def _sort_rows(self) -> None:
+        """Sort the rows by the selected column; equal ones stay in the order of their quality."""
+        keys = [column.keys for column in self.columns] or [self.order[:0]]
+        key = keys[min(self._by, len(keys) - 1)]
+        self.order = np.argsort(-key if self._down else key, kind="stable")
+
+
+class WorstTable(QTableView):
+    """The view of the worst cells."""
+
+    row_activated = Signal(int)
+    """The row to which a key moved, or on which Return was pressed. Qt's own signal of the current
+    row is emitted too often: the focus alone makes the first row current."""
+
+    def __init__(self, model: WorstModel) -> None:
+        super().__init__()
+        self.setObjectName("worst")
+        self.setTabKeyNavigation(False)  # the tab key goes on to the next panel
+        self._titles: tuple[str, ...] = ()
+        self._needed: list[int] = []
+        self._given: list[int] = []
+        self.setModel(model)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setAlternatingRowColors(True)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        letters = self.font()
+        letters.setPointSizeF(0.9 * letters.pointSizeF())
+        self.setFont(letters)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(22)
+        self.setToolTip(
+            "Click a cell to fly there. Click it again, or press Esc, to remove the mark."
+        )
+        header = self.horizontalHeader()
+        header.setHighlightSections(False)
+        header.setFont(letters)
+        header.setStretchLastSection(True)
+        header.setMinimumSectionSize(32)
+        model.modelReset.connect(self._measure_columns)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+        header.setSortIndicator(QUALITY, Qt.SortOrder.AscendingOrder)
+        self.setSortingEnabled(True)
+
+    def _measure_columns(self) -> None:
+        """Measure the width that each column needs; it never shrinks for the same columns."""
+        model = self.model()
+        assert isinstance(model, WorstModel)
+        if not model.rowCount():
+            return
+        if model.headers != self._titles:
+            self._titles = model.headers
+            self._given = []
+            self._needed = [0] * len(self._titles)
+        metrics = self.fontMetrics()
+        before = self._needed
+        self._needed = []
+        for place, column in enumerate(model.columns):
+            texts = (*column.texts, *column.title.split())
+            room = max(metrics.horizontalAdvance(text) for text in texts)
+            # Qt's own size hint is wider than the panel has room for.
+            room += 8 + (ARROW if place == QUALITY else 0)
+            self._needed.append(max(room, before[place]))
+        if self._needed != before:
+            self._distribute_width()
+
+    def _distribute_width(self) -> None:
+        """Spread the spare width over the columns, unless the user has resized one."""
+        now = [self.columnWidth(column) for column in range(len(self._needed))]
+        # The last column stretches: its width says nothing about the user.
+        if not self._needed or (self._given and now[:-1] != self._given[:-1]):
+            return
+        spare = max(self.viewport().width() - sum(self._needed), 0) // len(self._needed)
+        self._given = [needed + spare for needed in self._needed]
+        for column, width in enumerate(self._given):
+            self.setColumnWidth(column, width)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._distribute_width()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        before = self.currentIndex().row()
+        super().keyPressEvent(event)
+        row = self.currentIndex().row()
+        enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if row >= 0 and (row != before or enter):
+            self.row_activated.emit(row)
 
 
 class WorstPanel(Panel):

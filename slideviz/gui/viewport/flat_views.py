@@ -17,8 +17,7 @@ from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.view_mouse import CellMouse
 from slideviz.gui.viewport.viewing import TitleBar, Viewing
-from slideviz.gui.widgets.build import in_column
-from slideviz.gui.widgets.labels import ElidedLabel
+from slideviz.gui.widgets.build import ElidedLabel, in_column
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, ask_and_write_plot
 from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of
 from slideviz.plots.section_paint import Paint, shown_paint

@@ -19,9 +19,8 @@ from qtpy.QtWidgets import (
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse, CoarseWhileMoving
-from slideviz.gui.widgets.build import tool_button
+from slideviz.gui.widgets.build import ElidedLabel, tool_button
 from slideviz.gui.widgets.command import fill_pane
-from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.scene.color_legend import STRIP
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs

@@ -26,11 +26,11 @@ from slideviz.gui.widgets.build import (
     in_column,
     in_row,
     push_button,
+    rich_label,
     set_style,
     tool_button,
 )
 from slideviz.gui.widgets.error_reporter import details_of
-from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4  # most lines of a message in the banner; all of them are behind “Details”
 Answers = Mapping[str, Callable[[], object]]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMenu
 
+from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.icons import set_icon
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
 from slideviz.session.motions import box_names, wheel_passages
 from slideviz.session.panes import choices, panes, show_in

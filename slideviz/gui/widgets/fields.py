@@ -15,8 +15,7 @@ from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValid
 from qtpy.QtWidgets import QApplication, QLineEdit, QSpinBox, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.widgets.build import set_style
-from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.build import set_style, wrapped
 from slideviz.gui.widgets.services import main_window
 
 _ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")  # the letters that an expression may have

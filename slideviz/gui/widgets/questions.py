@@ -11,8 +11,7 @@ from qtpy.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, 
 
 from slideviz.formats.table import FILE_FORMATS, MeshFormat, formats_for, readable_patterns
 from slideviz.gui.responsiveness.timers import ROWS_MS
-from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
 

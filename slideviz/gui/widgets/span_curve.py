@@ -11,8 +11,8 @@ from qtpy.QtWidgets import QSizePolicy, QWidget
 
 from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
 from slideviz.gui.responsiveness.timers import single_shot
+from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.fields import short_text
-from slideviz.gui.widgets.labels import wrapped
 from slideviz.machine.blade import curve_at
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import round_step, tick_format, ticks

@@ -6,8 +6,7 @@ from contextlib import suppress
 
 from slideviz.case.spans import span_ends
 from slideviz.errors import CaseError
-from slideviz.gui.widgets.build import in_row
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.build import Choice, in_row
 from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.zones import names_from
 from slideviz.session import changes
