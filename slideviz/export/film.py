@@ -31,8 +31,7 @@ from slideviz.export.titles import (
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
 from slideviz.session.pieces import CheckCancelled, InThread, not_cancelled, run_inline
-from slideviz.session.results import planned_steps
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import Session, StepFrame, planned_steps
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
 """Default width and height in pixels, by the kind of film."""

@@ -19,7 +19,7 @@ from PIL import Image
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
-from slideviz.scene.color_legend import set_letters
+from slideviz.scene.legend import set_letters
 
 SMALLEST = 64
 LARGEST = 8192

@@ -15,7 +15,7 @@ from slideviz.export.titles import (
     place_words,
     title_words,
 )
-from slideviz.scene.color_legend import STRIP
+from slideviz.scene.stage import STRIP
 from slideviz.session.colors import with_drawable_colors
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import Shown

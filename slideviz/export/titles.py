@@ -192,7 +192,7 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
-    from slideviz.scene.color_legend import set_letters
+    from slideviz.scene.legend import set_letters
 
     plotter.remove_actor(CELL_LABEL, reset_camera=False, render=False)
     words = mark_words(scene.session)

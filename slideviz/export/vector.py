@@ -22,9 +22,10 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.plots.cells import color_bar, color_scale, draw_cells
 from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.plots.section_paint import clipped
-from slideviz.scene.color_legend import OPACITY, STRIP
+from slideviz.scene.legend import OPACITY
 from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
+from slideviz.scene.stage import STRIP
 from slideviz.sections.cut import Cutter
 from slideviz.sections.line import box_around, trace
 from slideviz.sections.polygons import CellsInRange, Polygons

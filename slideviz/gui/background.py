@@ -16,12 +16,10 @@ from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
 from slideviz.session import jobs
-from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
-from slideviz.session.limits import check_frame
+from slideviz.session.jobs import JobProgress, Report, Stopped, check_frame, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.results import CheckedLimits
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import CheckedLimits, Session, StepFrame
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")

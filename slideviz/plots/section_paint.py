@@ -14,8 +14,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import walls
 from slideviz.plots.ticks import rounded_out
-from slideviz.session.results import StepFrame
-from slideviz.session.state import Session
+from slideviz.session.state import Session, StepFrame
 from slideviz.terms import (
     QUANTITIES,
     RATED,

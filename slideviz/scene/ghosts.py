@@ -18,7 +18,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
 from slideviz.scene import actors
 from slideviz.scene.actors import draw_in_front
-from slideviz.scene.color_legend import set_letters
+from slideviz.scene.legend import set_letters
 from slideviz.scene.stage import KeyedLayer, Layer
 from slideviz.session.motions import support_case, support_key, support_of
 from slideviz.session.state import Session

@@ -20,11 +20,10 @@ from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.camera import Camera
 from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
-from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, RepairLayer
+from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, PointLayer, RepairLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
 from slideviz.scene.overview import Overview
 from slideviz.scene.passages import PassageLayer
-from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.colors import with_drawable_colors

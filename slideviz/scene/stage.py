@@ -12,12 +12,13 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.plots.section_paint import clipped
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
-from slideviz.scene.color_legend import STRIP
 from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import WALL_VALUES
 
 USUAL_DPI = 72.0  # VTK's dots per inch of a screen with a device pixel ratio of 1
+STRIP = 104
+"""Width in pixels of the strip at the right that is free of the mesh, at normal letter size."""
 
 
 class Layer:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
-from slideviz.session.motion_scale import scaled
 from slideviz.session.motions import with_new_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
+from slideviz.session.reach import scaled
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role

@@ -7,8 +7,7 @@ import numpy as np
 from slideviz.mesh.metrics import is_known
 from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes import second_view, set_view, undoable
-from slideviz.session.results import StepFrame
-from slideviz.session.state import Session, outwards
+from slideviz.session.state import Session, StepFrame, outwards
 from slideviz.terms import METRICS
 
 

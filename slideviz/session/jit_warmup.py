@@ -18,7 +18,7 @@ from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.jobs import Stopped, raise_if_cancelled
-from slideviz.session.results import cell_displacement
+from slideviz.session.state import cell_displacement
 from slideviz.solver.deform import deform
 from slideviz.system.jit_cache import compilation_watched
 

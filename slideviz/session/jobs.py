@@ -1,4 +1,4 @@
-"""The long jobs of the window as plain functions: open, compute, save.
+"""The long jobs of the window as plain functions: open, compute, check, save.
 
 A job is a function with two arguments for the thread that runs it: it calls ``report(item)``, from
 any thread, with progress and results, and raises `slideviz.errors.Cancelled` soon after
@@ -17,7 +17,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.case.check import check_case
-from slideviz.case.limits import Limit, MeasuredMesh, check_case_limits, check_limits
+from slideviz.case.limits import (
+    NUMBERS,
+    Limit,
+    MeasuredMesh,
+    check_case_limits,
+    check_limits,
+    require_streamed,
+)
 from slideviz.case.model import Case
 from slideviz.case.motions.span import prepare_span
 from slideviz.case.zone_cases import each_zone, with_marker_names
@@ -42,7 +49,7 @@ from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import CheckedLimits, Session, StepFrame
 from slideviz.solver.deform import deform
 from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.repair_stage import mended_frame
@@ -55,6 +62,7 @@ from slideviz.terms import CELL_STATES
 if TYPE_CHECKING:
     from slideviz.design.deformed_wheel import WheelQuality
     from slideviz.solver.steps import Progress, Step
+
 
 _ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
 
@@ -510,3 +518,24 @@ def open_sample(
     raise_if_cancelled(stopped)
     case = next(path for path in written if path.suffix == ".cfg")
     return open_file(case, None, report, stopped)
+
+
+def check_frame(
+    frame: StepFrame, undeformed: Mesh, case: Case, _report: Report, _stopped: Stopped
+) -> CheckedLimits:
+    """Return the limits of a case, checked on a frame."""
+    if frame.extra is None:
+        try:
+            results = check_case_limits(case, frame.quality, frame.mesh, frame.base or undeformed)
+            return CheckedLimits(frame, case.limits, results)
+        except SlidevizError as error:
+            return CheckedLimits(frame, case.limits, (), str(error))
+    joined = Quality.joined([frame.quality, frame.extra.quality])  # numbered as in the frame
+    measured = MeasuredMesh(replace(joined, of_mesh=frame.quality.totals))
+    known = tuple(limit for limit in case.limits if NUMBERS[limit.name].streamed)
+    problem = ""
+    try:
+        require_streamed(case.limits)
+    except SlidevizError as error:
+        problem = str(error)
+    return CheckedLimits(frame, case.limits, check_limits(known, measured), problem)

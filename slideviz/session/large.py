@@ -13,7 +13,7 @@ from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import QualityTotals, quality
 from slideviz.session.inspect import WORST
-from slideviz.session.results import StepFrame
+from slideviz.session.state import StepFrame
 from slideviz.solver.deform import free_memory
 from slideviz.streaming.quality import measure_mesh
 from slideviz.streaming.resources import NEEDED

@@ -16,7 +16,7 @@ from slideviz.case.words import counted
 from slideviz.errors import Level, Message, messages_of
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
-from slideviz.session.motion_scale import moves_nothing
+from slideviz.session.reach import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
 from slideviz.solver.deform import free_memory

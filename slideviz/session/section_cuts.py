@@ -25,9 +25,8 @@ from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
 from slideviz.session.large import block_frame
 from slideviz.session.motions import machine_pair
-from slideviz.session.results import StepFrame
 from slideviz.session.saving import bound_sections
-from slideviz.session.state import Session
+from slideviz.session.state import Session, StepFrame
 from slideviz.streaming.source import CellBlock, FileSource, cut_cells
 from slideviz.system.threads import Tick, in_parts
 from slideviz.system.weak_cache import WeakCache

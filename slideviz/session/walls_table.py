@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from slideviz.case.model import Case
-from slideviz.session.results import StepFrame
-from slideviz.session.state import Session
+from slideviz.session.state import Session, StepFrame
 
 COLUMNS = ("Boundary", "First height", "Growth", "Equal", "Angle")
 """Titles of the columns in the window; each number is the worst of its boundary."""

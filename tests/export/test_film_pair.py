@@ -13,7 +13,7 @@ from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import panes
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
-from slideviz.scene.color_legend import STRIP
+from slideviz.scene.stage import STRIP
 from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame, round_up
 from slideviz.solver.deform import deform

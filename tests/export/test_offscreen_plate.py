@@ -8,8 +8,9 @@ from slideviz.color_scheme import DARK, LIGHT
 from slideviz.export.offscreen_renderer import OffscreenRenderer, PictureOptions
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
-from slideviz.scene.color_legend import OPACITY, STRIP
+from slideviz.scene.legend import OPACITY
 from slideviz.scene.scene import Scene
+from slideviz.scene.stage import STRIP
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame

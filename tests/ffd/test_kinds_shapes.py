@@ -15,7 +15,7 @@ from slideviz.design.sweeps.results import sources_of
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
-from slideviz.session.motion_scale import moves_nothing
+from slideviz.session.reach import moves_nothing
 from tests.ffd.ffd_samples import square
 from tests.oracles.freeform import blended, rotated
 

@@ -5,8 +5,7 @@ import re
 import pytest
 from qtpy.QtGui import QKeySequence
 
-from slideviz.gui.commands import COMMANDS, MENUS
-from slideviz.gui.widgets.command import CommandState
+from slideviz.gui.commands import COMMANDS, MENUS, CommandState
 from slideviz.gui.widgets.icons import NAMES
 from slideviz.session import changes
 from slideviz.session.state import Session

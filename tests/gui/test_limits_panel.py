@@ -9,7 +9,7 @@ from qtpy.QtTest import QTest
 from slideviz.case.limits import read_limits
 from slideviz.gui.panels.limits import LimitsPanel
 from slideviz.session import changes
-from slideviz.session.limits import check_frame
+from slideviz.session.jobs import check_frame
 from slideviz.session.store import Store
 from tests.session.test_walls_table import sheared_session
 

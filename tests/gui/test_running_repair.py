@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.gui.commands import COMMANDS
+from slideviz.gui.commands import COMMANDS, CommandState
 from slideviz.gui.panels.curves import CurvesPanel
-from slideviz.gui.widgets.command import CommandState
 from slideviz.session import changes
 from tests import builders
 from tests.solver.test_repair_stage import folded, last, scrambled

@@ -5,7 +5,7 @@ import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 
-from slideviz.gui.viewport import view_mouse
+from slideviz.gui.viewport import viewing as view_mouse
 from slideviz.mesh import surfaces
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES

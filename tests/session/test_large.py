@@ -11,7 +11,7 @@ from slideviz.mesh.quality import FINE, INVERTED, lowest, pairwise_sum, quality,
 from slideviz.samples.table import sample
 from slideviz.session.inspect import WORST, cell_info, worst_cells
 from slideviz.session.large import first_frame, frame_of
-from slideviz.session.results import StepFrame
+from slideviz.session.state import StepFrame
 from slideviz.streaming.skin import read_skin
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from slideviz.case.limits import read_limits
 from slideviz.case.model import Case
 from slideviz.mesh.quality import quality, quality_totals
-from slideviz.session.limits import check_frame
+from slideviz.session.jobs import check_frame
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame, result_settings
 from tests.builders import grid

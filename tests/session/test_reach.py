@@ -8,9 +8,8 @@ import slideviz as sv
 from slideviz.mesh.margin import reach_words
 from slideviz.samples.table import sample
 from slideviz.session import changes, jobs
-from slideviz.session.motion_scale import factor_of, scaled
 from slideviz.session.opening import open_mesh
-from slideviz.session.reach import reach_of, reach_run, typed_words
+from slideviz.session.reach import factor_of, reach_of, reach_run, scaled, typed_words
 from slideviz.session.run_messages import end_parts
 from slideviz.session.state import StepFrame
 

@@ -10,8 +10,8 @@ from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import section_cuts
-from slideviz.session.results import StepFrame
 from slideviz.session.section_cuts import Groups, keep_slab, read_slab, slab_of
+from slideviz.session.state import StepFrame
 from slideviz.streaming.skin import read_skin
 from tests.slow import one_of_each_fast
 

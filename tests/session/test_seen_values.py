@@ -5,7 +5,7 @@ import pytest
 
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
-from slideviz.session.results import StepFrame, cell_displacement
+from slideviz.session.state import StepFrame, cell_displacement
 
 
 @pytest.fixture(scope="module", params=["square", "hexahedron", "cylindrical"])

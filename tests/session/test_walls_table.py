@@ -12,8 +12,8 @@ from slideviz.plots.session_plots import distribution
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.results import StepFrame
 from slideviz.session.runs_words import COLUMNS
+from slideviz.session.state import StepFrame
 from slideviz.session.walls_table import table_rows, wall_rows
 from slideviz.system.csv_table import csv_text
 from tests.builders import grid

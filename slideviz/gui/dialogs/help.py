@@ -28,7 +28,7 @@ import slideviz
 from slideviz import __version__
 from slideviz.case.cfg import describe_keys
 from slideviz.case.words import counted
-from slideviz.gui.commands import MENUS
+from slideviz.gui.commands import MENUS, CommandState
 from slideviz.gui.widgets.build import (
     dialog_buttons,
     fixed_font,
@@ -37,7 +37,6 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
 )
-from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.error_reporter import versions
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.services import Services

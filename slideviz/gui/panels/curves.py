@@ -26,8 +26,7 @@ from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
-from slideviz.session.motion_scale import can_scale, factor_of
-from slideviz.session.reach import reach_of, reach_run
+from slideviz.session.reach import can_scale, factor_of, reach_of, reach_run
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store

@@ -12,7 +12,7 @@ from qtpy.QtCore import QSignalBlocker, QSize
 from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushButton, QWidget
 
-from slideviz.gui.commands import COMMANDS
+from slideviz.gui.commands import COMMANDS, CommandState
 from slideviz.gui.widgets.build import (
     Choice,
     PanelScroll,
@@ -23,7 +23,6 @@ from slideviz.gui.widgets.build import (
     push_button,
     wrapped,
 )
-from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.fields import NumberBox, number_text
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window

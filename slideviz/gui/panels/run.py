@@ -9,7 +9,7 @@ from qtpy.QtWidgets import QPushButton, QSizePolicy
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import Message
-from slideviz.gui.commands import COMMANDS
+from slideviz.gui.commands import COMMANDS, Command
 from slideviz.gui.widgets.build import (
     LinkLabel,
     QuietBar,
@@ -19,7 +19,6 @@ from slideviz.gui.widgets.build import (
     set_style,
     wrapped,
 )
-from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window

@@ -1,4 +1,4 @@
-"""The runs panel: settings and quality of each run."""
+"""The runs panel: settings and quality of each run, in a list with two lines for each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.commands import COMPARE
+from slideviz.gui.commands import COMPARE, Command, fill_compare
 from slideviz.gui.widgets.build import (
     ModelIndex,
     WrappingRow,
@@ -33,7 +33,6 @@ from slideviz.gui.widgets.build import (
     tool_button,
     wrapped,
 )
-from slideviz.gui.widgets.command import Command, fill_compare
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write

@@ -1,4 +1,4 @@
-"""The panel of the worst cells of the shown step; a click flies to a cell and marks it."""
+"""The panel of the worst cells of the shown step: a table; a click flies to a cell and marks it."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.view_mouse import CellMouse
-from slideviz.gui.viewport.viewing import TitleBar, Viewing
+from slideviz.gui.viewport.viewing import CellMouse, TitleBar, Viewing
 from slideviz.gui.widgets.build import ElidedLabel, in_column
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, ask_and_write_plot
 from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of

@@ -1,4 +1,4 @@
-"""Layouts, buttons and labels in a line each, for panels and dialogs."""
+"""The small parts of panels and dialogs: layouts, buttons, labels, tooltips, drop-down lists."""
 
 from __future__ import annotations
 
