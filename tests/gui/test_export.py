@@ -23,12 +23,19 @@ from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.dialogs import exports as export
+from slideviz.gui.dialogs import pictures
 from slideviz.gui.dialogs import help as manual
-from slideviz.gui.dialogs.exports import PictureDialog
-from slideviz.gui.dialogs.film import FilmDialog, FilmForm, length_words
+from slideviz.gui.dialogs.pictures import (
+    FilmDialog,
+    FilmForm,
+    PictureDialog,
+    fitted,
+    framed,
+    length_words,
+    to_image,
+)
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
 from slideviz.plots.session_plots import draw_meridional_view, gaps_of
 from slideviz.plots.style import PRINT
@@ -107,12 +114,12 @@ def test_the_preview_follows_the_options(renderer, qtbot):
     dialog = PictureDialog(None, renderer)
     qtbot.addWidget(dialog)
     dialog.show()
-    qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
-    white = dialog.preview.pixmap().toImage()
-    assert white.width() <= dialog.preview.width()
+    qtbot.waitUntil(lambda: not dialog.picture.pixmap().isNull())
+    white = dialog.picture.pixmap().toImage()
+    assert white.width() <= dialog.picture.width()
     dialog.background.show_value("transparent")
     dialog.background.chosen.emit("transparent")
-    qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != white)
+    qtbot.waitUntil(lambda: dialog.picture.pixmap().toImage() != white)
     assert dialog.picture_options.background == "transparent"
     dialog.reject()
 
@@ -208,7 +215,7 @@ def test_drawings_of_2d_meshes(ran, answers, tmp_path):
 
 def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    assert export.picture_filters(driver.session)[0] == questions.PICTURE_FILTERS
+    assert pictures.picture_filters(driver.session)[0] == questions.PICTURE_FILTERS
     viewing = driver.window.viewing
     with OffscreenRenderer(driver.session, viewing.surfaces, viewing.scene) as renderer:
         dialog = PictureDialog(None, renderer)
@@ -416,12 +423,12 @@ def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
 
     def look(dialog):
         timer.start(0)
-        qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
+        qtbot.waitUntil(lambda: not dialog.picture.pixmap().isNull())
         timer.stop()
         assert len(ticks) > 15, "the event loop went on"
-        before = dialog.preview.pixmap().toImage()
+        before = dialog.picture.pixmap().toImage()
         dialog.options["title"].toggle()
-        qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != before)
+        qtbot.waitUntil(lambda: dialog.picture.pixmap().toImage() != before)
         return False
 
     in_dialog(look)
@@ -433,11 +440,11 @@ def test_a_copy_while_the_preview_is_drawn_is_whole_and_so_is_the_preview(opened
     pictures = []
 
     def look(dialog):
-        qtbot.waitUntil(lambda: dialog._runner.busy)
+        qtbot.waitUntil(lambda: dialog.drawer.busy)
         dialog._copy()
         pictures.append(QApplication.clipboard().image().size())
-        assert dialog.preview.pixmap().isNull()
-        qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
+        assert dialog.picture.pixmap().isNull()
+        qtbot.waitUntil(lambda: not dialog.picture.pixmap().isNull())
         pictures.append(dialog.picture_options.size)
         return False
 
@@ -500,8 +507,8 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
         shown.append(dialog.passages.itemText(dialog.passages.count() - 1))
         dialog.numbered.setChecked(len(shown) > 1)
         dialog.passages.setCurrentIndex(dialog.passages.count() - 1)
-        driver.qtbot.waitUntil(lambda: not dialog._runner.busy)
-        assert not dialog.preview.pixmap().isNull()
+        driver.qtbot.waitUntil(lambda: not dialog.drawer.busy)
+        assert not dialog.picture.pixmap().isNull()
         return True
 
     for passages, name in ((0, "wheel.su2"), (1, "part.su2b")):
@@ -533,8 +540,8 @@ def test_a_stage_has_wheels_gaps_and_spans_of_its_zones(driver, answers, tmp_pat
 
     def look(dialog):
         words.extend((dialog.passages.currentText(), dialog.words.text()))
-        driver.qtbot.waitUntil(lambda: not dialog._runner.busy)
-        dialog.preview.pixmap().save(str(tmp_path / "preview.png"))
+        driver.qtbot.waitUntil(lambda: not dialog.drawer.busy)
+        dialog.picture.pixmap().save(str(tmp_path / "preview.png"))
         return True
 
     answers("ask_save", tmp_path / "wheel.su2")

@@ -1025,7 +1025,7 @@ def test_nothing_is_asked_when_nothing_changed_or_a_case_cannot_be_written(
 def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
     from PIL import Image
 
-    from slideviz.gui.dialogs.exports import PictureDialog
+    from slideviz.gui.dialogs.pictures import PictureDialog
 
     def accept(dialog):
         dialog.width_px.setValue(1280)

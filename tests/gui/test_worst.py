@@ -529,7 +529,7 @@ def test_lengths_have_the_same_number_of_decimals():
 def test_columns_grow_with_the_numbers_of_another_mesh(full):
     table = full.table
     room = table.columnWidth(CELL)
-    dim = full.model.places.shape[1]
+    dim = full.model.worst.positions.shape[1]
     full.model.show(worst_at(np.zeros((1, dim)), [123_456_789]))
     wide = table.fontMetrics().horizontalAdvance("123456789")
     assert room < wide < table.columnWidth(CELL)

@@ -1,4 +1,4 @@
-"""The middle of the window: the view of the mesh, a linked second one to compare runs, and the mouse there."""
+"""The middle of the window: the view of the mesh, a second one to compare runs, and the mouse."""
 
 from __future__ import annotations
 
