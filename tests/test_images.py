@@ -22,7 +22,7 @@ from slideviz.rbf.images import misfits
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
-from slideviz.session.node_types import NodeTypes
+from slideviz.session.node_types import typed_nodes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.solver import stepping
@@ -393,8 +393,7 @@ def test_the_view_has_the_same_types_as_a_run():
     )
     plain = replace(mesh, name="m")
     session = open_mesh(StepFrame(plain, sv.quality(plain)), None, (), case)
-    types = NodeTypes()
-    found = types.of(changes.set_view(session, points="types"))
+    found = typed_nodes(changes.set_view(session, points="types"))
     fixed = found.nodes[found.kinds == list(NODE_TYPES).index("fixed")]
     np.testing.assert_array_equal(fixed, make_setup(prepare(case, mesh)).classes.fixed)
     # Markers that do not match are told beside the Run button; the types are there all the same.
@@ -402,7 +401,7 @@ def test_the_view_has_the_same_types_as_a_run():
     points[mesh.marker("y_p").nodes[2], 0] += 0.03
     wrong = plain.with_points(points)
     session = open_mesh(StepFrame(wrong, sv.quality(wrong)), None, (), case)
-    found = types.of(changes.set_view(session, points="types"))
+    found = typed_nodes(changes.set_view(session, points="types"))
     assert np.sum(found.kinds == list(NODE_TYPES).index("fixed")) == len(fixed) - 1
 
 

@@ -28,7 +28,7 @@ from slideviz.sections.polygons import CellsInRange
 from slideviz.sections.span import find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.passages import Period, find_periods, matrices, show_passages
+from slideviz.session.passages import find_periods, matrices, period_of, show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity
@@ -93,7 +93,7 @@ def save_section(
 def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     frame = session.frame
     assert frame is not None
-    around = matrices(session, Period().of(session) if session.view.passages else None)
+    around = matrices(session, period_of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
     cutter = Cutter.of(frame.mesh)
     points = frame.mesh.points

@@ -21,7 +21,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import Label
 from slideviz.session.colors import with_drawable_colors
-from slideviz.session.passages import Period, keeps, matrices
+from slideviz.session.passages import keeps, matrices, period_of
 from slideviz.session.section_cuts import NO_POLYGONS, Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 
@@ -53,7 +53,6 @@ class FlatScene:
         self._outlines = Instances(self.stage, self._undeformed)
         self._undeformed_of: tuple[object, ...] = ()
         self._style_lines()
-        self._period = Period()
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
         self.session = Session()  # the state that is shown
@@ -135,7 +134,7 @@ class FlatScene:
     def _draw_neighbours(self, section: Section) -> None:
         by_passage: dict[int, FloatArray] = {}
         if self.session.view.passages:
-            pair = self._period.of(self.session)
+            pair = period_of(self.session)
             for number, matrix in matrices(self.session, pair).items():
                 if pair is not None and keeps(section, matrix):
                     by_passage[number] = flat_matrix(section, pair, number, matrix)

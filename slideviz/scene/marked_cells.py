@@ -22,7 +22,7 @@ from slideviz.scene.actors import VALUES, draw_in_front, part_shape
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import KeyedLayer, Layer, Stage
 from slideviz.session.inspect import cell_centers, nodes_of
-from slideviz.session.node_types import NOTHING, NodeTypes, TypedNodes
+from slideviz.session.node_types import NOTHING, TypedNodes, typed_nodes
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import NODE_TYPES
 
@@ -38,7 +38,6 @@ class PointLayer(Layer):
     """The nodes that the view asks for, drawn as small balls."""
 
     def clear(self) -> None:
-        self._types = NodeTypes()
         self._surfaces: tuple[Surface, ...] = ()
         self._drawn: TypedNodes = NOTHING
         self._key: tuple[object, ...] = ()
@@ -52,7 +51,7 @@ class PointLayer(Layer):
     def update(self, old: Session | None, new: Session) -> None:
         if new.mesh is None or new.frame is None:
             return
-        typed = self._types.of(new)
+        typed = typed_nodes(new)
         key = (typed, new.view.hidden)
         if key != self._key and not (typed is NOTHING and self._actor is None):
             self._key = key

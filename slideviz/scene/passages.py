@@ -14,7 +14,7 @@ from slideviz.mesh.zones import marker_zones
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.session.passages import Period, matrices
+from slideviz.session.passages import matrices, period_of, periods_of
 from slideviz.session.state import Session
 
 PALER = 0.45
@@ -62,7 +62,6 @@ class PassageLayer(KeyedLayer):
         super().__init__(stage)
 
     def clear(self) -> None:
-        self._period = Period()
         self._key = ()
         self._matrices: list[FloatArray] = []
         for copy in chain.from_iterable(self._actors.values()):
@@ -88,14 +87,14 @@ class PassageLayer(KeyedLayer):
     def _repeats(self, session: Session, pair: Pair, name: str) -> bool:
         """Return whether a pair repeats a boundary, or what is shown of the cells of all zones."""
         mesh = session.mesh
-        if mesh is None or self._period.of(session) is not None:
+        if mesh is None or period_of(session) is not None:
             return True
         zones = dict(zip(mesh.marker_names, marker_zones(mesh), strict=True))
         return zones[pair.first] == zones.get(name)
 
     def key(self, session: Session) -> tuple[object, ...]:
         # The threshold's actor is made when it first has cells.
-        pairs = self._period.of_zones(session) if session.view.passages else ()
+        pairs = periods_of(session) if session.view.passages else ()
         return pairs, session.view.passages, self._threshold.actor
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
@@ -108,7 +107,7 @@ class PassageLayer(KeyedLayer):
         return sources
 
     def draw(self, session: Session) -> None:
-        wanted = [(pair, matrices(session, pair)) for pair in self._period.of_zones(session)]
+        wanted = [(pair, matrices(session, pair)) for pair in periods_of(session)]
         # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer
         for copy in chain.from_iterable(self._actors.values()):

@@ -19,7 +19,7 @@ from slideviz.sections.cut import transformed
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.session.passages import Period, keeps, matrices
+from slideviz.session.passages import keeps, matrices, period_of
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 
@@ -69,7 +69,6 @@ class SectionLayer(Layer):
         self.drawn: dict[str, SectionDrawn] = {}
         """The sections by name of their actor: ``section:0`` is the first section through the mesh
         itself, ``section:0:1`` that through its next passage."""
-        self._period = Period()
         self._instances: dict[str, Instances] = {}
         self._lines.clear()
         self._lines_of: tuple[object, ...] = ()
@@ -141,7 +140,7 @@ class SectionLayer(Layer):
         return low, np.max([box[1] for box in boxes], axis=0)
 
     def _neighbours(self, session: Session) -> dict[int, FloatArray]:
-        return matrices(session, self._period.of(session) if session.view.passages else None)
+        return matrices(session, period_of(session) if session.view.passages else None)
 
     def _wanted(self, session: Session) -> dict[str, tuple[Section, int, FloatArray | None]]:
         """Return section, number of the passage and its matrix for each cut, by actor name.

@@ -15,7 +15,7 @@ from slideviz.mesh.model import IntArray, Mesh
 from slideviz.session.motions import shown_case
 from slideviz.session.state import Session
 from slideviz.solver.domain import find_classes, find_period, roles_of_copies
-from slideviz.system.weak_cache import weak_cache
+from slideviz.system.weak_cache import WeakCache, weak_cache
 from slideviz.terms import NODE_TYPES, NodeType
 
 
@@ -41,44 +41,35 @@ class TypedNodes:
 NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))  # no nodes
 
 
-class NodeTypes:
-    """Finds the types of the boundary nodes of a mesh; those of the last case are cached."""
+def typed_nodes(session: Session) -> TypedNodes:
+    """Return the nodes that a session's view shows as points; hidden boundaries count, too."""
+    mesh = session.mesh
+    if mesh is None or session.view.points == "none":
+        return NOTHING
+    if session.view.points == "control":
+        return control_nodes(session)
+    # A step has the types of its run's case, which the session's may have left since.
+    case = shown_case(session)
+    roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)
+    period = case.periodic, case.periodic_type, case.axis, case.origin
+    key = roles, case.sliding, period, case.feature_angle_deg
+    return _TYPES.of(mesh, key, lambda: _classified(mesh, case))
 
-    def __init__(self) -> None:
-        self._types: tuple[object, TypedNodes] | None = None
 
-    def clear(self) -> None:
-        """Forget mesh and cached types."""
-        self.__init__()  # type: ignore[misc]
+_TYPES = WeakCache()
 
-    def of(self, session: Session) -> TypedNodes:
-        """Return the nodes that a session's view shows as points; hidden boundaries count, too."""
-        if session.mesh is None or session.view.points == "none":
-            return NOTHING
-        if session.view.points == "control":
-            return control_nodes(session)
-        # A step has the types of its run's case, which the session's may have left since.
-        return self._typed(session.mesh, shown_case(session))
 
-    def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
-        roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)
-        period = case.periodic, case.periodic_type, case.axis, case.origin
-        key = (mesh, roles, case.sliding, period, case.feature_angle_deg)
-        if self._types is None or self._types[0] != key:
-            self._types = key, self._classified(mesh, case)
-        return self._types[1]
-
-    def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
-        try:
-            zones = list(each_zone(case, mesh))
-        except SlidevizError:
-            return NOTHING
-        each = [_types_of_zone(one, zone) for one, zone in zones]
-        first = [part.points.start for part in mesh.parts]
-        return TypedNodes(
-            np.concatenate([t.nodes + start for t, start in zip(each, first, strict=True)]),
-            np.concatenate([typed.kinds for typed in each]),
-        )
+def _classified(mesh: Mesh, case: Case) -> TypedNodes:
+    try:
+        zones = list(each_zone(case, mesh))
+    except SlidevizError:
+        return NOTHING
+    each = [_types_of_zone(one, zone) for one, zone in zones]
+    first = [part.points.start for part in mesh.parts]
+    return TypedNodes(
+        np.concatenate([t.nodes + start for t, start in zip(each, first, strict=True)]),
+        np.concatenate([typed.kinds for typed in each]),
+    )
 
 
 @weak_cache

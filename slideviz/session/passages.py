@@ -17,6 +17,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.opening import guess_by_name
 from slideviz.session.state import Session
+from slideviz.system.weak_cache import WeakCache
 
 _SAME = 1e-9
 """A section is taken onto itself where it moves by less than this, over its size or distance."""
@@ -119,37 +120,38 @@ def show_passages(
     return cuts
 
 
-class Period:
-    """Finds the periods of a session's mesh, and caches them for the last periodic boundaries."""
+_PERIODS = WeakCache()
 
-    def __init__(self) -> None:
-        self._last: tuple[object, Pair | None, tuple[Pair, ...]] = (), None, ()
 
-    def of(self, session: Session) -> Pair | None:
-        """Return the pair of boundaries whose period repeats the mesh; None without a match.
+def period_of(session: Session) -> Pair | None:
+    """Return the pair of boundaries whose period repeats a session's mesh; None without a match.
 
-        None also where zones have different periods.
-        """
-        return self._find(session)[0]
+    None also where zones have different periods.
+    """
+    return _periods(session)[0]
 
-    def of_zones(self, session: Session) -> tuple[Pair, ...]:
-        """Return the pair whose period repeats the mesh; those of zones where they differ."""
-        return self._find(session)[1]
 
-    def _find(self, session: Session) -> tuple[Pair | None, tuple[Pair, ...]]:
-        case = session.case
-        mesh = session.mesh
-        if mesh is None:
-            return None, ()
-        names = case.markers_with("periodic")
-        key = (mesh, session.pairs, names, case.periodic_type, case.axis, case.origin)
-        if self._last[0] != key:
-            self._last = key, None, ()
-            with suppress(SlidevizError):  # do not match: said beside the Run button
-                pair = find_period(mesh, case, session.pairs)
-                every = find_periods(mesh, case, session.pairs) if pair is None else (pair,)
-                self._last = key, pair, every
-        return self._last[1:]
+def periods_of(session: Session) -> tuple[Pair, ...]:
+    """Return the pair whose period repeats a session's mesh; those of zones where they differ."""
+    return _periods(session)[1]
+
+
+def _periods(session: Session) -> tuple[Pair | None, tuple[Pair, ...]]:
+    case = session.case
+    mesh = session.mesh
+    pairs = session.pairs
+    if mesh is None:
+        return None, ()
+
+    def find() -> tuple[Pair | None, tuple[Pair, ...]]:
+        with suppress(SlidevizError):  # do not match: said beside the Run button
+            pair = find_period(mesh, case, pairs)
+            return pair, find_periods(mesh, case, pairs) if pair is None else (pair,)
+        return None, ()
+
+    names = case.markers_with("periodic")
+    key = pairs, names, case.periodic_type, case.axis, case.origin
+    return _PERIODS.of(mesh, key, find)
 
 
 def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:

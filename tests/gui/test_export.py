@@ -22,9 +22,8 @@ from slideviz.export import film as film_module
 from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.gui.dialogs import exports as export
-from slideviz.gui.dialogs import pictures
 from slideviz.gui.dialogs import help as manual
+from slideviz.gui.dialogs import pictures
 from slideviz.gui.dialogs.pictures import (
     FilmDialog,
     FilmForm,

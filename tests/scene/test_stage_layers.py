@@ -21,7 +21,7 @@ from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.inspect import cell_centers
 from slideviz.session.opening import open_mesh
-from slideviz.session.passages import Period, matrices
+from slideviz.session.passages import matrices, period_of
 from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
 from tests.builders import far_field
@@ -130,7 +130,7 @@ def test_the_legend_names_the_points(scene, row):
 
 
 def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
-    pitch = Period().of(open_mesh(StepFrame(row.mesh, quality(row.mesh)), None)).vector
+    pitch = period_of(open_mesh(StepFrame(row.mesh, quality(row.mesh)), None)).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     session = opened(scene, row, passages=1, edges=False, triad=False)
@@ -160,7 +160,7 @@ def test_neighbours_of_a_stator_are_turned(scene, stator):
         angle = np.arctan2(actor.user_matrix[1, 0], actor.user_matrix[0, 0])
         assert abs(abs(angle) - 2 * np.pi / 41) < 1e-6
     # The second periodic side of one is the first of the next.
-    period = Period().of(session)
+    period = period_of(session)
     first = stator.mesh.points[stator.mesh.marker(period.first).nodes]
     second = stator.mesh.points[stator.mesh.marker(period.second).nodes]
     moved = first @ matrices(session, period)[1][:3, :3].T
@@ -185,7 +185,7 @@ def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
 
 def test_neighbours_follow_the_step_and_the_colors(scene, row):
     session = opened(scene, row, passages=1, edges=False, triad=False)
-    pitch = Period().of(session).vector
+    pitch = period_of(session).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     before = near(scene, at + pitch, 1).mean(axis=0)
@@ -205,7 +205,7 @@ def test_neighbours_show_the_chosen_cells_only(scene, row):
     session = opened(scene, row, passages=1, edges=False, triad=False, color_by="skew")
     half = float(np.median(session.frame.values("skew")))
     at = cell_centers(row.mesh, np.arange(len(row.mesh.cells)))
-    shifted = at + Period().of(session).vector
+    shifted = at + period_of(session).vector
 
     def yellow(points):
         """Tell where a picture shows the color of a value: yellow to green."""
@@ -243,18 +243,17 @@ def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
 
 
 def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
-    period = Period()
     lonely = changes.set_view(session, passages=2)
-    assert period.of(lonely) is None
+    assert period_of(lonely) is None
     scene.open(lonely, find_surfaces(lonely.mesh))
     assert not [name for name in scene.plotter.actors if name.startswith("copy:")]
 
 
 def test_periodic_boundaries_that_do_not_match_have_no_neighbours(row):
     session = open_mesh(StepFrame(row.mesh, quality(row.mesh)), None, (), row.case)
-    assert Period().of(session) is not None
+    assert period_of(session) is not None
     wrong = changes.set_role(session, ("INFLOW", "BLADE"), "periodic")
-    assert Period().of(wrong) is None
+    assert period_of(wrong) is None
 
 
 # Axes -------------------------------------------------------------------------------------

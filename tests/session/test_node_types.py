@@ -11,7 +11,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.session import changes
-from slideviz.session.node_types import NOTHING, NodeTypes
+from slideviz.session.node_types import NOTHING, typed_nodes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.solver.deform import deform
@@ -36,7 +36,7 @@ def stator():
 
 def test_nodes_of_a_solid_mesh_have_the_types_that_the_method_gives_them(stator):
     session = session_of(stator, points="types")
-    found = named(NodeTypes().of(session))
+    found = named(typed_nodes(session))
     case = stator.case.change(motions=(Translate("BLADE", (1e-4, 0.0, 0.0)),))
     step = next(deform(case, stator.mesh))
     for kind in ("moving", "fixed", "sliding_edge", "sliding_surface"):
@@ -52,19 +52,19 @@ def test_nodes_of_a_solid_mesh_have_the_types_that_the_method_gives_them(stator)
 
 
 def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
-    types, session = NodeTypes(), session_of(passage, points="types")
+    session = session_of(passage, points="types")
     walls = [name for name in passage.mesh.marker_names if session.role(name) == "sliding"]
-    before = named(types.of(session))
+    before = named(typed_nodes(session))
     assert before["sliding_edge"]
     fixed = changes.set_role(session, walls, "fixed")
-    assert len(named(types.of(fixed))["sliding_edge"]) < len(before["sliding_edge"])
+    assert len(named(typed_nodes(fixed))["sliding_edge"]) < len(before["sliding_edge"])
     step = next(deform(session.case, passage.mesh))
     ran = changes.add_frames(
         changes.start_run(session), [StepFrame(step.mesh, quality(step.mesh), step)]
     )
     changed = changes.set_role(ran, walls, "fixed")
-    assert named(types.of(changed)) == before
-    assert named(types.of(changes.show_frame(changed, 0))) == named(types.of(fixed))
+    assert named(typed_nodes(changed)) == before
+    assert named(typed_nodes(changes.show_frame(changed, 0))) == named(typed_nodes(fixed))
 
 
 def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
@@ -77,26 +77,27 @@ def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
         return real(*values)
 
     monkeypatch.setattr(module, "find_classes", counted)
-    types, session = NodeTypes(), session_of(passage, points="types")
-    first = types.of(session)
-    assert types.of(changes.set_view(session, edges=False)) is first
-    assert types.of(changes.set_case(session, steps=7)) is first
+    fresh = replace(passage, mesh=replace(passage.mesh, name="fresh"))
+    session = session_of(fresh, points="types")
+    first = typed_nodes(session)
+    assert typed_nodes(changes.set_view(session, edges=False)) is first
+    assert typed_nodes(changes.set_case(session, steps=7)) is first
     assert len(asked) == 1
-    types.of(changes.set_case(session, sliding="none", periodic="none"))
+    typed_nodes(changes.set_case(session, sliding="none", periodic="none"))
     assert len(asked) == 2
 
 
 def test_control_nodes_are_those_that_the_step_interpolated_with(passage):
     case = passage.case.change(reduction=Reduction(tolerance=1e-2), steps=2)
     session = changes.start_run(session_of(passage, points="control"))
-    assert NodeTypes().of(session) is NOTHING
+    assert typed_nodes(session) is NOTHING
     steps = list(deform(case, passage.mesh))
     session = changes.add_frames(
         session, [StepFrame(step.mesh, quality(step.mesh), step) for step in steps]
     )
     boundary = np.unique(np.concatenate([marker.nodes for marker in passage.mesh.markers]))
     for index, step in enumerate(steps, start=1):
-        found = named(NodeTypes().of(changes.show_frame(session, index)))["control"]
+        found = named(typed_nodes(changes.show_frame(session, index)))["control"]
         assert found == set(step.control.tolist())
         assert len(found) == step.control_nodes < len(boundary)
         assert found <= set(boundary.tolist())
@@ -109,8 +110,8 @@ def test_control_nodes_are_those_that_the_step_interpolated_with(passage):
 def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passage):
     session = session_of(passage, points="types")
     bare = replace(session, mesh=replace(passage.mesh, markers=()))
-    assert not len(NodeTypes().of(bare).nodes)
-    assert NodeTypes().of(changes.set_view(session, points="none")) is NOTHING
+    assert not len(typed_nodes(bare).nodes)
+    assert typed_nodes(changes.set_view(session, points="none")) is NOTHING
 
 
 def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
@@ -122,7 +123,7 @@ def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
     monkeypatch.setattr(topology, "_find_owners", counted)
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), passage.case)
     find_surfaces(mesh)
-    NodeTypes().of(changes.set_view(session, points="types"))
+    typed_nodes(changes.set_view(session, points="types"))
     for _ in range(2):
         next(deform(passage.case, mesh))
     assert found == [mesh]

@@ -30,7 +30,7 @@ from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
-from slideviz.session.passages import Period
+from slideviz.session.passages import periods_of
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import (
@@ -128,7 +128,6 @@ class DisplayPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._period = Period()
         content = QWidget()
         in_column(PanelScroll(content), on=self)
         self.form = QFormLayout(content)
@@ -224,7 +223,7 @@ class DisplayPanel(Panel):
         self.threshold.setEnabled(view.threshold is not None)
         self.threshold.show_value(view.threshold or _worse_half(session))
         self.points.show_value(view.points)
-        self._sync_passages(session, self._period.of_zones(session))
+        self._sync_passages(session, periods_of(session))
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
             able = COMMANDS[name].enabled(CommandState(session))

@@ -48,7 +48,7 @@ from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.sections.model import Section, Triple
 from slideviz.session import changes, section_cuts
-from slideviz.session.passages import Period
+from slideviz.session.passages import period_of
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import can_cut, first_section
@@ -295,7 +295,6 @@ class SectionsPanel(Panel):
         super().__init__(services.store)
         self.setObjectName("sections")
         self.services = services
-        self._period = Period()
         self._size = 8.5, 12.0  # cm
         self._make_list()
         self._make_tools()
@@ -433,8 +432,7 @@ class SectionsPanel(Panel):
     def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.session
         assert session.mesh is not None
-        pair = self._period.of(session)
-        section = first_section(kind, session, pair)
+        section = first_section(kind, session, period_of(session))
         self.change(changes.add_section, section)
         try:
             with_walls(section, session.mesh, session.case, session.pairs)
