@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
@@ -69,6 +70,7 @@ def _fill(
 
 
 Keys = str | QKeySequence.StandardKey
+WAIT = "Wait for the running job, or cancel it."
 
 
 def always(_: Any) -> bool:
@@ -98,6 +100,8 @@ class Command:
     tip_now: Callable[[CommandState], str] | None = None
     """Returns a tooltip to be shown instead of ``tip``, or an empty text; for a disabled command,
     why it is disabled."""
+    why_not: str = ""
+    """Why it is disabled, in a sentence; for its tooltip."""
     button_tip: str = ""
     button_key: str = ""
     """`button_tip`, `button_key`: tooltip and shortcut of its button in a panel."""
@@ -137,8 +141,12 @@ class Command:
         act.setEnabled(able)
         if self.checked is not None:
             act.setChecked(self.checked(now))
-        if self.tip_now is not None:
-            tip = self.tip_now(now) or self.tip
+        if self.tip_now or self.why_not:
+            tip = self.tip_now(now) if self.tip_now else ""
+            if not able and self.why_not:
+                reason = WAIT if has_mesh(now) and now.busy else self.why_not
+                tip = now.session.lacks_cells or reason
+            tip = tip or self.tip
             self._explain(act, self.tip if able else tip, tip)
 
 
@@ -249,26 +257,15 @@ def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], 
     return lambda now: able(now) and not now.session.lacks_cells
 
 
-def why_not(able: Callable[[CommandState], bool], why: str) -> Callable[[CommandState], str]:
-    """Return a ``tip_now``: it returns why a command is disabled, empty if ``able`` holds.
-
-    The reason is ``why``, unless the mesh stays in its file or a job runs.
-    """
-    wait = "Wait for the running job, or cancel it."
-
-    def words(now: CommandState) -> str:
-        if able(now):
-            return ""
-        reason = wait if has_mesh(now) and now.busy else why
-        return now.session.lacks_cells or reason
-
-    return words
-
-
 KEY = QKeySequence.StandardKey
 
 
 # What they do ------------------------------------------------------------------------------
+def call(method: str, *values: Any, **named: Any) -> Callable[[Any], object]:
+    """Return what calls a method of the window, or of a part of it such as ``store.undo``."""
+    return lambda window: attrgetter(method)(window)(*values, **named)
+
+
 def _undo_or_redo(window: MainWindow, step: Callable[[], bool], words: str, done: str) -> None:
     """Call ``step`` (undo or redo), and show in the status bar which change that was."""
     if step():
@@ -319,50 +316,50 @@ def _fill_panels(window: MainWindow, menu: QMenu) -> None:
 _NO_STEPS = "There are no steps yet: run the case first."
 _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes.", (
     Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
-            lambda window: window.exports.picture(), ("Ctrl+P",), "picture", has_mesh),
+            call("exports.picture"), ("Ctrl+P",), "picture", has_mesh),
     Command("copy_picture", "&Copy picture",
             "Copy a picture of the view, with a white background, to the clipboard.",
-            lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=has_mesh),
+            call("exports.copy_picture"), ("Ctrl+Shift+C",), enabled=has_mesh),
     Command("export_film", "&Film of the steps…", "Make a film of the steps.",
-            lambda window: window.exports.make_film(),
-            enabled=in_memory(has_steps), tip_now=why_not(in_memory(has_steps), _NO_STEPS)),
+            call("exports.make_film"),
+            enabled=in_memory(has_steps), why_not=_NO_STEPS),
     Command("export_quality", "&Quality as CSV…",
             "Save the quality of every cell of the step that is shown as a CSV table.",
-            lambda window: window.exports.quality(),
+            call("exports.quality"),
             enabled=in_memory(is_idle),
-            tip_now=why_not(in_memory(is_idle), "There is no mesh yet: open one first.")),
+            why_not="There is no mesh yet: open one first."),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
-            lambda window: window.exports.steps(),
+            call("exports.steps"),
             enabled=in_memory(has_steps_and_is_idle),
-            tip_now=why_not(in_memory(has_steps_and_is_idle), _NO_STEPS)),
+            why_not=_NO_STEPS),
 ), tooltips=True)
 
 _FILE = Menu("file", "&File", entries=(
     Command("open", "&Open…", "Open a mesh, or a case with its mesh.",
-            lambda window: window.files.ask_and_open(), (KEY.Open,), "open"),
+            call("files.ask_and_open"), (KEY.Open,), "open"),
     Menu("open_recent", "Open &recent", "Open a recent file.", fill=_fill_recent),
     Menu("open_sample", "Open sa&mple", "Open a case that comes with the program.", (
         Command("sample_of_size", "Of another &size…", "Open a sample with fewer or more cells.",
-                lambda window: window.files.ask_and_open_sample()),
+                call("files.ask_and_open_sample")),
     ), fill=_fill_samples),
     None,
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
-            lambda window: window.files.save_mesh(), (KEY.Save,), "save", in_memory(is_idle),
-            tip_now=why_not(in_memory(is_idle), "There is no mesh yet: open one first.")),
+            call("files.save_mesh"), (KEY.Save,), "save", in_memory(is_idle),
+            why_not="There is no mesh yet: open one first."),
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
-            lambda window: window.exports.wheel(), enabled=in_memory(has_wheel),
-            tip_now=why_not(in_memory(has_wheel), "The mesh is not a passage of a wheel: two "
+            call("exports.wheel"), enabled=in_memory(has_wheel),
+            why_not="The mesh is not a passage of a wheel: two "
                             "boundaries of its only zone must be periodic, by a whole part of a "
-                            "turn.")),
+                            "turn."),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
-            lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", has_mesh),
+            call("files.save_case"), ("Ctrl+Shift+S",), "case", has_mesh),
     _EXPORT,
     None,
     Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",
-            lambda window: window.close(), (KEY.Quit,)),
+            call("close"), (KEY.Quit,)),
 ), tooltips=True)
 
 _EDIT = Menu("edit", "&Edit", entries=(
@@ -380,42 +377,42 @@ _EDIT = Menu("edit", "&Edit", entries=(
 
 _RUN = Menu("run", "&Run", entries=(
     Command("run", "&Run", "Deform the mesh with these settings.",
-            lambda window: window.start_run(), ("F5",), "run",
+            call("start_run"), ("F5",), "run",
             lambda now: now.ready and not now.busy,
             button_tip="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
     Command("cancel", "&Cancel", "Stop the running job; finished steps are kept.",
-            lambda window: window.running.cancel(), image="cancel", enabled=lambda now: now.busy,
+            call("running.cancel"), image="cancel", enabled=lambda now: now.busy,
             button_tip="Stop within a second (Esc); finished steps are kept.",
             button_key="Esc"),
     Command("repair", "Re&pair",
             "Mend the inverted and poor cells of the last step of the run that is shown, or of the "
             "mesh: by moving nodes near them, never nodes of moving and fixed boundaries.",
-            lambda window: window.running.repair(), ("F7",), enabled=needs_repair,
-            tip_now=why_not(needs_repair, "No cell needs repair: all are proved valid, and their "
-                            "quality is above the limit in the method panel.")),
+            call("running.repair"), ("F7",), enabled=needs_repair,
+            why_not="No cell needs repair: all are proved valid, and their "
+                            "quality is above the limit in the method panel."),
     None,
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "
             "or other settings, and their quality.",
-            lambda window: window.dock_manager.toggle("designs"), ("F6",), enabled=has_mesh,
-            tip_now=why_not(has_mesh, "There is no mesh yet: open one first.")),
+            call("dock_manager.toggle", "designs"), ("F6",), enabled=has_mesh,
+            why_not="There is no mesh yet: open one first."),
 ))
 
 _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.", (
     Command("fit_colors", "Fit to this step",
             "Let the colors range over the values of the step that is shown, and of the other step "
             "in a comparison.",
-            lambda window: window.store.change(fit_colors, every=False),
+            call("store.change", fit_colors, every=False),
             ("R",), enabled=colored_by_value,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
     Command("fit_all_colors", "Fit to all steps",
             "Let the colors range over the values of all steps, so that they mean the same in a "
             "whole film.",
-            lambda window: window.store.change(fit_colors, every=True),
+            call("store.change", fit_colors, every=True),
             ("Shift+R",), enabled=colored_by_value),
     Command("usual_colors", "Default range", "Use the default range of the colors.",
-            lambda window: window.store.change(changes.set_view, color_range=None),
+            call("store.change", changes.set_view, color_range=None),
             enabled=lambda now: colored_by_value(now) and now.session.view.color_range is not None,
             title_now=lambda now: usual_range(now.session)),
 ))
@@ -424,7 +421,7 @@ _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.",
 def _side_command(side: str, keys: str, short: str = "") -> Command:
     place = "a corner" if side == "iso" else side
     return Command(f"side{side}", "isometric" if side == "iso" else side,
-                   f"Look at the mesh from {place}.", lambda window: window.viewing.look_from(side),
+                   f"Look at the mesh from {place}.", call("viewing.look_from", side),
                    (keys,), enabled=is_3d, short=short)
 
 
@@ -438,26 +435,26 @@ _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
 # Without steps the commands are disabled, and Space presses the focused button.
 STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
-            lambda window: window.player.go(0), ("Home",), enabled=has_steps,
+            call("player.go", 0), ("Home",), enabled=has_steps,
             button_tip="Undeformed mesh (Home)"),
     Command("step_previous", "Step back", "Show the step before this one.",
-            lambda window: window.player.step(-1), ("Alt+Left",), enabled=has_steps,
+            call("player.step", -1), ("Alt+Left",), enabled=has_steps,
             button_tip="One step back (Alt+Left)"),
     Command("step_play", "Play or pause", "Play the steps one after the other, or pause.",
-            lambda window: window.player.toggle(), ("Space",), enabled=has_steps,
+            call("player.toggle"), ("Space",), enabled=has_steps,
             button_tip="Play the steps (Space)"),
     Command("step_next", "Step on", "Show the step after this one.",
-            lambda window: window.player.step(1), ("Alt+Right",), enabled=has_steps,
+            call("player.step", 1), ("Alt+Right",), enabled=has_steps,
             button_tip="One step on (Alt+Right)"),
     Command("step_last", "Last step", "Show the deformed mesh.",
-            lambda window: window.player.go(10**9), ("End",), enabled=has_steps,
+            call("player.go", 10**9), ("End",), enabled=has_steps,
             button_tip="Last step (End)"),
 ))
 
 
 def _theme_command(theme: str, tip: str) -> Command:
     return Command(f"theme_{theme}", f"&{theme.capitalize()}", tip,
-                   lambda window: window.set_theme(theme), checked=lambda now: now.theme == theme)
+                   call("set_theme", theme), checked=lambda now: now.theme == theme)
 
 
 _THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
@@ -494,12 +491,12 @@ _VIEW = Menu("view", "&View", entries=(
     None,
     _COLORS,
     Command("fit", "&Fit all", "Make the whole mesh fill the view.",
-            lambda window: window.viewing.fit(), ("F",), "fit", has_mesh),
+            call("viewing.fit"), ("F",), "fit", has_mesh),
     Command("fit_boundary", "Fit to &boundary",
             "Make the selected boundaries fill the view, or else those that move.",
             lambda w: w.viewing.fit(target_boundaries(w.store.session)),
             ("Shift+F",), enabled=has_boundary_target,
-            tip_now=why_not(has_boundary_target, "No boundary is selected, and none moves.")),
+            why_not="No boundary is selected, and none moves."),
     _SIDES,
     COMPARE,
     Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
@@ -511,34 +508,34 @@ _VIEW = Menu("view", "&View", entries=(
     None,
     _THEMES,
     Command("full_screen", "F&ull screen", "Fill the screen with the window, or leave full screen.",
-            lambda window: window.toggle_full_screen(), ("F11",)),
+            call("toggle_full_screen"), ("F11",)),
     Menu("panels", "&Panels", "Show and hide the panels around the view.", (
         Command("next_panel", "&Next panel",
                 "Go to the next panel, also behind a tab.",
-                lambda window: window.dock_manager.bring_next(), ("Ctrl+PgDown",)),
+                call("dock_manager.bring_next"), ("Ctrl+PgDown",)),
         Command("previous_panel", "&Previous panel",
                 "Go to the previous panel, also behind a tab.",
-                lambda window: window.dock_manager.bring_next(-1), ("Ctrl+PgUp",)),
+                call("dock_manager.bring_next", -1), ("Ctrl+PgUp",)),
         Command("hide_panels", "&Hide or show all",
                 "Hide every panel, so that the view has all the space, or show them again.",
-                lambda window: window.dock_manager.toggle_all(), ("F9",)),
+                call("dock_manager.toggle_all"), ("F9",)),
         Command("restore_layout", "&Restore layout",
                 "Move every panel back to its first place.",
-                lambda window: window.dock_manager.restore_layout()),
+                call("dock_manager.restore_layout")),
     ), fill=_fill_panels),
 ))
 
 _HELP = Menu("help", "&Help", entries=(
     Command("manual", "&Manual", "Read and search the pages of the documentation.",
-            lambda window: window.help.manual(), ("Shift+F1",)),
+            call("help.manual"), ("Shift+F1",)),
     Command("shortcuts", "&Keyboard and mouse", "Show all keys and what the mouse does.",
-            lambda window: window.help.shortcuts(), ("F1",)),
+            call("help.shortcuts"), ("F1",)),
     Command("case_keys", "Case &keys", "Show and search the keys of a case file.",
-            lambda window: window.help.case_keys()),
+            call("help.case_keys")),
     Command("copy_details", "&Copy details for a bug report",
             "Copy versions, graphics, mesh and the last messages, for a bug report.",
-            lambda window: window.help.copy_details()),
-    Command("about", "&About slideviz", "Show version and licence.", lambda w: w.help.about()),
+            call("help.copy_details")),
+    Command("about", "&About slideviz", "Show version and licence.", call("help.about")),
 ))
 # fmt: on
 
