@@ -293,9 +293,13 @@ class PictureDialog(PixelFields, PreviewDialog):
             "text": self.text,
             "background": self.background,
         }
-        self._restore_choices({"preset": "1600x1000", "text": 1.0})
+        marked = renderer.session.marked_here
+        usual = replace(PictureOptions(), fill=renderer.fills, marked=marked)
+        known = {name: getattr(usual, name) for name in OPTIONS}
+        self._restore_choices({"preset": "1600x1000", "text": 1.0, **known})
         with suppress(TypeError, ValueError):  # none, or of another version
-            self._restore_choices(json.loads(kept))
+            known = dict(json.loads(kept))
+            self._restore_choices({name: known[name] for name in known.keys() - self._passing})
         self.changed()
 
     # Parts -----------------------------------------------------------------------------
@@ -320,16 +324,13 @@ class PictureDialog(PixelFields, PreviewDialog):
         self.background = Choice(BACKGROUNDS, "What is behind the mesh.")
         self.background.chosen.connect(self._changed)
         self._form.addRow("Background", self.background)
-        usual = replace(PictureOptions(), fill=self.renderer.fills)
         self.options: dict[str, QCheckBox] = {}
         for name, (text, tip) in OPTIONS.items():
-            self.options[name] = option = check_box(text, tip, self._changed)
-            option.setChecked(getattr(usual, name))
-            self._form.addRow("", option)
+            self.options[name] = check_box(text, tip, self._changed)
+            self._form.addRow("", self.options[name])
         session = self.renderer.session
         self._form.setRowVisible(self.options["both"], self.renderer.beside is not None)
         self._form.setRowVisible(self.options["marked"], session.view.marked_cell is not None)
-        self.options["marked"].setChecked(session.marked_here)
         self._passing = {"fill", "both", *(() if session.marked_here else ("marked",))}
         """The options that depend on the present view, and are not kept."""
 
