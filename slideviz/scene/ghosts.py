@@ -72,22 +72,15 @@ class BoxLayer(KeyedLayer):
             if not lattice:
                 continue
             shape = lattice_shape(list(lattice.values()), mesh.dim, lift)
-            self._add(shape, name, color)
+            sizes = 2.0 * self.stage.pixel_scale, 8.0 * self.stage.pixel_scale
+            self.stage.mark(shape, name, color, *sizes)
             if mesh.dim == 3:
-                behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", color)
+                hidden = BEHIND if name == BASE else f"{MOVED}:behind"
+                behind = self.stage.mark(shape, hidden, color, *sizes)
                 behind.prop.opacity = FAINT if name == BASE else CLEAR
                 draw_in_front(behind.mapper)
         if boxes:
             self._label(boxes, mesh.dim, lift)
-
-    def _add(self, shape: Any, name: str, color: str) -> Any:
-        actor = self.stage.add(shape, name, lighting=False, pickable=False)
-        scale = self.stage.pixel_scale
-        actor.prop.color = color
-        actor.prop.line_width = 2.0 * scale
-        actor.prop.point_size = 8.0 * scale
-        actor.prop.render_points_as_spheres = True
-        return actor
 
     def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
         at = []
@@ -389,9 +382,7 @@ class SupportLayer(KeyedLayer):
             (HALO, self.stage.scheme.background, 7.0),
             (NAME, ROLES["moving"].color, 3.5),
         ):
-            actor = self.stage.add(shape, name, lighting=False, pickable=False)
-            actor.prop.color = color
-            actor.prop.line_width = width * self.stage.pixel_scale
+            self.stage.mark(shape, name, color, width * self.stage.pixel_scale)
 
 
 def circles(middles: FloatArray, radius: float) -> FloatArray:

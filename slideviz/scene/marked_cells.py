@@ -5,7 +5,6 @@ If a limit is chosen, the rings are around the cells that fail it instead.
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,9 +14,8 @@ import pyvista as pv
 from slideviz.case.limits import LimitResult
 from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import IntArray, Mesh
-from slideviz.mesh.surfaces import Surface, lifted
-from slideviz.scene import actors
+from slideviz.mesh.model import IntArray
+from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
 from slideviz.scene.actors import VALUES, draw_in_front, part_shape
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import KeyedLayer, Layer, Stage
@@ -29,6 +27,7 @@ from slideviz.terms import NODE_TYPES
 POINT_SIZES = ((0, 9.0), (1500, 7.0), (6000, 5.0))
 """Pairs of a number of points, and their diameter in pixels from that number on."""
 
+NODES = "points:nodes"  # the name of the actor
 _POINT_COLOR = "point_color"  # name of the point data with the colors
 _RGB = np.array([pv.Color(term.color).int_rgb for term in NODE_TYPES.values()], np.uint8)
 """Red, green and blue (0 to 255) of each type of node, (t, 3)."""
@@ -42,7 +41,6 @@ class PointLayer(Layer):
         self._drawn: TypedNodes = NOTHING
         self._key: tuple[object, ...] = ()
         self._shape: Any = None
-        self._actor: Any = None
         self.stage.point_words = ()
 
     def open(self, _session: Session, surfaces: Sequence[Surface]) -> None:
@@ -53,10 +51,10 @@ class PointLayer(Layer):
             return
         typed = typed_nodes(new)
         key = (typed, new.view.hidden)
-        if key != self._key and not (typed is NOTHING and self._actor is None):
+        if key != self._key:
             self._key = key
             self._fill(self._seen(typed, new), new)
-        elif self._actor is not None and (old is None or old.frame is not new.frame):
+        elif old is None or old.frame is not new.frame:
             self._place(new)
 
     def _seen(self, typed: TypedNodes, session: Session) -> TypedNodes:
@@ -71,20 +69,35 @@ class PointLayer(Layer):
         count = len(typed.nodes)
         present = [NODE_TYPES[kind] for kind in typed.present]
         self.stage.point_words = tuple((term.label, term.color) for term in present)
-        if self._actor is None:
-            self._shape = pv.PolyData()
-            self._actor = self._make()
-        self._actor.visibility = count > 0
+        self.stage.remove(NODES)
+        self._shape = None
         if not count:
             return
-        shape = pv.PolyData(self._at(session, typed.nodes))
-        shape.point_data[_POINT_COLOR] = _RGB[typed.kinds]
-        self._shape.copy_from(shape, deep=False)
+        self._shape = pv.PolyData(self._at(session, typed.nodes))
+        self._shape.point_data[_POINT_COLOR] = _RGB[typed.kinds]
         size = next(size for least, size in reversed(POINT_SIZES) if count >= least)
-        self._actor.prop.point_size = size * self.stage.pixel_scale
+        actor = self.stage.plotter.add_mesh(
+            self._shape,
+            name=NODES,
+            scalars=_POINT_COLOR,
+            rgb=True,
+            style="points",
+            render_points_as_spheres=True,
+            point_size=size * self.stage.pixel_scale,
+            # Shading makes a ball visible on a face of the same color.
+            ambient=0.25,
+            diffuse=0.85,
+            copy_mesh=False,
+            reset_camera=False,
+            render=False,
+            pickable=False,
+        )
+        # A depth offset, so that faces and edges do not cut into the points.
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
 
     def _place(self, session: Session) -> None:
-        if len(self._drawn.nodes):
+        if self._shape is not None:
             self._shape.points[:] = self._at(session, self._drawn.nodes)
             self._shape.GetPoints().Modified()
 
@@ -93,97 +106,45 @@ class PointLayer(Layer):
         assert session.frame is not None
         return lifted(session.frame.mesh.points[nodes], 4.0 * self.stage.lift(session.mesh))
 
-    def _make(self) -> Any:
-        mapper = pv.DataSetMapper(dataset=self._shape)
-        # A depth offset, so that faces and edges do not cut into the points.
-        mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
-        mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray(_POINT_COLOR)
-        mapper.SetColorModeToDirectScalars()
-        mapper.scalar_visibility = True
-        actor = pv.Actor(mapper=mapper, name="points:nodes")
-        prop = actor.prop
-        prop.style = "points"
-        prop.render_points_as_spheres = True
-        # Shading makes a ball visible on a face of the same color.
-        prop.ambient = 0.25
-        prop.diffuse = 0.85
-        self.stage.plotter.add_actor(
-            actor, name=actor.name, reset_camera=False, render=False, pickable=False
-        )
-        return actor
-
 
 OUTLINE = "mark:outline"  # names of the actors
 FACES = "mark:faces"
 DOT = "mark:dot"
 
 
-class MarkLayer(Layer):
+class MarkLayer(KeyedLayer):
     """The marked cell: its edges, its faces in the color of its value (3D), and a dot.
 
     The dot shows a cell that is smaller than a pixel. If the cell is inside a 3D mesh, the
     boundaries are made transparent (`slideviz.scene.mesh.BoundaryLayer`).
     """
 
-    def clear(self) -> None:
-        self.cell: int | None = None  # the index of the cell that is drawn
-        self._drawn: dict[str, Any] = {}
-        # Kept here: a data set that only VTK holds may come back from a mapper without points.
-        self._shapes: dict[str, Any] = {}
+    names = (OUTLINE, FACES, DOT)
 
-    def update(self, old: Session | None, new: Session) -> None:
-        cell = new.view.marked_cell
-        frame = new.frame
-        if cell is None or frame is None or not frame.has(cell):
-            for name in self._drawn:
-                self.stage.remove(name)
-            self.clear()
+    def key(self, session: Session) -> tuple[object, ...]:
+        cell = session.view.marked_cell
+        frame = session.frame
+        return (frame, cell, session.view.color_by) if frame and frame.has(cell) else ()
+
+    def draw(self, session: Session) -> None:
+        cell = session.view.marked_cell
+        if not self._key or session.frame is None or cell is None:
             return
-        containing, at = frame.place_of(cell)
-        if cell != self.cell:
-            self._add(containing.mesh, at)
-        if cell != self.cell or old is None or old.frame is not new.frame:
-            self._place(containing.mesh, at)
-        self.cell = cell
-        if FACES in self._drawn:
-            shape = self._shapes[FACES]
-            value = self.stage.value_of(new, cell)
-            shape.cell_data[VALUES] = np.full(shape.n_cells, value)
-            self._drawn[FACES].mapper.scalar_visibility = True
-
-    def _add(self, mesh: Mesh, cell: int) -> None:
-        for name in self._drawn:
-            self.stage.remove(name)
-        self._drawn = {}
-        at = lifted(mesh.points[nodes_of(mesh, cell)], 0.0)
-        edges = np.array(ELEMENTS[int(mesh.cells.types[cell])].edges)
-        lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
-        shapes = {OUTLINE: pv.PolyData(at, lines=lines), DOT: pv.PolyData(at[:1].copy())}
-        if mesh.dim == 3:
-            shapes[FACES] = part_shape(mesh, np.array([cell]))
-            shapes[FACES].cell_data[VALUES] = np.zeros(shapes[FACES].n_cells)
-        self._shapes = shapes
-        for name, shape in shapes.items():
-            actor = self.stage.add(shape, name, lighting=False, pickable=False)
-            self._drawn[name] = actor
-            if name == FACES:
-                continue
-            actor.prop.color = SELECTED_COLOR
-            actor.prop.line_width = 4.0
-            actor.prop.point_size = 9.0
-            actor.prop.render_points_as_spheres = name == DOT
-            draw_in_front(actor.mapper)
-
-    def _place(self, mesh: Mesh, cell: int) -> None:
-        at = mesh.points[nodes_of(mesh, cell)]
+        containing, at = session.frame.place_of(cell)
+        mesh = containing.mesh
         lift = 3.0 * self.stage.lift(mesh)
-        actors.place(self._shapes[OUTLINE], at, lift)
-        actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)
-        if FACES in self._shapes:
-            faces = self._shapes[FACES]
-            actors.place(faces, mesh.points[faces.point_data["vtkOriginalPointIds"]])
+        corners = mesh.points[nodes_of(mesh, at)]
+        edges = np.array(ELEMENTS[int(mesh.cells.types[at])].edges)
+        outline = pv.PolyData(lifted(corners, lift), lines=facet_connectivity(edges))
+        dot = pv.PolyData(lifted(corners.mean(axis=0)[None], lift))
+        for name, shape in ((OUTLINE, outline), (DOT, dot)):
+            draw_in_front(self.stage.mark(shape, name, SELECTED_COLOR, 4.0, 9.0).mapper)
+        if mesh.dim == 3:
+            faces = part_shape(mesh, np.array([at]))
+            value = self.stage.value_of(session, cell)
+            faces.cell_data[VALUES] = np.full(faces.n_cells, value)
+            actor = self.stage.add(faces, FACES, lighting=False, pickable=False)
+            actor.mapper.scalar_visibility = True
 
 
 NAME = "points:inverted"
@@ -197,36 +158,34 @@ _RING = "if (len2 > 1.0 || len2 < 0.42) { discard; }"
 """The replacement of `_DISC`: a ring instead of a disc."""
 
 
-class InvertedLayer(Layer):
+class InvertedLayer(KeyedLayer):
     """The rings, in front of everything, at the middle of inverted cells.
 
     If sections cut a 3D mesh, only the cells they cut have rings: others would seem to be on them.
     ``sections``: says which cells are cut; updated before this layer.
     """
 
+    names = (NAME,)
+
     def __init__(self, stage: Stage, sections: SectionLayer) -> None:
         super().__init__(stage)
         self.sections = sections
 
     def clear(self) -> None:
-        self._key: tuple[object, ...] = ()
+        super().clear()
         self._cut: list[IntArray] = []
-        self._shape: Any = None  # a reference in Python: VTK alone may return it without points
         self.stage.ring_words = ()
 
-    def update(self, _old: Session | None, new: Session) -> None:
-        key = (new.frame, _wanted(new), new.limit_chosen, self.stage.pixel_scale)
-        cut = self._cut_cells(new)
-        same = len(cut) == len(self._cut) and all(map(operator.is_, cut, self._cut))
-        if key == self._key and same:
-            return
-        self._key = key
-        self._cut = cut
-        self.stage.remove(NAME)
+    def key(self, session: Session) -> tuple[object, ...]:
+        self._cut = self._cut_cells(session)
+        shown = session.frame, _wanted(session), session.limit_chosen
+        return *shown, self.stage.pixel_scale, *map(id, self._cut)
+
+    def draw(self, session: Session) -> None:
         self.stage.ring_words = ()
-        if _wanted(new):
-            assert new.frame is not None
-            self._draw(new.frame, new.limit_chosen, cut)
+        if _wanted(session):
+            assert session.frame is not None
+            self._draw(session.frame, session.limit_chosen, self._cut)
 
     def _cut_cells(self, session: Session) -> list[IntArray]:
         """Return, per section of a 3D mesh in memory, the cells (k,) of its polygons."""
@@ -260,14 +219,11 @@ class InvertedLayer(Layer):
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):
             return  # a mesh in its file has few of them in memory, or none
-        self._shape = pv.PolyData(
+        rings = pv.PolyData(
             lifted(cell_centers(in_memory.mesh, cells), 4.0 * self.stage.lift(in_memory.mesh))
         )
-        actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
-        actor.prop.color = color
-        actor.prop.point_size = size * self.stage.pixel_scale
-        actor.prop.render_points_as_spheres = True
+        actor = self.stage.mark(rings, NAME, color, size=size * self.stage.pixel_scale)
         actor.GetShaderProperty().AddFragmentShaderReplacement(_DISC, False, _RING, False)
         draw_in_front(actor.mapper)
 
@@ -325,16 +281,14 @@ class RepairLayer(KeyedLayer):
             ]
         )
         used, ends = np.unique(edges, return_inverse=True)
-        lines = np.insert(ends.reshape(-1, 2), 0, 2, axis=1).ravel()
+        lines = facet_connectivity(ends.reshape(-1, 2))
         ghost = pv.PolyData(lifted(before[used], lift), lines=lines)
         dots = pv.PolyData(lifted(mesh.points[nodes], lift))
-        self._shapes = ghost, dots  # a data set that only VTK holds may come back without points
+        scale = self.stage.pixel_scale
         for name, shape, color in (
             (CELLS_BEFORE, ghost, INVERTED_COLOR),
             (MOVED_NODES, dots, SELECTED_COLOR),
         ):
-            actor = self.stage.add(shape, name, lighting=False, pickable=False)
-            actor.prop.color = color
-            actor.prop.line_width = 1.5 * self.stage.pixel_scale
-            actor.prop.point_size = 4.0 * self.stage.pixel_scale
+            actor = self.stage.mark(shape, name, color, 1.5 * scale, 4.0 * scale)
+            actor.prop.render_points_as_spheres = False
             draw_in_front(actor.mapper)

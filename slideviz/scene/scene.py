@@ -121,6 +121,7 @@ class Scene:
         for layer in self.layers:
             layer.clear()
         self.plotter.clear_actors()
+        self.stage.shapes.clear()
         self.session = Session()
 
     def update(self, session: Session) -> None:

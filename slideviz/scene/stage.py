@@ -85,6 +85,7 @@ class Stage:
         """tuple of (str, str): texts and colors of the legend for the nodes drawn as points."""
         self.ring_words: tuple[tuple[str, str], ...] = ()
         """tuple of (str, str): texts and colors of the legend for the rings."""
+        self.shapes: dict[str, Any] = {}  # the data sets of `mark`, by the names of their actors
         self.has_legend = True  # whether this scene may have a legend, and leaves its strip free
         self.has_plate = True
         """Whether the legend has a half-transparent plate; False for a transparent background."""
@@ -121,8 +122,27 @@ class Stage:
         actor.mapper.scalar_visibility = False
         return actor
 
+    def mark(self, shape: Any, name: str, color: str, width: float = 1.0, size: float = 1.0) -> Any:
+        """Add unlit lines and balls that the mouse cannot pick; return their actor.
+
+        ``width``, ``size``: of lines and balls, in pixels.
+        """
+        # A data set that only VTK holds may come back from a mapper without points.
+        self.shapes[name] = shape
+        return self.add(
+            shape,
+            name,
+            lighting=False,
+            pickable=False,
+            color=color,
+            line_width=width,
+            point_size=size,
+            render_points_as_spheres=True,
+        )
+
     def remove(self, name: str) -> None:
         """Remove an actor, if the plotter has it."""
+        self.shapes.pop(name, None)
         self.plotter.remove_actor(name, reset_camera=False, render=False)
 
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
