@@ -11,6 +11,7 @@ import numpy as np
 from numba import prange
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.planes import partition
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.system.jit_cache import OPTIONS, njit
 
@@ -26,36 +27,6 @@ EDGE = 1e-9
 """A closest point is on the side of a triangle where the opposite corner has at most this part in
 it."""
 NO_SYMMETRY = (1.0, 0.6180339887, 0.4142135624)  # a direction in which points of a mesh differ
-
-
-@njit(**OPTIONS)
-def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
-    """Reorder keys and items ``start`` to ``stop``, so that the lowest keys are before ``half``.
-
-    Quickselect (C. A. R. Hoare, Algorithm 65: Find, 1961): a sort that stops as soon as that holds.
-    """
-    left = start
-    right = stop - 1
-    while left < right:
-        pivot = keys[(left + right) // 2]
-        i = left
-        j = right
-        while i <= j:
-            while keys[i] < pivot:
-                i += 1
-            while keys[j] > pivot:
-                j -= 1
-            if i <= j:
-                keys[i], keys[j] = keys[j], keys[i]
-                items[i], items[j] = items[j], items[i]
-                i = i + 1
-                j = j - 1
-        if half <= j:
-            right = j
-        elif half >= i:
-            left = i
-        else:
-            return
 
 
 @njit(inline="always", **OPTIONS)
@@ -121,7 +92,7 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
             by = shifts[image, longest]
             middle[i] = (low[one, longest] + by) + (high[one, longest] + by)
         half = a + (b - a + 1) // 2
-        _part(middle, order, a, half, b)
+        partition(middle, order, a, half, b)
         starts[2 * k + 1] = a
         stops[2 * k + 1] = half
         starts[2 * k + 2] = half

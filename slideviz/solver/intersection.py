@@ -231,12 +231,17 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     # The markers have holes, so that they have no inside: take all sides of one cell alone.
     if abs(winding_number(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:
         shell = shell_of(mesh)
-    # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
-    there = there[[not _is_out(shell, mesh.points, point[None]) for point in before]]
-    if not len(there) or not _is_out(shell, after, there):
-        return False
+    left = []
+    for start, end in zip(before, there, strict=True):
+        # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
+        if _is_out(shell, mesh.points, start[None]):
+            continue
+        if not _is_out(shell, after, end[None]):
+            return False
+        left.append(end)
     others = np.setdiff1d(shell, facets)
-    return all(_is_out(shell, after, image) for image in _images(case, mesh, there, after[others]))
+    images = _images(case, mesh, np.array(left), after[others]) if left else ()
+    return bool(left) and all(_is_out(shell, after, image) for image in images)
 
 
 def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
