@@ -43,7 +43,7 @@ from slideviz.session.section_cuts import first_section
 from tests.builders import passage, stage
 from tests.mesh.test_interfaces import moved, zones
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -85,6 +85,7 @@ def pixels(path):
 # Picture -----------------------------------------------------------------------------------
 
 
+@pytest.mark.window("own")
 def test_the_usual_picture_is_white_without_clutter(opened, answers, tmp_path):
     asked = answers("ask_save", tmp_path / "out.png")
     opened.window.set_theme("dark")
@@ -178,6 +179,7 @@ def test_a_picture_for_paper_knows_its_size(opened, answers, tmp_path):
     assert known["dpi"] == pytest.approx((300, 300), abs=0.1)
 
 
+@pytest.mark.window("own")
 def test_copy_in_the_dialog_and_by_keys(opened, qtbot):
     clipboard = QApplication.clipboard()
     clipboard.clear()
@@ -321,6 +323,7 @@ def test_a_stopped_film_leaves_no_file(ran, film, answers, tmp_path, qtbot):
     assert film.isVisible()
 
 
+@pytest.mark.window("own")
 @pytest.mark.parametrize("how", ["open", "close"])
 def test_opening_or_closing_stops_a_film(ran, film, answers, tmp_path, passage_file, qtbot, how):
     answers("ask_unsaved", "discard")
@@ -495,6 +498,7 @@ def test_all_steps_are_saved_with_numbers(ran, answers, tmp_path):
     assert not ran.session.unsaved_mesh
 
 
+@pytest.mark.window("own")
 def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_path):
     mesh, roles = passage((2, 6, 6), 40.0), {"blade": "moving", "per1": "periodic"}
     case = Case(roles=roles | {"per2": "periodic"}, periodic_type="rotational")

@@ -6,7 +6,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
 from slideviz.system.atomic import atomic_write
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -35,6 +35,7 @@ def test_a_case_is_not_saved_over_the_mesh(opened, monkeypatch):
     assert "choose another name" in opened.banner.text.text()
 
 
+@pytest.mark.window("own")
 def test_a_closed_window_spares_nothing_any_more(opened, monkeypatch):
     path = opened.store.session.path
     monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")

@@ -12,7 +12,7 @@ from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 OWN = {"multilevel": "levels", "level_size": "level_end"}
 """Fields that stand for more than one key, by the one that they have label and tip from."""
@@ -26,7 +26,8 @@ def ready(driver, passage_file):
         changes.set_case, reduction=Reduction(0.25, multilevel=True), periodic_type="rotational"
     )
     driver.window.docks["method"].raise_()
-    driver.click(driver.window.method.more.button)
+    if not driver.window.method.more.button.isChecked():
+        driver.click(driver.window.method.more.button)
     return driver
 
 

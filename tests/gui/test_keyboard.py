@@ -14,7 +14,7 @@ from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -121,6 +121,7 @@ def seen_pixels(widget):
     return pixels.reshape(image.height(), image.width(), 4)[..., :3].astype(int)
 
 
+@pytest.mark.window("own")
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_focus_is_seen_wherever_the_tab_key_leads(opened, theme):
     window, reason, seen = opened.window, Qt.FocusReason.TabFocusReason, []

@@ -10,7 +10,7 @@ from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 NAME = '<b>wing</b><img src="a.png">'
 ask_replace = questions.ask_replace
@@ -78,6 +78,7 @@ def test_a_sentence_is_not_cut_within_brackets(inside):
     assert _shortened("a; b.") == "a; b."
 
 
+@pytest.mark.window("own")
 def test_labels_do_not_guess(window, tmp_path):
     guessing = [
         label.text()

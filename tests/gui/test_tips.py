@@ -21,7 +21,7 @@ from slideviz.gui.widgets.build import LETTERS, wrapped
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 LONG = "the correction of a blade moves nodes of a shroud that is < 0.01 away " * 4
 
