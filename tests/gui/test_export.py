@@ -99,6 +99,7 @@ def test_the_usual_picture_is_white_without_clutter(opened, answers, tmp_path):
     assert "SVG" in asked[0][2]
 
 
+@pytest.mark.window("own")
 def test_a_cancelled_picture_asks_for_no_name_and_one_that_cannot_be_written_is_told(
     opened, answers, tmp_path
 ):
@@ -165,6 +166,7 @@ def test_sizes_in_pixels_and_on_paper_are_offered_again_and_broken_ones_are_not(
         require_vector(renderer.session, Path("a.png"))
 
 
+@pytest.mark.window("own")
 def test_a_picture_for_paper_knows_its_size(opened, answers, tmp_path):
     answers("ask_save", tmp_path / "out.png")
 
@@ -201,6 +203,7 @@ def test_copy_in_the_dialog_and_by_keys(opened, qtbot):
     assert clipboard.image().width() == 1600
 
 
+@pytest.mark.window("own")
 def test_drawings_of_2d_meshes(ran, answers, tmp_path):
     def saved(name):
         answers("ask_save", tmp_path / name)
@@ -214,6 +217,7 @@ def test_drawings_of_2d_meshes(ran, answers, tmp_path):
     assert drawn.count(b"<path") >= len(ran.session.mesh.cells), "a path for every cell"
 
 
+@pytest.mark.window("own")
 def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
     assert pictures.picture_filters(driver.session)[0] == questions.PICTURE_FILTERS
@@ -225,6 +229,7 @@ def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
         dialog.reject()
 
 
+@pytest.mark.window("own")
 def test_two_runs_beside_each_other_are_one_picture(ran):
     ran.window.start_run()
     ran.settle()
@@ -417,6 +422,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
         assert threading.main_thread() not in where
 
 
+@pytest.mark.window("own")
 def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
     monkeypatch.setattr(pieces.actor_groups, "__defaults__", (100,))
     ticks = []
@@ -438,6 +444,7 @@ def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
     assert ticks
 
 
+@pytest.mark.window("own")
 def test_a_copy_while_the_preview_is_drawn_is_whole_and_so_is_the_preview(opened, qtbot):
     pictures = []
 
@@ -533,6 +540,7 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
     assert "must be periodic, by a whole part of a turn" in " ".join(act.toolTip().split())
 
 
+@pytest.mark.window("own")
 def test_a_stage_has_wheels_gaps_and_spans_of_its_zones(driver, answers, tmp_path):
     mesh, window = stage(), driver.window
     names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
