@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
 from slideviz.rbf.reduction import Reduction
+from slideviz.solver.growth import Farthest, _cause, stray_warning
+from slideviz.solver.prepare import prepare
+from slideviz.solver.setup import make_setup
 from slideviz.streaming import output
 from slideviz.streaming.run import stream
 from tests.builders import annulus, far_field, grid, layered, square
@@ -45,6 +49,46 @@ def test_steps_and_data_reduction_do_not_hide_it(steps, reduction):
     case = SHEARED.change(sliding="ds", steps=steps, reduction=reduction)
     with pytest.raises(UnsoundError, match="that the motion reaches, whose largest displacement"):
         list(sv.deform(case, layered(8, 1e-4)))
+
+
+def set_already(case, text):
+    """The remedies in a message that a case has."""
+    remedies = re.findall(r"([A-Z_]+)= ([\w-]+)", text.rpartition("; ")[2])
+    values = {key: KEYS[key].kind.write(KEYS[key].get(case)) for key, _ in remedies}
+    named = [key for key, value in remedies if values[key].lower() == value.lower()]
+    return named + (["RBF_KERNEL"] if f"such as {case.kernel}" in text else [])
+
+
+@pytest.mark.parametrize("kernel", ["wendland-c0", "wendland-c2", "gaussian"])
+@pytest.mark.parametrize("reduction", [None, Reduction(), Reduction(auto=True)])
+@pytest.mark.parametrize("role", ["moving", "fixed", "sliding"])
+def test_no_remedy_is_set_already(kernel, reduction, role, monkeypatch):
+    case = Case(
+        roles={"y_m": "moving", "x_m": role},
+        motions=(Translate("y_m", (0.05, 0.0)), Translate("x_m", (0.05, 0.0))),
+        kernel=kernel,
+        reduction=reduction,
+        sliding="ps",
+        influence_factor=2.5,
+    )
+    mesh = layered(8, 1e-4)
+    setup = make_setup(prepare(case.change(motions=case.motions[: 1 + (role == "moving")]), mesh))
+    for steep in (0.0, 1e9):
+        monkeypatch.setattr("slideviz.solver.growth.STEEP", steep)
+        for node, gap in ((0, 1.0), (8, 0.5)):
+            moved = setup.coords.copy()
+            moved[setup.known[node]] += gap
+            said = _cause(setup, mesh, moved)
+            assert not set_already(case, said)
+            pair = [int(each) for each in re.findall(r"(?:nodes|and) (\d+) \(", said)]
+            fixed = np.isin(pair, setup.classes.fixed).any()
+            assert ("make the fixed boundary" in said) == fixed
+    far = Farthest(9.0, 0, mesh.points[0])
+    after = mesh.points.copy()
+    after[setup.known] += 1e-3
+    monkeypatch.setattr("slideviz.solver.growth.STRAY", 3.0)
+    (said,) = stray_warning(setup, mesh, after, far)
+    assert not set_already(case, said)
 
 
 def test_the_remedy_helps():

@@ -258,8 +258,9 @@ def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
     _require_free(
         8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
         f"{sum(sizes)} unknowns need",
-        "give large boundaries far from the motion the role internal, use SLIDING_MODE= ps, "
-        "DATA_REDUCTION= YES, or a coarser mesh",
+        "give large boundaries far from the motion the role internal, use "
+        f"{'SLIDING_MODE= ps, ' if case.sliding == 'ds' else ''}DATA_REDUCTION= YES, or a coarser "
+        "mesh",
     )
 
 

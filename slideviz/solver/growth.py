@@ -7,7 +7,7 @@ with cells of a height of 1e-6 between the two.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -41,6 +41,8 @@ STRAY = 10.0
 
 OFF_WALL = 1e-3  # part of the span by which sliding nodes may leave hub or shroud
 NOISE = 1e-6  # part of the size of what moves by which its nodes may leave a wall: digits of a file
+
+ROUGHEST = "wendland-c0"  # the kernel that overshoots least
 
 HOPELESS = 0.1
 """A system was not solved where its solution misses the displacement of a control node by more than
@@ -162,9 +164,11 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     ratio = found.length / most
     radius = setup.basis.radius
     smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
-    remedy = f"RBF_KERNEL= wendland-c0, which does not, or INFLUENCE_FACTOR= {smaller}"
+    factor = f"INFLUENCE_FACTOR= {smaller}"
     if setup.fitted_radius < radius:
-        remedy = "INFLUENCE_FACTOR= AUTO, or RBF_KERNEL= wendland-c0"
+        factor = "INFLUENCE_FACTOR= AUTO"
+    plain = "" if setup.basis.kernel == ROUGHEST else f"RBF_KERNEL= {ROUGHEST}"
+    remedy = listed_or([factor, plain] if plain else [factor])
     sentence = (
         f"node {found.node} at ({where}) moves by {found.length:.3g}, {ratio:.3g} "
         f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
@@ -215,7 +219,8 @@ def _off_walls(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iter
     if case.rims == "slide":
         free = ", to which it cannot be brought back", "move it less"
     fixed = find_rims(case.change(rims="free"), mesh, setup, ("fixed",))
-    of_fixed = ", which is fixed", "let that boundary slide, with RIMS= SLIDE, or move it less"
+    slides = "" if case.rims == "slide" else ", with RIMS= SLIDE"
+    of_fixed = ", which is fixed", f"let that boundary slide{slides}, or move it less"
     for rims, words in ((setup.rims, free), (fixed, of_fixed)):
         if rims is None:
             continue
@@ -305,22 +310,40 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))
     usual = setup.largest / mesh.extent
+    less = less_smooth(setup)
     if steep[k] < STEEP * usual:
         return (
-            f"{setup.basis.kernel} is too smooth for nodes so close to each other; use a less "
-            "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "
-            "DATA_REDUCTION= YES"
+            f"{setup.basis.kernel} is too smooth for nodes so close to each other; "
+            f"use {listed_or(less)}"
         )
     pair = sorted((int(nodes[k]), int(nodes[others[k]])))
     named = " and ".join(
         f"{mesh.number(node)} ({', '.join(_names_at(setup, node))})" for node in pair
     )
+    motion = "let them move more alike"
+    if np.isin(pair, setup.classes.fixed).any():
+        motion = "make the fixed boundary moving, internal or periodic"
     return (
         f"boundary nodes {named}, {gaps[k]:.2g} apart, have displacements that differ by "
-        f"{apart[k]:.3g}, which a smooth function cannot follow; make the fixed boundary moving, "
-        "internal or periodic, use RBF_KERNEL= wendland-c0, which does not overshoot, or "
-        "DATA_REDUCTION= YES"
+        f"{apart[k]:.3g}, which a smooth function cannot follow; "
+        f"{listed_or([motion, *(f'use {remedy}' for remedy in less)])}"
     )
+
+
+def less_smooth(setup: Setup) -> list[str]:
+    """Return what makes a system easier to solve, of what its case does not have yet."""
+    kernel = setup.basis.kernel != ROUGHEST
+    return [
+        *(["DATA_REDUCTION= YES"] if setup.reduction is None else []),
+        *([f"a less smooth RBF_KERNEL such as {ROUGHEST}"] if kernel else []),
+        "a smaller INFLUENCE_FACTOR",
+    ]
+
+
+def listed_or(remedies: Sequence[str]) -> str:
+    """Return remedies as a list with ``or`` before its last one."""
+    *others, last = remedies
+    return ", or ".join(filter(None, (", ".join(others), last)))
 
 
 def _names_at(setup: Setup, node: int) -> list[str]:

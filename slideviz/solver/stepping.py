@@ -25,7 +25,14 @@ from slideviz.rbf.operations import features
 from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, put, take, value
-from slideviz.solver.growth import farthest_node, stray_warning, unsoundness, wall_warnings
+from slideviz.solver.growth import (
+    farthest_node,
+    less_smooth,
+    listed_or,
+    stray_warning,
+    unsoundness,
+    wall_warnings,
+)
 from slideviz.solver.normals import sliding_normals
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
@@ -181,7 +188,7 @@ class Stepping:
         if step.index == step.total:
             left = wall_warnings(self.setup, self.case, self.mesh, points)
         messages = (
-            *_run_warnings([*self.case.warnings, *self.setup.warnings], findings),
+            *_run_warnings([*self.case.warnings, *self.setup.warnings], findings, self.setup),
             *apart,
             *torn_interfaces(self.mesh, points),
             *step.messages,
@@ -451,7 +458,9 @@ def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Findi
     )
 
 
-def _run_warnings(before: Sequence[Remark], findings: Sequence[_Finding]) -> list[Remark]:
+def _run_warnings(
+    before: Sequence[Remark], findings: Sequence[_Finding], setup: Setup
+) -> list[Remark]:
     """Return the warnings of a run after some steps, each once.
 
     Of the reductions that ended too early the one with the largest error is told, else the first
@@ -467,7 +476,9 @@ def _run_warnings(before: Sequence[Remark], findings: Sequence[_Finding]) -> lis
     worst = max(
         findings, key=lambda finding: (finding.error_estimate, finding.refined, finding.index)
     )
-    doubt = _doubt_warning(worst.error_estimate, worst.refined, worst.index, worst.condition)
+    remedy = f"use {listed_or(less_smooth(setup))}"
+    numbers = worst.error_estimate, worst.refined, worst.index, worst.condition
+    doubt = _doubt_warning(*numbers, remedy)
     return [*dict.fromkeys([*before, *others]), *of_nodes, *doubt]
 
 
@@ -489,24 +500,22 @@ def _limited_note(limited: int, nodes: int, index: int) -> Message:
 
 
 def _doubt_warning(
-    error_estimate: float, refined: float, index: int, condition: float
+    error_estimate: float, refined: float, index: int, condition: float, remedy: str
 ) -> list[Remark]:
     """Return the warning that a solution cannot be trusted, the note that it was refined, or []."""
     nearly = f"the system is nearly singular (condition number {condition:.0e})"
     if error_estimate > TRUSTED:
         sentence = (
             f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
-            f"wrong by {wrong_by(error_estimate, bounded=refined > 0.0)}; use "
-            "DATA_REDUCTION= YES, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
-            "INFLUENCE_FACTOR"
+            f"wrong by {wrong_by(error_estimate, bounded=refined > 0.0)}; {remedy}"
         )
         return [sentence if error_estimate > NOTED else note(sentence)]
     if refined:
         return [
             note(
-                f"step {index}: {nearly}; between the boundary nodes its solution would be wrong "
-                f"by {100 * refined:.2g} % of the largest displacement, so it was refined with "
-                f"twice the digits, to {100 * error_estimate:.2g} %"
+                f"step {index}: nothing is wrong: {nearly}, so it was refined with twice the "
+                f"digits, and displacements are off by {100 * error_estimate:.2g} % of the "
+                f"largest instead of {100 * refined:.2g} %"
             )
         ]
     return []

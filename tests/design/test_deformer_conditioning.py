@@ -72,6 +72,7 @@ def test_a_run_is_right_and_says_that_it_was_refined(motion):
     assert off < rounding
     (note,) = [message for message in last.messages if "singular" in str(message)]
     assert note.level == "note"
+    assert str(note).startswith("step 1: nothing is wrong: the system is nearly singular")
     assert "so it was refined with twice the digits" in str(note)
     assert np.abs(deformer.deform() - last.mesh.points).max() < 1e-7
 
@@ -113,7 +114,7 @@ def test_a_small_error_is_a_note(error_estimate, little):
     with pytest.warns(ConditionWarning) as more:
         warn_of_error_estimate([step], np.array(error_estimate))
     said = [each.message.args[0] for each in (*told, *more)] + _doubt_warning(
-        error_estimate, 0.0, 1, 1e12
+        error_estimate, 0.0, 1, 1e12, "use less"
     )
     assert [each.level == "note" for each in messages_of(said)] == [little] * 3
 
