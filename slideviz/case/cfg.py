@@ -16,7 +16,17 @@ from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, entries_of, listed, read_text, require_no_mesh
-from slideviz.errors import CaseError, Message, most_similar, nearest, raise_all, shown
+from slideviz.case.method_keys import REDUCTION_ROWS
+from slideviz.errors import (
+    CaseError,
+    Message,
+    Remark,
+    most_similar,
+    nearest,
+    note,
+    raise_all,
+    shown,
+)
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
@@ -91,7 +101,7 @@ def set_key(case: Case, key: str, value: str, option: str = "--set") -> Case:
     return changed
 
 
-def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tuple[str, ...]]:
+def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tuple[Remark, ...]]:
     """Return the case of a text, its problems, and warnings; ``path`` is for messages only.
 
     ``case``: that of a text without keys.
@@ -121,7 +131,7 @@ def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tup
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
     values = dict[str, Any]()
-    remarks = list[str]()
+    remarks = list[Remark]()
     for name, key in KEYS.items():
         if name not in rows:
             continue
@@ -136,6 +146,11 @@ def _parsed(path: Path, text: str, case: Case) -> tuple[Case, list[Message], tup
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
     problems += _second_roles(rows, values)
+    if case.reduction is None:
+        rows_off = REDUCTION_ROWS[1:]
+        idle = [key.name for key in rows_off if not key.is_default(values.get(key.name))]
+        if idle:
+            remarks.append(note(f"{path}: DATA_REDUCTION= NO does not use {', '.join(idle)}"))
     # A mistyped key makes contradictions that are not reported as well.
     mistyped = {most_similar(key, KEYS) for key in names - KEYS.keys()}
     for message in contradictions(case):

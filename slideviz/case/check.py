@@ -10,7 +10,7 @@ from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.limits import not_walls
-from slideviz.case.method_keys import FACTORS, why_no_tolerance
+from slideviz.case.method_keys import FACTORS
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions
@@ -371,17 +371,9 @@ def idle_settings(case: Case) -> tuple[Message, ...]:
     if idle:
         notes.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
     notes += [
-        f"{_with_switch(key, case)} has no effect: {key.no_effect}"
+        f"{_with_switch(key, case)} has no effect: {reason}"
         for key in KEYS.values()
-        if key.no_effect and key.get(case) != key.get(usual)
-    ]
-    notes += [
-        f"{key.name} has no effect: DATA_REDUCTION= AUTO finds the tolerance; YES uses this one"
-        for key in KEYS.values()
-        if key.idle_reason is why_no_tolerance
-        and case.reduction is not None
-        and case.reduction.auto
-        and key.get(case) != key.get(usual)
+        if (reason := key.no_effect or key.switch(case)) and not key.is_default(key.get(case))
     ]
     return tuple(map(note, notes))
 

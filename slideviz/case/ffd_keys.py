@@ -68,7 +68,7 @@ def _integers(words: list[Word], least: int) -> Degrees:
 def _said_where_needed(row: Key) -> Key:
     """Return the row of a key, changed so that a file has the key only where it has an effect."""
     usual = getattr(CaseFields(), row.field)
-    needs_boxes = row.idle_reason is _without_definition
+    needs_boxes = row.switch is _without_definition
 
     def get(case: Case) -> Any:
         value = getattr(case, row.field)
@@ -122,13 +122,13 @@ _ROWS = (
         DEGREES,
         field="ffd_degrees",
         label="FFD degrees",
-        idle_reason=_without_definition,
+        switch=_without_definition,
     ),
     _setting(
         "FFD_BLENDING",
         "How control points of these boxes move the nodes inside.",
         label="FFD blending",
-        idle_reason=_without_definition,
+        switch=_without_definition,
     ),
     _setting(
         "FFD_BSPLINE_ORDER",
@@ -136,7 +136,7 @@ _ROWS = (
         ORDERS,
         field="ffd_orders",
         label="FFD orders",
-        idle_reason=_without_definition,
+        switch=_without_definition,
     ),
     _setting(
         "FFD_COORD_SYSTEM",
@@ -145,8 +145,6 @@ _ROWS = (
         field="ffd_system",
         label="FFD coordinates",
     ),
-    _setting(
-        "FFD_AXIS", "A point on that axis.", POINT, label="FFD axis", idle_reason=_without_axis
-    ),
+    _setting("FFD_AXIS", "A point on that axis.", POINT, label="FFD axis", switch=_without_axis),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)

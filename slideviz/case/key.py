@@ -58,8 +58,10 @@ class Key:
     """Words in the label of a run whose value differs from those of other runs, with ``{}`` for the
     value. None: the key's label and the value; empty: no words."""
     method: Method | None = None  # the only method that uses it
+    switch: Callable[[Case], str] = lambda _: ""
+    """Returns which other setting keeps the key from having an effect; empty where none does."""
     idle_reason: Callable[[Case], str] = lambda _: ""
-    """Returns why the key has no effect in a case with that method; empty where it has one."""
+    """Returns why the key has no effect in a case otherwise; empty where it has one."""
     no_effect: str = ""
     """Why it never changes a result: for keys that are read only because RBF-SliDe has them."""
 
@@ -68,9 +70,13 @@ class Key:
         """Return the label, with the unit in brackets if there is one."""
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
+    def is_default(self, value: Any) -> bool:
+        """Return whether a value is the default, or None."""
+        return value is None or self.kind.write(value) == self.default
+
     def idle(self, case: Case) -> str:
         """Return why the key has no effect in a case; "" if it has one."""
-        return other_method(case, self.method) or self.idle_reason(case)
+        return other_method(case, self.method) or self.switch(case) or self.idle_reason(case)
 
 
 def other_method(case: Case, method: Method | None) -> str:

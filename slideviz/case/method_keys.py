@@ -26,10 +26,13 @@ def _why_no_reduction(case: Case) -> str:
     return other_method(case, "rbf") or off
 
 
+_AUTO = "DATA_REDUCTION= AUTO finds the tolerance; YES uses this one"
+
+
 def why_no_tolerance(case: Case) -> str:
     """Return why a tolerance of data reduction has no effect in a case; "" where it has one."""
     auto = case.reduction is not None and case.reduction.auto
-    return _why_no_reduction(case) or ("it is automatic" if auto else "")
+    return _why_no_reduction(case) or (_AUTO if auto else "")
 
 
 def _why_no_levels(case: Case) -> str:
@@ -50,7 +53,7 @@ def greedy(
     """
     field = field or name.lower()
     usual = getattr(Reduction(), field)
-    window = {"idle_reason": _why_no_reduction, **window}
+    window = {"switch": _why_no_reduction, **window}
 
     def put(case: Case, value: Any) -> Case:
         if case.reduction is None:
@@ -63,7 +66,7 @@ def greedy(
             return None
         value = getattr(reduction, field)
         # A tolerance without effect is written to a file only where it is not the default.
-        idle = reduction.auto and window["idle_reason"] is why_no_tolerance and value == usual
+        idle = reduction.auto and window["switch"] is why_no_tolerance and value == usual
         return None if idle else value
 
     return field_row(
@@ -119,7 +122,7 @@ REDUCTION_ROWS = (
         tip="The largest error at the boundary that the control nodes may leave to the "
         "correction, in the mesh's length unit.",
         run_label="",
-        idle_reason=why_no_tolerance,
+        switch=why_no_tolerance,
     ),
     greedy(
         "DATA_RED_RELATIVE",
@@ -128,7 +131,7 @@ REDUCTION_ROWS = (
         field="relative",
         label="a relative tolerance of a case file,",
         run_label="",
-        idle_reason=why_no_tolerance,
+        switch=why_no_tolerance,
     ),
     greedy(
         "MULTILEVEL",
@@ -144,7 +147,7 @@ REDUCTION_ROWS = (
         "What ends a level: its number of nodes, or the decrease of its error.",
         field="criterion",
         run_label="levels by {}",
-        idle_reason=_why_no_levels,
+        switch=_why_no_levels,
     ),
     greedy(
         "LVL_TOL_CRIT",
@@ -152,7 +155,7 @@ REDUCTION_ROWS = (
         real(0.0, 1.0),
         field="level_tolerance",
         run_label="a level ends at {}",
-        idle_reason=_why_no_levels,
+        switch=_why_no_levels,
     ),
     greedy(
         "LVL_SIZE",
@@ -162,7 +165,7 @@ REDUCTION_ROWS = (
         label="A level ends at",
         form="more",
         tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        idle_reason=_why_no_levels,
+        switch=_why_no_levels,
     ),
     Key(
         "DOUBLE_EDGE",
@@ -321,6 +324,7 @@ METHOD_ROWS = (
         "than this part.",
         real(0.0, 1.0),
         run_label="gain {}",
+        switch=lambda case: "STEPS is a number" if case.steps else "",
     ),
     replace(
         _setting(
@@ -395,7 +399,7 @@ METHOD_ROWS = (
         tip="How far from walls nodes go with them, in the mesh's length unit. Automatic: a "
         "fiftieth of the wall's extent, or the thickness of its boundary layer if that is less.",
         run_label="to {}",
-        idle_reason=lambda case: "layers are off" if case.layers == "no" else "",
+        switch=lambda case: "layers are off" if case.layers == "no" else "",
         method="rbf",
     ),
     _setting(
@@ -416,7 +420,7 @@ METHOD_ROWS = (
         form="more",
         tip="The quality below which valid cells are mended, too.",
         run_label="repair below {}",
-        idle_reason=_why_no_repair,
+        switch=_why_no_repair,
     ),
     _setting(
         "REPAIR_STEPS",
@@ -427,7 +431,7 @@ METHOD_ROWS = (
         tip="Whether cells are mended after each step, so that the next one starts from a better "
         "mesh, or only after the last.",
         run_label="repair of each step",
-        idle_reason=_why_no_repair,
+        switch=_why_no_repair,
     ),
     _setting(
         "IDW_POWER",

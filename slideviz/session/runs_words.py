@@ -83,7 +83,7 @@ SETTINGS: tuple[Key, ...] = tuple(
 def _setting_words(key: Key, case: Case) -> str:
     """Return a setting in words; "" where it is at its default, or has no effect."""
     value = key.get(case)
-    if value is None or key.kind.write(value) == key.default or key.idle(case):
+    if key.is_default(value) or key.idle(case):
         return ""
     if key.field == "reduction":
         return reduction_words(case)

@@ -3,6 +3,7 @@
 import pytest
 
 from slideviz.case.cfg import describe_keys, set_key
+from slideviz.case.check import idle_settings
 from slideviz.case.key import GROUPS
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
@@ -132,7 +133,11 @@ def test_wrong_values(read, line, words):
 
 
 def test_settings_of_data_reduction_are_checked_even_without_it(read):
-    assert read("DATA_REDUCTION= NO\nGAMMA= 3").reduction is None
+    case = read("DATA_REDUCTION= NO\nGAMMA= 3\nLVL_SIZE= 16\nDATA_RED_TOLERANCE= 2e-3")
+    assert case.reduction is None
+    (said,) = case.warnings
+    assert str(said).endswith("a.cfg: DATA_REDUCTION= NO does not use DATA_RED_TOLERANCE, GAMMA")
+    assert said.level == "note"
     assert read("GAMMA= 3\nLVL_SIZE= 4\nDATA_REDUCTION= YES").reduction == Reduction(
         gamma=3.0, level_size=4
     )
@@ -340,6 +345,9 @@ def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
         assert KEYS[name].kind.value_label(text) == called
 
 
+AUTO = "DATA_REDUCTION= AUTO"
+
+
 @pytest.mark.parametrize(
     ("name", "case", "reason"),
     [
@@ -349,7 +357,7 @@ def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
         ("GAMMA", Case(method="elastic"), "linear elasticity does not use it"),
         ("GAMMA", Case(reduction=None), "data reduction is off"),
         ("GAMMA", Case(), ""),
-        ("DATA_RED_TOLERANCE", Case(), "it is automatic"),
+        ("DATA_RED_TOLERANCE", Case(), f"{AUTO} finds the tolerance; YES uses this one"),
         ("DATA_RED_TOLERANCE", Case(reduction=Reduction()), ""),
         ("LVL_SIZE", Case(reduction=Reduction()), "there are no levels"),
         ("LVL_SIZE", Case(reduction=Reduction(multilevel=True)), ""),
@@ -360,3 +368,18 @@ def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
 )
 def test_a_key_says_why_it_does_nothing_in_a_case(name, case, reason):
     assert KEYS[name].idle(case) == reason
+
+
+@pytest.mark.parametrize("name", [key.name for key in KEYS.values() if key.switch(Case())])
+def test_a_setting_whose_switch_is_off_is_told(name):
+    key = KEYS[name]
+    value = {"whole": 7, "real": 0.375, "switch": True}.get(key.kind.entry)
+    if key.kind.entry == "choice":
+        value = next(k for k in key.kind.words if key.kind.write(k) != key.default)
+    if name in ("FFD_DEGREE", "FFD_BSPLINE_ORDER", "FFD_AXIS"):
+        value = ((3, 3, 0),) if name == "FFD_DEGREE" else (3, 2, 4)
+    case = key.put(Case(), value)
+    (said,) = idle_settings(case)
+    assert str(said).startswith(name)
+    assert key.switch(case) in str(said)
+    assert said.level == "note"

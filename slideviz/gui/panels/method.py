@@ -33,7 +33,7 @@ from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes
 from slideviz.session.motions import largest_prescribed, pair_text, support_key, support_of
 from slideviz.session.opening import suggested_reduction
-from slideviz.session.run_messages import Requirement, tolerance_warning
+from slideviz.session.run_messages import Requirement, tolerance_warning, with_field_labels
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
@@ -133,8 +133,8 @@ class KeyForm(QFormLayout):
                 field.show_value(key.get(spare) if value is None else value)
             why_not = key.idle(case) or reasons.get(key.field, "")
             field.setEnabled(not why_not)
-            tip = key.tip or key.meaning
-            _set_tip(field, f"Not available: {why_not}." if why_not else tip)
+            why_not = with_field_labels(f"Not available: {why_not}.") if why_not else ""
+            _set_tip(field, why_not or key.tip or key.meaning)
 
 
 def _set_tip(field: Field, text: str) -> None:
