@@ -7,7 +7,6 @@ import pytest
 
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
-from slideviz.cli.run_outcome import advice_for
 from slideviz.errors import Doubt, Message
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
@@ -24,6 +23,7 @@ from slideviz.session.run_messages import (
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import deform
 from slideviz.solver.remedies import beyond_pitch
+from tests.advice import advice_for
 from tests.builders import sector
 
 

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.case.moving_nodes import displacements
 from slideviz.cli import run
-from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.zones import join_zones
 from slideviz.rbf.rims import Bodies, side_weights
 from slideviz.session.motions import Ghosts
@@ -24,6 +23,7 @@ from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.streaming.run import stream
 from tests import builders
+from tests.advice import advice_for
 from tests.design.test_deformer_derivatives import check
 
 LEFT = r"has left (\w+) by ([-\d.e]+)(?:;|,)"

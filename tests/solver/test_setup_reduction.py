@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.samples.table import sample
@@ -15,6 +14,7 @@ from slideviz.solver.deform import Step
 from slideviz.solver.prepare import prepare
 from slideviz.streaming.run import stream
 from tests import builders
+from tests.advice import advice_for
 
 
 @pytest.fixture(scope="module")
