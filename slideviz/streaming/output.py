@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 
+from slideviz.errors import MeshError
 from slideviz.formats.binary_copy import HEAD
 from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.quality import Quality
@@ -31,8 +34,7 @@ from slideviz.streaming.quality import (
 )
 from slideviz.streaming.source import FileSource, PointTable, ZoneSource
 from slideviz.streaming.stream_input import StreamInput, patched_text
-from slideviz.streaming.target_file import TargetFile, copying
-from slideviz.system.atomic import atomic_write
+from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SerialPool
 from slideviz.system.threads import Tick
 from slideviz.terms import SkewMetric
@@ -42,6 +44,7 @@ FEWEST = 1 << 16  # fewest nodes or cells of a part, but for the last
 PARTS = 1024
 """Parts of a file, within the two limits above: enough for many ranks."""
 Part = tuple[int, int]  # a range of nodes or cells: the first, and the one after the last
+_PIECE = 1 << 26  # most bytes that are copied in one task
 T = TypeVar("T")
 
 
@@ -56,50 +59,48 @@ class Output:
         stack: ExitStack,
         mesh_input: StreamInput,
         metric: SkewMetric,
-        output: Path,
-        target: TargetFile,
+        file: BinaryIO,
         timer: PhaseTimer,
         ranks: SerialPool,
         *,
         is_text: bool,
-        replaces: Path | None,
     ) -> None:
         self._stack = stack
         self._input = mesh_input
-        self._path = output
+        self._file = file
         self._timer = timer
         self._ranks = ranks
         self._is_text = is_text
-        self._replaces = replaces
         every = FileSource.open(stack, (mesh_input.path, mesh_input.zone)).zones
         self.zones = tuple(replace(one, first_cell=0, first_point=0) for one in every)
         """The zones of the undeformed mesh, each with numbers of its own."""
         self._cells = [slice(one.first_cell, one.first_cell + one.n_cells) for one in every]
-        self._target = target
+        self._path = Path(file.name)
+        """The file for the deformed points: the new one, or a temporary one beside a text."""
         if is_text:
-            os.ftruncate(target.file.fileno(), mesh_input.path.stat().st_size)
+            self._path = stack.enter_context(draft(self._path.parent))
+            with self._path.open("xb") as points:
+                points.truncate(mesh_input.path.stat().st_size)
             self._ready: Callable[[Tick], None] = lambda _: None
         else:
-            self._ready = stack.enter_context(copying(mesh_input.path, target.path, ranks))
-        self._is_ready = False
+            self._ready = stack.enter_context(copying(mesh_input.path, self._path, ranks))
         self._is_oriented: set[int] = set()
         self._metric = metric
         self._collectors: list[QualityCollector] = []
 
-    def _opened(self) -> TargetFile:
+    @cached_property
+    def _moved(self) -> Path:
         """Return the file for the deformed points when it can be written; of a text only points."""
-        if not self._is_ready:
-            with self._timer.phase("write") as tick:
-                self._ready(tick)
-            self._is_ready = True
-        return self._target
+        with self._timer.phase("write") as tick:
+            self._ready(tick)
+        return self._path
 
     def displace(self, zone: int, displacer: InteriorDisplacer | None) -> None:
         """Write all points of a zone after the last step; without ``displacer`` the undeformed."""
-        target = self._opened()
+        moved = self._moved
         source = self.zones[zone]
         # Ranks must see what others write, and none write a page back with old bytes of others.
-        arguments = *source.undeformed, target.path, displacer, self._ranks.size > 1
+        arguments = *source.undeformed, moved, displacer, self._ranks.size > 1
         todo = parts(source.n_points)
         with (
             self._timer.phase("evaluate") as tick,
@@ -116,15 +117,15 @@ class Output:
         With ``displacer`` it says how far each of its steps may go.
         Raises MeshError if cells are numbered in both directions, and some are folded.
         """
-        target = self._opened()
+        moved = self._moved
         source = self.zones[zone]
         count = self._cells[-1].stop
         if not self._collectors:
-            arguments = self._stack, self._path.parent, count, self._metric
+            arguments = self._stack, moved.parent, count, self._metric
             self._collectors = [QualityCollector(*arguments) for _ in range(2)]
         collector = RunCollector(*(one.of_cells(self._cells[zone]) for one in self._collectors))
         todo = parts(source.n_cells)
-        workers = *source.undeformed, target.path, self._metric, listed, displacer
+        workers = *source.undeformed, moved, self._metric, listed, displacer
         with (
             self._timer.phase("quality") as tick,
             self._ranks.sharing(cell_measurer, *workers) as do,
@@ -150,33 +151,36 @@ class Output:
 
         Its arguments are the zone, the descriptor of that file, and a tick.
         """
-        target = self._opened()
-        with self._timer.phase(phase) as tick, ExitStack() as stack:
-            source = FileSource.open(stack, self.zones[zone].undeformed, moved=target.path)
-            return work(source.zones[0], target.file.fileno(), tick)
+        moved = self._moved
+        with (
+            self._timer.phase(phase) as tick,
+            ExitStack() as stack,
+            open_temporary(moved) as file,
+        ):
+            source = FileSource.open(stack, self.zones[zone].undeformed, moved=moved)
+            return work(source.zones[0], file.fileno(), tick)
 
     def finish(self, boxes: Sequence[bytes | None]) -> None:
         """Complete the output; a text gets ``boxes`` of each zone, None: as they were."""
-        target = self._opened()
+        path = self._moved
         if not self._is_text:
             with self._input.path.open("rb") as file:
-                target.place(file.read(HEAD))
+                self._file.write(file.read(HEAD))
             return
         written = 0
         # One object, whose lock keeps threads from reading the points of two zones at once.
-        there = self.zones[0].file.of(target.file)
+        there = self.zones[0].file.of(self._stack.enter_context(path.open("rb")))
         moved = [replace(z, points=PointTable(there, z.place), base=z.points) for z in self.zones]
         if self._input.texts:
             blocks = patched_text(self._input.texts, moved, boxes)
         else:
-            blocks = text_of_binary(moved, Path(os.path.realpath(self._path)).parent)
+            blocks = text_of_binary(moved, path.parent)
         size = self._input.text_size([zone.place for zone in self.zones])
         with self._timer.phase("write") as tick:
-            with atomic_write(self._path, replaces=self._replaces) as file:
-                for block in blocks:
-                    file.write(block)
-                    written += len(block)
-                    tick(min(1.0, written / size))
+            for block in blocks:
+                self._file.write(block)
+                written += len(block)
+                tick(min(1.0, written / size))
             tick(1.0)
 
 
@@ -231,3 +235,80 @@ def cell_measurer(
         yield lambda part: MeasuredBlock.of(
             source.between(part[0], part[1] - part[0]), metric, listed, displacer
         )
+
+
+def copying(
+    source: Path, ours: Path, ranks: SerialPool
+) -> AbstractContextManager[Callable[[Tick], None]]:
+    """Return a context with a function that waits until a mesh is copied, but for its head.
+
+    ``source`` and ``ours``: the file to copy from, and the existing one to copy to.
+    ``ranks``: the processes that copy.
+    """
+    size = source.stat().st_size
+    ends = [*range(_PIECE, size, _PIECE), size]
+    tasks = list(zip([HEAD, *ends[:-1]], ends, strict=True))
+    way = _beside if ranks.size == 1 else _together
+    return way((source, ours), tasks, ranks)
+
+
+@contextmanager
+def _together(
+    files: tuple[Path, Path], tasks: list[Part], ranks: SerialPool
+) -> Iterator[Callable[[Tick], None]]:
+    """Context with a function in which all ranks do the ``tasks``, by `_copying`."""
+
+    def ready(tick: Tick) -> None:
+        with ranks.sharing(_copying, *files) as do:
+            for (_, end), _ in zip(tasks, do(tasks), strict=True):
+                tick(end / tasks[-1][1])
+
+    yield ready
+
+
+@contextmanager
+def _beside(
+    files: tuple[Path, Path], tasks: list[Part], _: SerialPool
+) -> Iterator[Callable[[Tick], None]]:
+    """Context with a function that waits for a thread's ``tasks``; its end stops these early."""
+    with _copying(*files) as copy, ThreadPoolExecutor(1, "slideviz-copy") as pool:
+        futures = [pool.submit(copy, task) for task in tasks]
+
+        def ready(tick: Tick) -> None:
+            for done, future in enumerate(futures):
+                while not future.done():
+                    tick(done / len(futures))
+                    wait([future], 0.05)
+                future.result()
+            tick(1.0)
+
+        try:
+            yield ready
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _copying(source: Path, ours: Path) -> Iterator[Callable[[Part], None]]:
+    """Context with a function that copies a piece of a file, onto the disk, to the same place."""
+    with source.open("rb") as given, open_temporary(ours) as file:
+
+        def copy(task: Part) -> None:
+            at, end = task
+            while at < end:
+                at += _copied(given, file, at, end - at)
+            os.fsync(file.fileno())
+
+        yield copy
+
+
+def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
+    """Copy up to ``count`` bytes at ``at``, in the kernel if possible; return how many."""
+    with suppress(OSError, AttributeError):
+        moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
+        if moved:
+            return moved
+    block = os.pread(given.fileno(), count, at)
+    if not block:
+        raise MeshError(f"{given.name}: became shorter while it was read; run it again")
+    return os.pwrite(file.fileno(), block, at)

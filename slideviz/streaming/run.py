@@ -37,7 +37,7 @@ from slideviz.streaming.quality import RunCollector, folded_steps
 from slideviz.streaming.skin import without_cells
 from slideviz.streaming.stream_input import open_for_run, require_su2
 from slideviz.streaming.streamed_repair import mend_file
-from slideviz.streaming.target_file import target_file
+from slideviz.system.atomic import atomic_write
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
 from slideviz.terms import FileFormat
@@ -161,7 +161,7 @@ def stream(
     remaining = RemainingTime(report, *phases)
     timer = step_timer(remaining, total, total)
     with ExitStack() as stack:
-        target = stack.enter_context(target_file(output, replaces))
+        file = stack.enter_context(atomic_write(output, replaces=replaces))
         with timer.phase("read") as tick:
             mesh_input = stack.enter_context(
                 open_for_run(
@@ -180,12 +180,10 @@ def stream(
             stack,
             mesh_input,
             case.quality_metric,
-            output,
-            target,
+            file,
             timer,
             ranks,
             is_text=is_text,
-            replaces=replaces,
         )
 
         def read() -> Mesh:

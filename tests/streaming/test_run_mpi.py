@@ -23,6 +23,7 @@ from slideviz.samples.table import write_sample
 from slideviz.streaming import output, skin
 from slideviz.streaming.run import stream
 from slideviz.system import ranks, threads
+from slideviz.system.cleanup import PREFIX
 from tests.streaming.test_run import made
 
 MPI = shutil.which("mpirun") and importlib.util.find_spec("mpi4py")
@@ -374,7 +375,7 @@ def test_killing_ranks_at_random_moments_leaves_no_half_mesh(square, alone):
             os.kill(int(random.choice(children)), 9)
         done(process)
         assert (square / "out.su2b").read_bytes() in (b"older", reference)
-        for file in square.glob(".*.partial"):
+        for file in square.glob(f"{PREFIX}*"):
             assert file.read_bytes()[:4] not in MAGIC
     assert done(started(square, 2, *WORDS))[0] == 0
     assert results(square) == alone
