@@ -120,15 +120,16 @@ def _counted(text: Text) -> IntArray:
 
 def write_layouts(
     layouts: Sequence[BinaryLayout], path: Path, progress: Tick, ranks: SerialPool = SERIAL
-) -> bytes:
-    """Write the binary form of a text into an existing file of its size, but for the file's head.
+) -> None:
+    """Write the binary form of a text into a temporary file, which is made if there is none.
 
-    Returns the head (``HEAD`` bytes), which the caller writes. Raises MeshError if the text has a
-    mistake; the message has its line.
+    Its head comes last. Raises MeshError if the text has a mistake; the message has its line.
     """
-    for layout, share in zip(layouts, equal_shares(progress, len(layouts)), strict=True):
-        _write_layout(layout, path, share, ranks)
-    return np.array([layouts[0].conn.itemsize, len(layouts)], "<i4").tobytes()
+    with open_temporary(path, new=True) as file:
+        file.truncate(layouts[-1].place.end)
+        for layout, share in zip(layouts, equal_shares(progress, len(layouts)), strict=True):
+            _write_layout(layout, path, share, ranks)
+        file.write(np.array([layouts[0].conn.itemsize, len(layouts)], "<i4").tobytes())
 
 
 def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool) -> None:

@@ -142,8 +142,7 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     warn(sentence_of_lost(target, printable(source.name), lost_of_texts(texts), alone=alone))
     require_disk_space(target, target, layouts[-1].place.end)
     with atomic_write(target) as file:
-        os.truncate(file.fileno(), layouts[-1].place.end)
-        file.write(write_layouts(layouts, Path(file.name), progress_share(tick, 0.1)))
+        write_layouts(layouts, Path(file.name), progress_share(tick, 0.1))
     tick(1.0)
 
 

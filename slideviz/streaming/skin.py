@@ -277,68 +277,54 @@ def _cell_error(source: BinaryFile, place: ZonePlace, element: int, message: str
     return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
 
 
-Outer = dict[tuple[int, str], tuple[int, FloatArray]]
-"""Number and coordinates (d,) of outermost points, by axis (0 to 2) and side ("low", "high")."""
+PointBlock = tuple[FloatArray, IntArray, FloatArray]
+"""Points (k, d) of a block of the file; numbers (o,), ascending, and points (o, d) of those of the
+block with the lowest and highest coordinates."""
 
 
 @contextmanager
 def _point_reader(
     path: Path, zone: int
-) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
+) -> Iterator[Callable[[tuple[int, IntArray]], PointBlock]]:
     """Context with a function that reads one block of points.
 
-    Its argument is the number of the block's first point, and ascending nodes (k,) in the block. It
-    returns their points (k, d) and the outermost points of the block.
+    Its argument is the number of the block's first point, and ascending nodes (k,) in the block.
     """
     with open_zones(path, zone) as (source, (place,)):
 
-        def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
+        def read(task: tuple[int, IntArray]) -> PointBlock:
             first, nodes = task
             block = point_block(source, place, first, BLOCK)
-            outer: Outer = {}
-            for axis in range(place.dim):
-                low = int(block[:, axis].argmin())
-                high = int(block[:, axis].argmax())
-                outer[axis, "low"] = first + low, block[low].copy()
-                outer[axis, "high"] = first + high, block[high].copy()
-            return block[nodes - first], outer
+            outer = np.unique([block.argmin(axis=0), block.argmax(axis=0)])
+            return block[nodes - first], first + outer, block[outer]
 
         yield read
 
 
 def _join_points(
-    source: BinaryFile,
-    place: ZonePlace,
-    numbers: IntArray,
-    found: Iterator[tuple[FloatArray, Outer]],
+    source: BinaryFile, place: ZonePlace, numbers: IntArray, found: Iterator[PointBlock]
 ) -> tuple[IntArray, FloatArray]:
     """Return ``numbers`` with those of the outermost points of all, sorted, and the points (k, d).
 
     ``found`` are the results of `_point_reader` for the blocks in order.
     """
-    blocks: list[FloatArray] = [np.empty((0, place.dim))]
-    outer: Outer = {}
-    for block, ends in found:
-        blocks.append(block)
-        for (axis, side), (node, point) in ends.items():
-            old = outer.get((axis, side))
-            sign = -1.0 if side == "low" else 1.0
-            if old is None or sign * point[axis] > sign * old[1][axis]:
-                outer[axis, side] = node, point
-    for (axis, _), (node, point) in outer.items():
-        if abs(point[axis]) > LARGEST:
+    if not place.n_points:
+        return numbers, np.empty((0, place.dim))
+    points, nodes, places = map(np.concatenate, zip(*found, strict=True))
+    # Of several at one place the first, as in a block.
+    outermost = np.stack([places.argmin(axis=0), places.argmax(axis=0)], axis=1)
+    for (axis, _), k in np.ndenumerate(outermost):
+        if abs(places[k, axis]) > LARGEST:
             raise source.error(
-                place.points + node * source.point(place.dim).itemsize + 8 * axis,
-                f"point {node} is at {tuple(point.tolist())}; nothing can be computed with "
+                place.points + int(nodes[k]) * source.point(place.dim).itemsize + 8 * axis,
+                f"point {nodes[k]} is at {tuple(places[k].tolist())}; nothing can be computed with "
                 f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh",
             )
-    more = dict(outer.values())
-    few = np.unique(np.array(list(more), np.int64))
-    extra = few[np.searchsorted(numbers, few) == np.searchsorted(numbers, few, "right")]
-    every = np.concatenate([numbers, extra])
-    blocks.append(np.array([more[n] for n in extra]).reshape(-1, place.dim))
+    few = np.unique(outermost)
+    few = few[~np.isin(nodes[few], numbers)]
+    every = np.concatenate([numbers, nodes[few]])
     order = np.argsort(every, kind="stable")  # nearly in order already
-    return every[order], np.concatenate(blocks)[order]
+    return every[order], np.concatenate([points, places[few]])[order]
 
 
 def _renumbered(cells: Cells, numbers: IntArray) -> Cells:

@@ -21,7 +21,6 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
 from slideviz.formats.su2b.write import write_at
-from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, frozen_array
 from slideviz.mesh.quality import Quality
 from slideviz.sections.cut import crossed_cells
@@ -267,21 +266,15 @@ class ZoneSource:
         base = None if self.base is None else mesh.with_points(self.base.at(nodes))
         return CellBlock(block.ids + self.first_cell, nodes + self.first_point, mesh, base)
 
-    def cells(self, ids: IntArray) -> CellBlock:
-        """Return the cells ``ids`` (k,) of the zone, in that order."""
-        found = [self.elements_at(int(cell), 1) for cell in ids]
-        if any(int(one.ids[0]) != cell for one, cell in zip(found, ids, strict=True)):
-            # Cells are not in order in the file: read all of it.
-            by_id: dict[int, ElementBlock] = {}
-            for block in self.elements():
-                ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
-                for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
-                    nodes = block.nodes[ends[k] : ends[k + 1]].copy()
-                    by_id[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
-            found = [by_id[int(cell)] for cell in ids]
-        types = np.concatenate([one.types for one in found])
-        flat = np.concatenate([one.nodes for one in found])
-        return self.with_points(ElementBlock(0, types, flat, ids))
+    def cells(self, ids: IntArray) -> Iterator[CellBlock]:
+        """Yield blocks with the cells ``ids`` (k,) of the zone, in any order."""
+        blocks: Iterable[ElementBlock] = [self.elements_at(cell, 1) for cell in ids.tolist()]
+        if any(one.ids[0] != cell for one, cell in zip(blocks, ids, strict=True)):
+            blocks = self.elements()  # cells are not in order in the file: read all of it
+        for block in blocks:
+            which = np.flatnonzero(np.isin(block.ids, ids))
+            if len(which):
+                yield self.with_points(block).take(which)
 
 
 @dataclass(frozen=True, eq=False)
@@ -356,7 +349,7 @@ class FileSource:
         """Return the cells ``ids`` (k,), in that order."""
         shifted = [(zone, ids - zone.first_cell) for zone in self.zones]
         mine = [(zone, some[(some >= 0) & (some < zone.n_cells)]) for zone, some in shifted]
-        block = join_blocks(zone.cells(some) for zone, some in mine if len(some))
+        block = join_blocks(part for zone, some in mine for part in zone.cells(some))
         return block.take(np.searchsorted(block.ids, ids))
 
 

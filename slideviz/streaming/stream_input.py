@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.binary_copy import BinaryLayout, binary_layouts, write_layouts
+from slideviz.formats.binary_copy import binary_layouts, write_layouts
 from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.text import Text, find_texts
@@ -103,7 +103,7 @@ def open_read_only(
         try:
             open_temporary(copy, new=True).close()
             require_disk_space(copy, path, layouts[-1].place.end)
-            _write_copy(layouts, copy, tick)
+            write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED))
         except OSError as problem:
             raise MeshError(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
@@ -111,14 +111,6 @@ def open_read_only(
             ) from problem
         with naming_text(texts[0], copy):
             yield StreamInput(copy, None, texts)
-
-
-def _write_copy(
-    layouts: Sequence[BinaryLayout], copy: Path, tick: Tick, ranks: SerialPool = SERIAL
-) -> None:
-    with open_temporary(copy, new=True) as file:
-        file.truncate(layouts[-1].place.end)
-        file.write(write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED), ranks))
 
 
 @contextmanager
@@ -169,7 +161,7 @@ def open_for_run(
     needed = bytes_of_run(places, width, result, size, is_text=is_text, later=later)
     require_disk_space(output, output, needed)
     with draft(Path(os.path.realpath(output)).parent) as copy:
-        _write_copy(layouts, copy, tick, ranks)
+        write_layouts(layouts, copy, progress_share(tick, SCANNED, COPIED), ranks)
         with naming_text(texts[0], copy):
             yield StreamInput(copy, None, texts)
 
