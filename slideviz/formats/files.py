@@ -85,7 +85,20 @@ def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
         "OPENBLAS_NUM_THREADS": "1",
     }
     answer = bytearray()
-    with _started(path, command, environment) as reader, killed_at_end(reader):
+    try:
+        reader = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+        )
+    except OSError as problem:
+        raise path_error(
+            path,
+            f"cannot be read: its reader does not start: {problem.strerror}; close other programs",
+        ) from problem
+    with reader, killed_at_end(reader):
         assert reader.stdout is not None
         while True:
             spent = time.monotonic() - begun
@@ -100,25 +113,6 @@ def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
     mesh = _unpacked(path, bytes(answer), code)
     progress(1.0)
     return mesh
-
-
-def _started(
-    path: Path, command: list[str], environment: dict[str, str]
-) -> subprocess.Popen[bytes]:
-    """Return the process of a command, its output a pipe; raise MeshError if it does not start."""
-    try:
-        return subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-        )
-    except OSError as problem:
-        raise path_error(
-            path,
-            f"cannot be read: its reader does not start: {problem.strerror}; close other programs",
-        ) from problem
 
 
 def _limits(size: int) -> tuple[int, int]:
@@ -159,10 +153,14 @@ def main() -> None:
     # Whatever prints must not get into the answer.
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        # Late: Windows has none.
+        import resource
+
         seconds = int(sys.argv[2])
         memory = int(sys.argv[3])
         path = Path(sys.argv[4])
-        _limit(seconds, memory)
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         try:
             mesh = replace(MESHIO, reader=sys.argv[5]).function("reader")(path)
         except MeshError as problem:
@@ -182,15 +180,6 @@ def main() -> None:
 
 def _bare(cells: Cells) -> Cells:
     return Cells(cells.types, cells.offsets, cells.connectivity)
-
-
-def _limit(seconds: int, memory: int) -> None:
-    """Let the system end this process after ``seconds`` of CPU time; limit its memory (bytes)."""
-    # Late: Windows has none.
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 
 
 def _die_with(parent: int) -> None:
@@ -290,13 +279,8 @@ def read(
     >>> sv.read("square.su2")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    mesh = _read(_checked_path(path, file_format), zone, progress or (lambda _: None), file_format)
-    check_size(mesh, printable(path))
-    return mesh
-
-
-def _read(path: Path, zone: int | None, tick: Tick, file_format: FileFormat | None) -> Mesh:
-    """Return the mesh of a file, as `read` does, whatever the size of its coordinates."""
+    path = _checked_path(path, file_format)
+    tick = progress or (lambda _: None)
     try:
         row = format_of(path, file_format)
         if not row.zones and zone not in (None, 1):
@@ -307,13 +291,16 @@ def _read(path: Path, zone: int | None, tick: Tick, file_format: FileFormat | No
             raise path_error(
                 path, "is written for ParaView, but not read; use the mesh it is made of"
             )
-        if not row.isolated:
-            return row.function("reader")(path, zone, tick)
-        return read_in_subprocess(path, tick)
+        if row.isolated:
+            mesh = read_in_subprocess(path, tick)
+        else:
+            mesh = row.function("reader")(path, zone, tick)
     except MemoryError as problem:
         raise path_error(
             path, "there is not enough memory to read it; use a machine with more"
         ) from problem
+    check_size(mesh, printable(path))
+    return mesh
 
 
 @check_types

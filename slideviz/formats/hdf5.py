@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
 
     import h5py
     from _typeshed import WriteableBuffer
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken: the given one, or with a number from 2."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return next(one for one in chain([name], numbered) if one not in taken)
 
 
 class Hdf5Draft:

@@ -24,7 +24,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.formats.hdf5 import Hdf5Draft, hdf5_write
+from slideviz.formats.hdf5 import Hdf5Draft, free_name, hdf5_write
 from slideviz.formats.table import WriteOptions
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
@@ -132,12 +132,12 @@ def vtkhdf_series(
         _typed(root, "PartitionedDataSetCollection")
         tree = root.create_group("Assembly", track_order=True)
         blocks = [_add_block(root, tree, _VOLUME, mesh.cells, np.arange(len(mesh.points)))]
-        taken = {_VOLUME}
+        taken = {_VOLUME, "Assembly"}
         if mesh.markers:
             tree = tree.create_group("boundaries", track_order=True)
             taken.add("boundaries")
         for marker in mesh.markers:
-            name = _free(_clean(marker.name), taken)
+            name = free_name(_clean(marker.name), taken)
             taken.add(name)
             blocks.append(_add_block(root, tree, name, marker.cells, marker.nodes))
         series = StepSeries(draft, blocks, is_series)
@@ -196,13 +196,3 @@ def _clean(name: str) -> str:
     """Return a name that HDF5 allows: without ``/``, which is its separator, and not only dots."""
     clean = name.replace("/", "_").replace("\0", "_")
     return clean if clean.strip(".") else f"_{clean}"
-
-
-def _free(name: str, taken: set[str]) -> str:
-    """Return a unique name: with a number added if it is taken or reserved in VTKHDF."""
-    number = 1
-    free = name
-    while free in taken or free == "Assembly":
-        number += 1
-        free = f"{name}_{number}"
-    return free

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from slideviz.mesh.model import Assembly, FloatArray, Mesh, ZoneInterface, frozen_array
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterface, frozen_array
 from slideviz.mesh.nearest import nearest
 
 COINCIDENT = 1e-6  # nodes of two zones nearer than this part of the mesh's extent are in one place
 ROUNDING = 1e-12  # part of the mesh's extent by which nodes of an interface may move unseen
+
+
+def points_of_nodes(
+    blocks: Iterable[tuple[int, FloatArray]], nodes: Mapping[str, IntArray]
+) -> dict[str, FloatArray]:
+    """Return the points (k, d) of the ``nodes`` (k,) of boundaries, by name, all in one pass.
+
+    ``blocks``: all points of a mesh in order: number of the first one, and points (m, d).
+    """
+    found: dict[str, list[FloatArray]] = {name: [] for name in nodes}
+    for first, points in blocks:
+        for name, some in nodes.items():
+            here = slice(*np.searchsorted(some, [first, first + len(points)]))
+            found[name].append(points[some[here] - first])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
 def find_interfaces(

@@ -283,9 +283,7 @@ block with the lowest and highest coordinates."""
 
 
 @contextmanager
-def _point_reader(
-    path: Path, zone: int
-) -> Iterator[Callable[[tuple[int, IntArray]], PointBlock]]:
+def _point_reader(path: Path, zone: int) -> Iterator[Callable[[tuple[int, IntArray]], PointBlock]]:
     """Context with a function that reads one block of points.
 
     Its argument is the number of the block's first point, and ascending nodes (k,) in the block.

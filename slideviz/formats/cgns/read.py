@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import path_error, printable
-from slideviz.formats.cgns.join import JOINED, Interface, Joined, join
+from slideviz.formats.cgns.join import JOINED, Joined, join
 from slideviz.formats.cgns.tree import Node, cgns_file
 from slideviz.formats.cgns.zone import CgnsZone, conditions, facets_of, read_zone, region_of
-from slideviz.formats.hdf5 import hdf5_write
+from slideviz.formats.hdf5 import free_name, hdf5_write
 from slideviz.formats.meshio.bridge import flattened, require_own_folder
 from slideviz.formats.meshio.markers import in_node_sets
 from slideviz.formats.table import WriteOptions
@@ -176,22 +176,13 @@ def _add_open(
         facets = facets.take(~among(facets, known))
         key = one.period or (one.node.name,)
         if len(facets):
-            names.setdefault(key, _free_name(one, [*taken, *names.values()]))
+            names.setdefault(key, free_name(one.node.name, [*taken, *names.values()]))
             groups.setdefault(names[key], []).append(facets)
         if one.why:
             where = f" {names[key]!r}" if len(facets) else ", as the file has it"
             remarks.append(
                 f"{one.node.path} is not joined: {one.why}. Its faces are a boundary{where}."
             )
-
-
-def _free_name(one: Interface, taken: Sequence[str]) -> str:
-    name = one.node.name
-    number = 1
-    while name in taken:
-        number += 1
-        name = f"{one.node.name}_{number}"
-    return name
 
 
 def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:

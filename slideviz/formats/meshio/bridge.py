@@ -131,19 +131,20 @@ _MOST_FILES = 100
 """Most files that are searched for names of further files: two may name each other."""
 
 
-def read_with_meshio(path: Path) -> Mesh:
+def read_with_meshio(path: Path, least: int = 2) -> Mesh:
     """Return the mesh of a file that meshio reads.
 
     Its cells are those of the highest dimension; those of one dimension less are its boundaries,
     with the names of the file. A file without named boundaries gets its outer surface, divided
     at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first. Raises MeshError if
     meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
+    ``least``: the lowest dimension of its cells.
     """
     with meshio_errors(path, "read"):
         require_own_folder(path)
     data = load(path, formats_of(path))
     with meshio_errors(path, "understood"):
-        return _mesh(path, data)
+        return _mesh(path, data, least)
 
 
 def read_surface(path: Path) -> Mesh:
@@ -151,14 +152,10 @@ def read_surface(path: Path) -> Mesh:
 
     Of a file with a volume, it is that mesh with its boundaries. Otherwise as `read_with_meshio`.
     """
-    with meshio_errors(path, "read"):
-        require_own_folder(path)
-    data = load(path, formats_of(path))
-    with meshio_errors(path, "understood"):
-        return _mesh(path, data, least=1)
+    return read_with_meshio(path, least=1)
 
 
-def _mesh(path: Path, data: meshio.Mesh, least: int = 2) -> Mesh:
+def _mesh(path: Path, data: meshio.Mesh, least: int) -> Mesh:
     blocks = [
         _block(path, cells.type, cells.data, index)
         for index, cells in enumerate(data.cells)

@@ -17,6 +17,13 @@ from slideviz.formats.su2.decimal import U10, U48, decimal, ends
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.system.jit_cache import OPTIONS, njit
 
+SIZES = np.zeros(257, np.int64)
+"""Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
+DIMS = np.full(257, -1)  # dimension by element type, likewise; -1 for no type
+for _row in ELEMENTS.values():
+    SIZES[_row.vtk] = _row.n_nodes
+    DIMS[_row.vtk] = _row.dim
+
 
 @njit(inline="always", **OPTIONS)
 def _print_whole(value, out, offset):  # type: ignore[no-untyped-def]
@@ -33,10 +40,10 @@ def _print_whole(value, out, offset):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-def]
+def print_cells(types, nodes, first, out):  # type: ignore[no-untyped-def]
     """Write a row for each element, type, nodes and index, into ``out``; return its length.
 
-    ``types`` (m,), ``offsets`` (m + 1,), ``nodes`` (k,): of the offsets only differences are used.
+    ``types`` (m,), ``nodes`` (k,): those of all elements, one after the other.
     ``first``: the index of the first element; if negative, rows get no index.
     ``out`` (b,) uint8: receives the text.
     """
@@ -44,7 +51,7 @@ def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-d
     k = 0
     for row in range(len(types)):
         offset = _print_whole(np.int64(types[row]), out, offset)
-        for _ in range(offsets[row + 1] - offsets[row]):
+        for _ in range(SIZES[types[row]]):
             out[offset] = 32
             offset = _print_whole(nodes[k], out, offset + 1)
             k += 1
@@ -137,13 +144,6 @@ def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
         offset += 1
     return row, offset
 
-
-SIZES = np.zeros(257, np.int64)
-"""Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
-DIMS = np.full(257, -1)  # dimension by element type, likewise; -1 for no type
-for _row in ELEMENTS.values():
-    SIZES[_row.vtk] = _row.n_nodes
-    DIMS[_row.vtk] = _row.dim
 
 RUN_COLUMNS = 5
 """Columns of a table of runs: first byte, first line, kind, rows, nodes (see `Lines`)."""

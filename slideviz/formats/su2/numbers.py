@@ -17,7 +17,7 @@ from slideviz.formats.su2.loops import cell_block, point_block
 from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.system.threads import Tick, ordered_map
+from slideviz.system.threads import Result, Tick, ordered_map
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 """The element types, for messages."""
@@ -75,9 +75,12 @@ def fill_cells(
         nodes[node : node + len(its)] = its
 
 
-def _each(work: Callable[[Piece], None], rows: Rows, progress: Tick) -> None:
-    for piece, _ in zip(rows, ordered_map(work, rows), strict=True):
+def _each(work: Callable[[Piece], Result], rows: Rows, progress: Tick) -> list[Result]:
+    results = []
+    for piece, result in zip(rows, ordered_map(work, rows), strict=True):
+        results.append(result)
         progress((piece.row + piece.rows) / number_of(rows))
+    return results
 
 
 def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines, int, bytes]:
@@ -165,15 +168,11 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Tick) -> FloatArr
     has its line.
     """
     points = np.empty((number_of(rows), dim))
-    ends = np.empty((len(rows), 2), np.int64)
-    place = {piece.row: k for k, piece in enumerate(rows)}
 
-    def parsed(piece: Piece) -> None:
-        mine = points[piece.row : piece.row + piece.rows]
-        ends[place[piece.row]] = fill_points(lines, piece, mine)
+    def parsed(piece: Piece) -> IntArray:
+        return fill_points(lines, piece, points[piece.row : piece.row + piece.rows])
 
-    _each(parsed, rows, progress)
-    require_all_coordinates(lines, rows, dim, ends)
+    require_all_coordinates(lines, rows, dim, np.array(_each(parsed, rows, progress)))
     points.flags.writeable = False
     return points
 

@@ -34,6 +34,7 @@ from slideviz.formats.su2.lines import (
 )
 from slideviz.formats.su2.loops import RUN_COLUMNS, scan_block
 from slideviz.formats.su2.numbers import fill_points, parse_cells
+from slideviz.mesh.interfaces import points_of_nodes
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.threads import Tick, ordered_map
 
@@ -368,15 +369,15 @@ def _boundaries_of(
         part.name: parse_cells(lines, part.rows, zone.dim - 1, count, progress).nodes
         for part in zone.markers
     }
-    places = {name: np.empty((len(some), zone.dim)) for name, some in nodes.items()}
-    for piece in zone.points:  # not all points of the zone at once
-        points = np.empty((piece.rows, zone.dim))
-        fill_points(lines, piece, points)
-        progress(1.0)
-        for name, some in nodes.items():
-            here = slice(*np.searchsorted(some, [piece.row, piece.row + piece.rows]))
-            places[name][here] = points[some[here] - piece.row]
-    for name, points in places.items():
+
+    def blocks() -> Iterator[tuple[int, FloatArray]]:  # not all points of the zone at once
+        for piece in zone.points:
+            points = np.empty((piece.rows, zone.dim))
+            fill_points(lines, piece, points)
+            progress(1.0)
+            yield piece.row, points
+
+    for name, points in points_of_nodes(blocks(), nodes).items():
         if len(points):
             yield zone.bounds.number, name, points
 

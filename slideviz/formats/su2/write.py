@@ -105,8 +105,12 @@ def _patched(zones: Sequence[Mesh]) -> Iterator[bytes]:
     documents = [zone.origin for zone in zones if isinstance(zone.origin, Document)]
     changes = [
         PointChange(
-            *(read.rows, read.points.__getitem__, zone.points.__getitem__),
-            *(read.unknown, read.zone[1], read.ffd),
+            read.rows,
+            read.points.__getitem__,
+            zone.points.__getitem__,
+            read.unknown,
+            read.zone[1],
+            read.ffd,
         )
         for zone, read in zip(zones, documents, strict=True)
     ]
@@ -227,7 +231,8 @@ def require_text_names(mesh: str, names: Iterable[str]) -> None:
             )
 
 
-CellsOf = Callable[[int, int], Cells]  # a function that returns the cells ``i`` to ``j - 1``
+CellsOf = Callable[[int, int], tuple[NDArray, ...]]
+"""A function that returns types and nodes of the cells ``i`` to ``j - 1``, and perhaps more."""
 PointsOf = Callable[[int, int], FloatArray]
 """A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
 
@@ -239,15 +244,11 @@ def content_blocks(contents: Sequence[ZoneContent], name: str) -> Iterator[bytes
     """
     require_text_names(name, (marker.name for content in contents for marker in content.markers))
 
-    def cells(content: ZoneContent, i: int, j: int) -> Cells:
-        types, nodes, _ = content.cells(i, j)
-        return Cells.from_types(types, nodes)
-
     several = len(contents) > 1
     yield f"NZONE= {len(contents)}\n".encode() if several else b""
     for number, content in enumerate(contents, 1):
         yield f"IZONE= {number}\n".encode() if several else b""
-        made = content.n_cells, partial(cells, content)
+        made = content.n_cells, content.cells
         yield from _zone(content.dim, made, (content.n_points, content.points))
         yield from _markers(content.markers, 0)
 
@@ -259,10 +260,8 @@ def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) ->
     yield from ordered_map(partial(_point_rows, points[1]), _blocks(points[0]))
 
 
-def _some(cells: Cells, i: int, j: int) -> Cells:
-    """Return the cells ``i`` to ``j - 1``, with offsets that begin as in ``cells``, not with 0."""
-    offsets = cells.offsets[i : j + 1]
-    return Cells(cells.types[i:j], offsets, cells.connectivity[offsets[0] : offsets[-1]])
+def _some(cells: Cells, i: int, j: int) -> tuple[NDArray, ...]:
+    return cells.types[i:j], cells.connectivity[slice(*cells.offsets[[i, j]])]
 
 
 def _blocks(count: int) -> list[tuple[int, int]]:
@@ -289,8 +288,6 @@ def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
 
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
-    some = cells(*block)
-    out = np.empty(_NUMBER_BYTES * (len(some.connectivity) + 2 * len(some)), np.uint8)
-    index = block[0] if numbered else -1
-    size = print_cells(some.types, some.offsets, some.connectivity, index, out)
-    return out[:size].tobytes()
+    types, nodes = cells(*block)[:2]
+    out = np.empty(_NUMBER_BYTES * (len(nodes) + 2 * len(types)), np.uint8)
+    return out[: print_cells(types, nodes, block[0] if numbered else -1, out)].tobytes()

@@ -19,7 +19,7 @@ from slideviz.errors import MeshError, printable
 from slideviz.formats.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zones
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
-from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.interfaces import find_interfaces, points_of_nodes
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.zones import join_zones
 from slideviz.system.threads import Tick, equal_shares
@@ -270,20 +270,13 @@ def boundaries_elsewhere(
         if zone.number == place.number:
             continue
         try:
-            nodes = [
-                (marker.name, marker.nodes)
-                for marker in (read_markers(source, zone) if zone.dim == place.dim else ())
-                if len(marker.cells)
-            ]
-            places = [np.empty((len(some), zone.dim)) for _, some in nodes]
-            for first, block in point_blocks(source, zone) if nodes else ():
-                for (_, some), points in zip(nodes, places, strict=True):
-                    here = slice(*np.searchsorted(some, [first, first + len(block)]))
-                    points[here] = block[some[here] - first]
+            markers = read_markers(source, zone) if zone.dim == place.dim else ()
+            nodes = {marker.name: marker.nodes for marker in markers if len(marker.cells)}
+            points = points_of_nodes(point_blocks(source, zone) if nodes else (), nodes)
         except MeshError:  # the zone that is asked for can be right all the same
             continue
-        for (name, _), points in zip(nodes, places, strict=True):
-            yield zone.number, name, points
+        for name, some in points.items():
+            yield zone.number, name, some
 
 
 def point_blocks(
