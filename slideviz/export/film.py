@@ -30,7 +30,7 @@ from slideviz.export.titles import (
 )
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
-from slideviz.session.pieces import CheckCancelled, InThread, not_cancelled, run_inline
+from slideviz.session.pieces import CheckCancelled, InThread, run_inline
 from slideviz.session.state import Session, StepFrame, planned_steps
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
@@ -294,7 +294,7 @@ def require_pair_width(size: tuple[int, int]) -> None:
 
 
 def film_frame_at(
-    frames: Sequence[StepFrame], position: float, going_on: CheckCancelled = not_cancelled
+    frames: Sequence[StepFrame], position: float, going_on: CheckCancelled
 ) -> FilmFrame:
     """Return the frame at a position in a run: a step, or a mesh between two steps.
 

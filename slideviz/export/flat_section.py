@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,32 +34,18 @@ from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity
 
 
-@dataclass(frozen=True)
-class PageFormat:
-    """The format of a section's picture."""
-
-    size: tuple[int, int]  # (int, int): width and maximum height in pixels
-    dpi: float | None = None  # pixels per inch of a picture for paper
-    title: bool = True
-    axes: bool = True  # `title`, `axes`: whether it has a title, and numbers along its axes
-
-    @classmethod
-    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> PageFormat:
-        """Return the format of a picture of a width and maximum height in centimetres."""
-        return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
-
-
 def save_section(
     path: Path,
     session: Session,
     section: Section,
-    paper: PageFormat,
+    paper: SectionStyle,
     report: Report,
     stopped: Stopped,
 ) -> Path:
     """Write the picture of a section as the view shows it: step, colors, neighbouring passages.
 
-    With a comparison, it shows both views. Return the path. Raises CaseError if no mesh is open,
+    With a comparison, it shows both views. ``paper``: its size, and whether it has title and axes.
+    Return the path. Raises CaseError if no mesh is open,
     the section cuts no cell that is shown, the name has a suffix other than a picture's, or the
     file cannot be written.
     """
@@ -82,8 +68,7 @@ def save_section(
     raise_if_cancelled(stopped)
     report(JobProgress(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
-    style = SectionStyle(paper.size, True, "edges" in session.view.drawn, name=name, dpi=paper.dpi)
-    style = replace(style, title=paper.title, axes=paper.axes)
+    style = replace(paper, trimmed=True, edges="edges" in session.view.drawn, name=name)
     if len(shown) == 1:
         shown = [replace(shown[0], name=frame_words(session), place="")]
     section_picture(shown, section, path, style)

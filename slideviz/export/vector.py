@@ -128,10 +128,6 @@ class _Paint:
         values = None if self.values is None else self.values[cells.cells]
         draw_cells(axes, cells, values, self.colors, edges=self.edge, **style)
 
-    def lines(self, cut: Polygons) -> dict[str, Any]:
-        """Return the color arguments of a LineCollection of the lines that a section cuts."""
-        return self.at(cut.cells)
-
     def at(self, cells: IntArray) -> dict[str, Any]:
         """Return the color arguments of a LineCollection with a line for each of cells (k,)."""
         if self.values is None:
@@ -167,7 +163,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
         if len(cut):
             ends = list(cut.points[cut.connectivity, :2].reshape(-1, 2, 2))
             style: dict[str, Any]
-            for kind, colors in ((RIM, {"colors": PAPER.text}), (BAND, paint.lines(cut))):
+            for kind, colors in ((RIM, {"colors": PAPER.text}), (BAND, paint.at(cut.cells))):
                 style = {"linewidths": WIDTHS[kind] * pixel_pt, "zorder": _ORDER[kind]}
                 axes.add_collection(LineCollection(ends, **style, **colors), autolim=False)
             if section.whole_cells:

@@ -8,16 +8,58 @@ a unit, 0 to 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from slideviz.plots.series import GreedyRun, Outcome, StepRun
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class StepRun:
+    """Quality after each step of a run."""
+
+    label: str
+    steps: IntArray  # (k,): numbers of the steps; 0 is the undeformed mesh
+    minimum: FloatArray  # (k,)
+    mean: FloatArray  # (k,)
+    series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+
+
+@dataclass(frozen=True, eq=False)
+class GreedyRun:
+    """The convergence of a greedy selection, cycle by cycle."""
+
+    label: str
+    control_nodes: IntArray  # (c,)
+    error: FloatArray
+    """(c,): largest error of the boundary after each cycle, in the mesh's length unit."""
+    level: IntArray  # (c,): number of the level of each cycle
+    tolerance: float | None = None
+    series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of one run."""
+
+    label: str  # the combination of methods; runs of one label are joined by a line
+    steps: int
+    minimum: float
+    mean: float
+    inverted: int = 0  # inverted cells
+    seconds: float = float("nan")  # processor time of the deformation
+    series: int | None = None
+    """Series number of its label; by default the index of the label among all labels."""
+
 
 What = Literal["minimum", "mean", "seconds"]
 
@@ -55,14 +97,12 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
     add_legend(axes, style)
 
 
-def convergence(
-    axes: Axes, runs: Sequence[GreedyRun], unit: str = "mesh units", style: Style = PRINT
-) -> None:
+def convergence(axes: Axes, runs: Sequence[GreedyRun], style: Style = PRINT) -> None:
     """Draw the error of greedy selections against control nodes, on a logarithmic axis.
 
     Each tolerance is a thin line; markers show where levels begin (about ten if there are many).
     """
-    style_axes(axes, style, "control nodes [-]", f"largest error [{unit}]")
+    style_axes(axes, style, "control nodes [-]", "largest error [mesh units]")
     axes.set_yscale("log")
     tolerances: set[float] = set()
     for index, run in enumerate(runs):

@@ -16,9 +16,7 @@ Measured = tuple[str, int, Sequence[Gap]]
 ZONE_DASHES = ("-", "--", ":", "-.")
 
 
-def draw_gaps(
-    figure: Figure, measured: Sequence[Measured], style: Style = PRINT, unit: str = "mesh units"
-) -> None:
+def draw_gaps(figure: Figure, measured: Sequence[Measured], style: Style = PRINT) -> None:
     """Draw the smallest distances by place, in a plot for each; without places as points.
 
     Span is the vertical axis, and the chord is the horizontal one. All meshes have the same gaps.
@@ -35,7 +33,7 @@ def draw_gaps(
             if gap.name == name
         ]
         by_span = not any(gap.along == "chord" for _, _, gap in shown)
-        labels = f"{name} [{unit}]", "span [-]" if by_span else "part of the chord [-]"
+        labels = f"{name} [mesh units]", "span [-]" if by_span else "part of the chord [-]"
         style_axes(axes, style, *(labels if by_span else labels[::-1]))
         for label, series, gap in shown:
             look = style.series(series)

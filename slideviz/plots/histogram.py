@@ -7,6 +7,7 @@ dashes, so that they can be told apart over the bars, over each other, and in gr
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +16,7 @@ from matplotlib.legend_handler import HandlerBase
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import NullLocator
 
-from slideviz.mesh.model import FloatArray
-from slideviz.plots.series import Bars, Distribution, Outline, QualityRun
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 
 if TYPE_CHECKING:
@@ -30,17 +30,68 @@ _PALER = 0.45  # part of the background's color mixed into bars, so that lines o
 _SWATCH = 5  # number of colors that represent the bars in a legend
 
 
+@dataclass(frozen=True, eq=False)
+class QualityRun:
+    """Qualities of the cells of one mesh."""
+
+    label: str
+    values: FloatArray  # (m,): 0 to 1
+    inverted: np.ndarray | None = None  # (m,): cells to count apart, whatever their value
+    series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distribution:
+    """The number of cells of one mesh in intervals of a value."""
+
+    counts: IntArray  # (k,)
+    edges: FloatArray
+    """(k + 1,): limits of the intervals; values outside are counted in the first or the last."""
+    inverted: int  # number of inverted cells, which are in no interval
+
+    @classmethod
+    def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
+        """Return the distribution of values (m,) in equal intervals; NaN is an inverted cell."""
+        right = values[np.isfinite(values)]
+        low = edges[0]
+        high = edges[-1]
+        count = len(edges) - 1
+        places = np.clip((right - low) * (count / (high - low)), 0, count - 1).astype(np.int64)
+        return cls(np.bincount(places, minlength=count), edges, len(values) - len(right))
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """A distribution drawn as bars: its label, and a color per bar (or a list of one for all)."""
+
+    label: str
+    distribution: Distribution
+    colors: Sequence[Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A distribution drawn as an outline, with its label and series number.
+
+    ``series`` None is the undeformed mesh, drawn as a thin dotted line.
+    """
+
+    label: str
+    distribution: Distribution
+    series: int | None
+
+
 def histogram(
     axes: Axes,
     runs: Sequence[QualityRun],
-    metric: str = "size-skew",
     edges: FloatArray | None = None,
     log: bool = False,
     style: Style = PRINT,
 ) -> None:
-    """Draw the number of cells against their quality, an outline for each run.
+    """Draw the number of cells against their size-skew, an outline for each run.
 
-    ``metric``: name of the value, for the axis. ``edges`` (k + 1,) float64, optional: limits of
+    ``edges`` (k + 1,) float64, optional: limits of
     equal intervals; by default 25 intervals from 0 to 1. ``log``: whether the counts' axis is
     logarithmic, which shows a few bad cells among many.
     """
@@ -53,7 +104,7 @@ def histogram(
         counted = counts.inverted > 0 and style.legend
         label = f"{run.label} ({counts.inverted} inverted)" if counted else run.label
         outlines.append(Outline(label, counts, series_number(run.series, index)))
-    draw_distribution(axes, None, outlines, f"{metric} quality [-]", log, style)
+    draw_distribution(axes, None, outlines, "size-skew quality [-]", log, style)
 
 
 def draw_distribution(

@@ -199,6 +199,11 @@ class SectionStyle:
     axes: bool = True
     """Whether a flat section has axes with numbers."""
 
+    @classmethod
+    def of_cm(cls, width: float, height: float) -> SectionStyle:
+        """Return the style of a picture of a width and maximum height in cm, of 300 dpi."""
+        return cls((round(width / 2.54 * 300), round(height / 2.54 * 300)), dpi=300.0)
+
     @property
     def inches(self) -> tuple[float, float]:
         """Return width and height on paper, in inches."""

@@ -14,12 +14,12 @@ from slideviz.case.motion_words import deformation
 from slideviz.design.blade_gaps import gaps
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE
+from slideviz.plots.draw import GreedyRun, StepRun
 from slideviz.plots.gap_curves import Measured
-from slideviz.plots.histogram import draw_distribution
+from slideviz.plots.histogram import Bars, Distribution, Outline, draw_distribution
 from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_curve import CurveRow, curve_of
 from slideviz.plots.section_paint import shown_paint
-from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
 from slideviz.plots.spanwise import Profile, along, in_layers
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out

@@ -42,11 +42,6 @@ class Profile:
         """Return the middles of the layers (k,), in the mesh's length unit."""
         return (self.edges[1:] + self.edges[:-1]) / 2.0
 
-    @property
-    def fraction(self) -> FloatArray:
-        """Return the middles of the layers (k,) relative to the span, 0 to 1."""
-        return (self.position - self.edges[0]) / (self.edges[-1] - self.edges[0])
-
 
 def along(
     mesh: Mesh,
@@ -129,27 +124,19 @@ def spanwise(
     axes: Axes,
     profiles: Sequence[Profile],
     what: Literal["minimum", "mean"] = "minimum",
-    fraction: bool = False,
-    unit: str = "mesh units",
     style: Style = PRINT,
 ) -> None:
-    """Draw the minimum or mean quality along the span, which is the vertical axis.
-
-    ``fraction``: whether the vertical axis is relative to the span, instead of the coordinate.
-    ``unit``: unit of the coordinate, for the label.
-    """
+    """Draw the minimum or mean quality along the span, which is the vertical axis."""
     coordinate = profiles[0].coordinate if profiles else "r"
-    label = "span fraction [-]" if fraction else f"{coordinate} [{unit}]"
-    style_axes(axes, style, f"{what} quality [-]", label)
+    style_axes(axes, style, f"{what} quality [-]", f"{coordinate} [mesh units]")
     ends = []
     for index, profile in enumerate(profiles):
         look = style.series(series_number(profile.series, index))
         values: FloatArray = getattr(profile, what)
-        height = profile.fraction if fraction else profile.position
         there = np.isfinite(values)
         axes.plot(
             values[there],
-            height[there],
+            profile.position[there],
             color=look.color,
             linestyle=look.dash,
             linewidth=style.width,
@@ -159,7 +146,7 @@ def spanwise(
             markevery=(index, max(len(profiles), int(there.sum()) // 8)),
             label=profile.label,
         )
-        ends += [0.0, 1.0] if fraction else [profile.edges[0], profile.edges[-1]]
+        ends += [profile.edges[0], profile.edges[-1]]
     axes.set_xlim(0.0, 1.02)
     if ends:
         axes.set_ylim(min(ends), max(ends))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from slideviz.color_scheme import DARK, INVERTED_COLOR, LIGHT, PAPER, ColorScheme
+from slideviz.color_scheme import INVERTED_COLOR, PAPER, ColorScheme
 from slideviz.plots.figure_io import SMALLEST
 from slideviz.terms import PALETTE
 
@@ -88,8 +88,6 @@ def _brightness(color: str) -> int:
 
 
 PRINT = Style(PAPER)
-ON_LIGHT = Style(LIGHT)
-ON_DARK = Style(DARK)
 
 
 def style_axes(axes: Axes, style: Style, x_label: str, y_label: str) -> None:

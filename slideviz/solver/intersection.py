@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from math import ceil, floor, pi
 
@@ -34,6 +35,7 @@ BESIDE = 1e-4  # distance from a facet of a point in the cells beside it, over t
 OPEN = 0.1
 """The markers form a closed surface, but for small gaps, where their winding around a point inside
 differs from 1 by no more than this."""
+Others = list[tuple[str, Cells]]  # names and elements of boundaries
 HALF = 0.5  # a point is outside of a surface that winds around it less often than this
 
 
@@ -50,7 +52,9 @@ def intersection_message(
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in _movers(case, mesh, nodes, vectors):
-        hit = _new_crossing(mesh, after, mesh.marker(name).cells, _others(case, mesh, name))
+        moved = mesh.marker(name).cells
+        find = partial(first_crossing, after, moved)
+        hit, _ = _first_new(find, mesh, moved, _others(case, mesh, name))
         if hit is not None:
             return (
                 f"the motion puts {name} through {hit.marker} near {_place(hit)}; move {name} "
@@ -75,19 +79,20 @@ def _giving_way(case: Case, wall: str) -> str:
     return f"let {wall} move with it (role moving, internal or periodic)"
 
 
-def _new_crossing(
-    mesh: Mesh, after: FloatArray, moved: Cells, others: list[tuple[str, Cells]]
-) -> Crossing | None:
+def _first_new(
+    find: Callable[[Others], Crossing | None], mesh: Mesh, moved: Cells, others: Others
+) -> tuple[Crossing | None, Others]:
     """Return where a moved boundary crosses one that it did not cross before the motion, or None.
 
-    Twisted quadrilaterals close to each other may cross before, as each is taken as two triangles.
+    With it those of the ``others`` that are left: twisted quadrilaterals close to each other may
+    cross before, as each is taken as two triangles. ``find``: returns the first crossing.
     """
-    while (hit := first_crossing(after, moved, others)) is not None:
-        wall = [(name, cells) for name, cells in others if name == hit.marker]
+    while (hit := find(others)) is not None:
+        wall = [other for other in others if other[0] == hit.marker]
         if first_crossing(mesh.points, moved, wall) is None:
-            return hit
-        others = [(name, cells) for name, cells in others if name != hit.marker]
-    return None
+            break
+        others = [other for other in others if other[0] != hit.marker]
+    return hit, others
 
 
 def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
@@ -102,14 +107,8 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
     after[nodes] += vectors
     for name in case.markers_with("moving"):
         moved = mesh.marker(name).cells
-        others = _others(case, mesh, name)
-        hit = swept_crossing(mesh.points, after, moved, others)
-        while hit is not None:
-            wall = [other for other in others if other[0] == hit.marker]
-            if first_crossing(mesh.points, moved, wall) is None:
-                break
-            others = [other for other in others if other[0] != hit.marker]
-            hit = swept_crossing(mesh.points, after, moved, others)
+        find = partial(swept_crossing, mesh.points, after, moved)
+        hit, others = _first_new(find, mesh, moved, _others(case, mesh, name))
         if hit is not None and (path := _arcs(case, mesh, nodes, vectors)):
             pairs = pairwise((mesh.points, *path))
             hits = (swept_crossing(*pair, moved, others) for pair in pairs)
@@ -286,7 +285,7 @@ def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Itera
             yield (there @ basis + np.asarray(pair.origin))[:, : mesh.dim]
 
 
-def _others(case: Case, mesh: Mesh, moved: str) -> list[tuple[str, Cells]]:
+def _others(case: Case, mesh: Mesh, moved: str) -> Others:
     """Return names and elements of the boundaries that the moving marker ``moved`` must not cross.
 
     These share no node with it, and do not give way (`intersection_message`).

@@ -11,6 +11,7 @@ from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import SlidevizError, doubts_of, messages_of
+from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
@@ -130,14 +131,8 @@ def _beyond_pitch_of_zone(case: Case, mesh: Mesh) -> str:
 def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
     if pair.kind == "translational":
         return float(np.abs(vectors @ (pair.vector / pair.period)).max(initial=0.0))
-    axis = np.array(pair.axis) / np.linalg.norm(pair.axis)
-
-    def arms(at: FloatArray) -> FloatArray:
-        full = np.pad(at, ((0, 0), (0, 3 - at.shape[1]))) - np.array(pair.origin)
-        return full - np.outer(full @ axis, axis)
-
-    before = arms(points)
-    after = arms(points + vectors)
-    sine = np.cross(before, after) @ axis
-    cosine = np.einsum("ij,ij->i", before, after)
-    return float(np.abs(np.arctan2(sine, cosine)).max(initial=0.0))
+    before, after = (
+        in_axis_frame(at, pair.axis, pair.origin) @ (1.0, 1.0j, 0.0)
+        for at in (points, points + vectors)
+    )
+    return float(np.abs(np.angle(after * before.conj())).max(initial=0.0))

@@ -15,10 +15,17 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
-from slideviz.plots.draw import What, against_steps, convergence, quality_by_step
+from slideviz.plots.draw import (
+    GreedyRun,
+    Outcome,
+    StepRun,
+    What,
+    against_steps,
+    convergence,
+    quality_by_step,
+)
 from slideviz.plots.figure_io import empty_figure, write_figure
-from slideviz.plots.histogram import histogram
-from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
+from slideviz.plots.histogram import QualityRun, histogram
 from slideviz.plots.spanwise import Profile, along, spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out

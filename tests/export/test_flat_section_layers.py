@@ -10,7 +10,7 @@ from PIL import Image
 
 from slideviz.color_scheme import INVERTED_COLOR, LIGHT
 from slideviz.errors import Cancelled, CaseError
-from slideviz.export.flat_section import PageFormat, frame_words, save_section
+from slideviz.export.flat_section import frame_words, save_section
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import draw_vector
@@ -18,6 +18,7 @@ from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.plots import section_picture
+from slideviz.plots.section_picture import SectionStyle
 from slideviz.samples.table import sample
 from slideviz.scene.actors import VALUES
 from slideviz.scene.flat_scene import FlatScene
@@ -613,7 +614,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     section = Section("cylinder", radius=0.27)
     told = []
     one, three = tmp_path / "one.svg", tmp_path / "three.svg"
-    going = (PageFormat((1600, 1000)), told.append, lambda: False)
+    going = (SectionStyle((1600, 1000)), told.append, lambda: False)
     assert save_section(three, session, section, *going) == three
     save_section(one, changes.set_view(session, passages=0), section, *going)
     assert three.stat().st_size > 2 * one.stat().st_size
@@ -623,7 +624,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     with pytest.raises(CaseError, match="a section is drawn as"):
         save_section(tmp_path / "one.bmp", session, section, *going)
     with pytest.raises(Cancelled):
-        save_section(one, session, section, PageFormat((1600, 1000)), told.append, lambda: True)
+        save_section(one, session, section, SectionStyle((1600, 1000)), told.append, lambda: True)
 
 
 def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_it_is_of(
@@ -647,7 +648,7 @@ def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_
         section_picture, "draw_section", lambda *v: drawn.append(real(*v)) or drawn[-1]
     )
     file = tmp_path / "a.png"
-    paper = PageFormat.of_cm(8.5, 6.4)
+    paper = SectionStyle.of_cm(8.5, 6.4)
     save_section(file, session, section, paper, lambda _: None, lambda: False)
     figure = drawn[0]
     said = figure.get_suptitle().split("\n")
@@ -674,7 +675,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
     monkeypatch.setattr(
         section_picture, "draw_section", lambda *v: drawn.append(real(*v)) or drawn[-1]
     )
-    going = (PageFormat((1600, 1000)), lambda _: None, lambda: False)
+    going = (SectionStyle((1600, 1000)), lambda _: None, lambda: False)
     save_section(tmp_path / "a.png", some, MIDDLE, *going)
     figure = drawn[0]
     cut = shapes_cells(session, MIDDLE)

@@ -8,10 +8,10 @@ from matplotlib.collections import PolyCollection
 from PIL import Image
 
 from slideviz.errors import CaseError
-from slideviz.export.flat_section import PageFormat, save_section
+from slideviz.export.flat_section import save_section
 from slideviz.mesh.quality import quality
 from slideviz.plots import section_picture
-from slideviz.plots.section_picture import arrangement
+from slideviz.plots.section_picture import SectionStyle, arrangement
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
@@ -19,7 +19,7 @@ from slideviz.session.state import StepFrame
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
 
-PAPERS = [PageFormat.of_cm(8.5, 6.4), PageFormat.of_cm(17.0, 10.6), PageFormat((1600, 1000))]
+PAPERS = [SectionStyle.of_cm(8.5, 6.4), SectionStyle.of_cm(17.0, 10.6), SectionStyle((1600, 1000))]
 LEVEL = Section("plane", (0.5, 0.5, 0.4))
 
 

@@ -8,10 +8,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from slideviz.plots.draw import against_steps, convergence, quality_by_step
-from slideviz.plots.histogram import histogram
-from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
-from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT
+from slideviz.color_scheme import DARK, LIGHT
+from slideviz.plots.draw import (
+    GreedyRun,
+    Outcome,
+    StepRun,
+    against_steps,
+    convergence,
+    quality_by_step,
+)
+from slideviz.plots.histogram import QualityRun, histogram
+from slideviz.plots.style import PRINT, Style
 
 
 @pytest.fixture
@@ -91,14 +98,14 @@ def test_convergence_marks_levels_and_tolerance(axes):
         np.array([1, 1, 2, 2]),
         1e-2,
     )
-    convergence(axes, [run, run], unit="m")
+    convergence(axes, [run, run])
     assert axes.get_yscale() == "log"
     curve, level, *_ = axes.lines
     assert curve.get_ydata().tolist() == [1.0, 0.1, 0.05]  # 0 has no place on this axis
     assert curve.get_markevery() == [0, 2]
     assert level.get_ydata() == [1e-2, 1e-2]
     assert [text.get_text() for text in axes.texts] == ["tolerance 0.01"]
-    assert "[m]" in axes.get_ylabel()
+    assert "[mesh units]" in axes.get_ylabel()
     low = axes.get_ylim()[0]
     assert low < 1e-2 / 2
 
@@ -158,7 +165,7 @@ def test_every_value_has_its_label_and_a_fitting_scale(axes, what, label, scale)
     assert len(axes.lines) == (3 if what == "mean" else 2)
 
 
-@pytest.mark.parametrize("style", [PRINT, ON_LIGHT, ON_DARK])
+@pytest.mark.parametrize("style", [PRINT, Style(LIGHT), Style(DARK)])
 def test_letters_are_large_enough_and_stand_out(axes, style):
     histogram(axes, two_qualities(), style=style)
     background = np.array(to_rgb(style.scheme.background))
@@ -191,7 +198,7 @@ def test_a_style_without_legend_leaves_it_to_the_figure(axes):
     assert axes.get_legend_handles_labels()[1] == ["ps", "ds"]
 
 
-@pytest.mark.parametrize("style", [PRINT, ON_DARK])
+@pytest.mark.parametrize("style", [PRINT, Style(DARK)])
 def test_series_differ_without_their_color(style):
     looks = [style.series(index) for index in range(49)]
     assert len({(look.marker, str(look.dash)) for look in looks[:7]}) == 7

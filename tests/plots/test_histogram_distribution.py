@@ -8,12 +8,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle, StepPatch
 
-from slideviz.color_scheme import PAPER
+from slideviz.color_scheme import DARK, PAPER
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.plots.histogram import BAND, draw_distribution
-from slideviz.plots.series import Bars, Distribution, Outline
+from slideviz.plots.histogram import BAND, Bars, Distribution, Outline, draw_distribution
 from slideviz.plots.session_plots import BINS, distribution
-from slideviz.plots.style import ON_DARK, PRINT
+from slideviz.plots.style import PRINT, Style
 from slideviz.session.state import StepFrame
 
 
@@ -80,7 +79,7 @@ def test_bars_are_as_high_as_there_are_cells(frames, log):
     assert axes.get_xlabel() == "skew quality [-]"
 
 
-@pytest.mark.parametrize("style", [PRINT, ON_DARK])
+@pytest.mark.parametrize("style", [PRINT, Style(DARK)])
 def test_others_are_outlines_that_differ_from_each_other_and_from_the_bars(frames, style):
     axes, one, outlines = drawn(frames, False, style)
     stairs = outlines_of(axes)
@@ -143,7 +142,7 @@ def test_the_undeformed_mesh_does_not_press_the_rest_flat():
 def test_inverted_cells_have_a_strip_left_of_the_values(frames, log):
     bad = frames[2].quality.inverted
     assert bad
-    axes, one, _ = drawn(frames, log, ON_DARK, shown=2)
+    axes, one, _ = drawn(frames, log, Style(DARK), shown=2)
     assert axes.get_xlim() == pytest.approx((-BAND, 1.0))
     strip = axes.containers[1].patches[0]
     assert strip.get_y() + strip.get_height() == one.inverted
@@ -152,7 +151,7 @@ def test_inverted_cells_have_a_strip_left_of_the_values(frames, log):
     stem, cap = axes.lines
     assert stem.get_ydata()[1] == cap.get_ydata()[0] == bad
     assert max(*stem.get_xdata(), *cap.get_xdata()) < 0
-    assert stem.get_color() == cap.get_color() == ON_DARK.series(1).color
+    assert stem.get_color() == cap.get_color() == Style(DARK).series(1).color
 
 
 def test_long_numbers_at_the_ticks_do_not_touch():

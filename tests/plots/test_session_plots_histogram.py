@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
+from slideviz.color_scheme import LIGHT
 from slideviz.mesh.quality import quality
 from slideviz.plots.session_plots import MOST_COMPARED, compared, draw_histogram
-from slideviz.plots.style import ON_LIGHT
+from slideviz.plots.style import Style
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame
@@ -58,7 +59,7 @@ def test_few_runs_are_all_compared_and_unfinished_ones_not(many):
 def legend(session, **view):
     figure = Figure()
     session = changes.set_view(session, **view)
-    draw_histogram(session, figure, ON_LIGHT, log=True, full_range=False)
+    draw_histogram(session, figure, Style(LIGHT), log=True, full_range=False)
     return figure.axes[0].get_legend()
 
 

@@ -24,7 +24,6 @@ def test_layers_hold_the_cells_whose_middle_is_in_them():
     np.testing.assert_allclose(profile.mean, [0.2, 0.7])
     assert profile.count.tolist() == [2, 2]
     assert profile.position.tolist() == [2.0, 4.0]
-    assert profile.fraction.tolist() == [0.25, 0.75]
     assert (profile.label, profile.coordinate) == ("run", "x")
 
 
@@ -75,14 +74,13 @@ def test_what_cannot_be_layered_is_said():
 def test_the_span_is_vertical_and_gaps_are_bridged():
     axes = Figure().add_subplot()
     profile = along(strip(2), np.array([0.2, 0.4]), "x", layers=5, label="a")
-    spanwise(axes, [profile, profile], "mean", fraction=True)
+    spanwise(axes, [profile, profile], "mean")
     line = axes.lines[0]
     assert line.get_xdata().tolist() == [0.2, 0.4]
-    np.testing.assert_allclose(line.get_ydata(), [0.3, 0.7])
-    assert axes.get_ylim() == (0.0, 1.0)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mean quality [-]", "span fraction [-]")
+    np.testing.assert_allclose(line.get_ydata(), [1.6, 2.4])
+    assert axes.get_ylim() == (1.0, 3.0)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mean quality [-]", "x [mesh units]")
     other = Figure().add_subplot()
-    spanwise(other, [profile], unit="m")
-    assert other.get_ylabel() == "x [m]"
+    spanwise(other, [profile])
     assert other.get_ylim() == (1.0, 3.0)
     assert other.get_legend() is None

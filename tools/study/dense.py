@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from slideviz.case.cfg import set_key
-from slideviz.plots.draw import convergence
-from slideviz.plots.series import GreedyRun
+from slideviz.plots.draw import GreedyRun, convergence
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
 from slideviz.solver.deform import deform

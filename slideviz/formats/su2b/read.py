@@ -279,15 +279,13 @@ def boundaries_elsewhere(
             yield zone.number, name, some
 
 
-def point_blocks(
-    source: BinaryFile, place: ZonePlace, size: int = BLOCK
-) -> Iterator[tuple[int, FloatArray]]:
+def point_blocks(source: BinaryFile, place: ZonePlace) -> Iterator[tuple[int, FloatArray]]:
     """Yield the points of a zone in blocks: number of the first point, and coordinates (k, d).
 
     Raises MeshError if a coordinate is not finite, or a point has another index than its place.
     """
-    for first in range(0, place.n_points, size):
-        yield first, point_block(source, place, first, size)
+    for first in range(0, place.n_points, BLOCK):
+        yield first, point_block(source, place, first, BLOCK)
 
 
 def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> FloatArray:

@@ -12,7 +12,7 @@ from qtpy.QtCore import QObject
 from qtpy.QtWidgets import QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.export.flat_section import PageFormat, save_section
+from slideviz.export.flat_section import save_section
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
@@ -30,6 +30,7 @@ from slideviz.gui.dialogs.pictures import (
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services
+from slideviz.plots.section_picture import SectionStyle
 from slideviz.session import changes, jobs
 from slideviz.session.motions import shown_case, wheel_passages
 from slideviz.session.state import Session
@@ -121,7 +122,7 @@ class Exports(QObject):
             copy_image(to_image(renderer.image(options)))
         self.window.show_status(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
-    def section(self, paper: PageFormat) -> None:
+    def section(self, paper: SectionStyle) -> None:
         """Ask for a file name, and write a picture of the selected section."""
         session = self._session
         section = self._session.view.section

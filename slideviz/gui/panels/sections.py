@@ -22,7 +22,6 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.errors import CaseError, SlidevizError
-from slideviz.export.flat_section import PageFormat
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
@@ -46,6 +45,7 @@ from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.plots.section_picture import SectionStyle
 from slideviz.sections.model import Section, Triple
 from slideviz.session import changes, section_cuts
 from slideviz.session.passages import period_of
@@ -280,10 +280,10 @@ UNSEEN = "Tick the section in the list to show it."
 """Tip of the tools of a section that is not shown."""
 
 SIZES = {
-    "8.5 cm wide, a column…": PageFormat.of_cm(8.5, 6.4),
-    "17 cm wide, a page…": PageFormat.of_cm(17.0, 10.6),
-    "25 cm wide, a slide…": PageFormat.of_cm(25.0, 14.0),
-    "1600 pixels wide, for the screen…": PageFormat((1600, 1000)),
+    "8.5 cm wide, a column…": SectionStyle.of_cm(8.5, 6.4),
+    "17 cm wide, a page…": SectionStyle.of_cm(17.0, 10.6),
+    "25 cm wide, a slide…": SectionStyle.of_cm(25.0, 14.0),
+    "1600 pixels wide, for the screen…": SectionStyle((1600, 1000)),
 }
 """Sizes of pictures by their words in the menu; the heights are limits."""
 
@@ -439,7 +439,7 @@ class SectionsPanel(Panel):
         except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
             self.services.banner.show_message(with_field_labels(str(error)))
 
-    def _want_picture(self, paper: PageFormat) -> None:
+    def _want_picture(self, paper: SectionStyle) -> None:
         title = self.titled.isChecked()
         axes = self.with_axes.isChecked()
         self.services.exports.section(replace(paper, title=title, axes=axes))
@@ -448,7 +448,7 @@ class SectionsPanel(Panel):
         size = questions.ask_paper(self, *self._size)
         if size is not None:
             self._size = size
-            self._want_picture(PageFormat.of_cm(*size))
+            self._want_picture(SectionStyle.of_cm(*size))
 
     def _remove(self) -> None:
         view = self.session.view
