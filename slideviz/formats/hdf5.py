@@ -11,21 +11,18 @@ import os
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from io import FileIO
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import h5py
 
 from slideviz.errors import path_error
 from slideviz.system.atomic import atomic_write, reason_of
-from slideviz.system.cleanup import open_temporary
 
 if TYPE_CHECKING:
-    from io import FileIO
-
-    import h5py
-    from _typeshed import WriteableBuffer
+    from _typeshed import ReadableBuffer, WriteableBuffer
 
 
 def free_name(name: str, taken: Collection[str]) -> str:
@@ -34,19 +31,21 @@ def free_name(name: str, taken: Collection[str]) -> str:
     return next(one for one in chain([name], numbered) if one not in taken)
 
 
-class Hdf5Draft:
+class Hdf5Draft(FileIO):
     """An HDF5 file that is being written, and the Python file object that h5py writes it through.
 
-    ``tree`` is the root of the HDF5 file. Errors of writing are kept, and raised by `require`. The
-    other methods are those of a Python file that h5py calls. ``path``: the file that the draft is
-    to replace, for messages. ``draft``: the existing file that is written.
+    ``tree`` is the root of the HDF5 file. Errors of writing are kept, and raised by `require`.
+    ``path``: the file that the draft is to replace, for messages. ``draft``: the existing file that
+    is written.
     """
 
     tree: h5py.File
 
     def __init__(self, path: Path, draft: Path) -> None:
+        super().__init__(
+            draft, "r+", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW)
+        )
         self._path = path
-        self._file = cast("FileIO", open_temporary(draft, buffering=0))
         self._problem: OSError | None = None
 
     def require(self) -> None:
@@ -55,17 +54,13 @@ class Hdf5Draft:
             reason = reason_of(self._problem)
             raise path_error(self._path, f"cannot be written: {reason}") from self._problem
 
-    def close(self) -> None:
-        """Close the file; HDF5 must have closed it before."""
-        self._file.close()
-
-    def write(self, data: bytes | memoryview) -> int:
+    def write(self, data: ReadableBuffer) -> int:
         """Write bytes unless a write failed before; return their number, even if this one fails."""
         remaining = memoryview(data).cast("B")
         size = len(remaining)
         try:
             while len(remaining) and self._problem is None:
-                remaining = remaining[self._file.write(remaining) :]
+                remaining = remaining[super().write(remaining) :]
         except OSError as problem:
             self._problem = problem
         return size
@@ -75,37 +70,20 @@ class Hdf5Draft:
         remaining = memoryview(buffer).cast("B")
         size = len(remaining)
         while len(remaining):
-            count = self._file.readinto(remaining)
+            count = super().readinto(remaining)
             if not count:
                 remaining[:] = bytes(len(remaining))
                 break
             remaining = remaining[count:]
         return size
 
-    def read(self, size: int) -> bytes:
-        """Return ``size`` bytes from the file, beyond its end zeros."""
-        buffer = bytearray(size)
-        self.readinto(buffer)
-        return bytes(buffer)
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go to a position in the file and return it."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the position in the file."""
-        return self._file.tell()
-
-    def truncate(self, size: int) -> int:
+    def truncate(self, size: int | None = None) -> int:
         """Set the length of the file and return it, even if this fails."""
         try:
-            self._file.truncate(size)
+            return super().truncate(size)
         except OSError as problem:
             self._problem = self._problem or problem
-        return size
-
-    def flush(self) -> None:
-        """Do nothing: the file has no buffer."""
+        return size or 0
 
 
 @contextmanager
@@ -123,10 +101,7 @@ def hdf5_write(
             with source.open("rb") as original:
                 shutil.copyfileobj(original, file)
             file.flush()
-        draft = Hdf5Draft(path, Path(file.name))
-        try:
+        with Hdf5Draft(path, Path(file.name)) as draft:
             with h5py.File(draft, "w" if source is None else "r+") as draft.tree:
                 yield draft
             draft.require()
-        finally:
-            draft.close()

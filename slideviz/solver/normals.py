@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import IntArray
 from slideviz.mesh.topology import TINY
 from slideviz.rbf.classify import directions
 from slideviz.rbf.frames import corners as corners_of
@@ -23,7 +23,6 @@ from slideviz.rbf.tape import (
     length,
     multiply,
     put,
-    recorded,
     take,
     transform,
     unit,
@@ -33,7 +32,7 @@ from slideviz.rbf.tape import (
 if TYPE_CHECKING:
     from slideviz.solver.setup import Setup
 
-TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
+TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 """Rotates the direction of a segment (2D) into its normal."""
 
 
@@ -50,69 +49,40 @@ def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
     return nodes, join(found, at[count:]) if count < len(at) else found
 
 
-@dataclass(frozen=True, eq=False)
-class _Corners:
-    """Computes corners of facets from the coordinates of nodes, a linear map, also on the axis."""
-
-    setup: Setup
-
-    def of(self, coords: Array) -> list[Array]:
-        """Return the corners of all facets, one array (f, d) for each place in a facet."""
-        facets = self.setup.boundary.facets
-        axis = self.setup.axis
-        v = value(coords)
-        touching = np.flatnonzero(axis[facets].any(axis=1) & ~axis[facets].all(axis=1))
-        parts = [take(coords, facets[:, k]) for k in range(facets.shape[1])]
-        if not len(touching):
-            return parts
-        table = facets[touching]
-        nodes, local = np.unique(table, return_inverse=True)
-        maps = self._maps(nodes, local.reshape(table.shape), table)
-        near = take(coords, nodes)
-        return [
-            put(part, touching, _mapped(maps[k], near, v.shape[1])) for k, part in enumerate(parts)
+def _corners(setup: Setup, coords: Array) -> list[Array]:
+    """Return the corners of all facets, one array (f, d) for each place in a facet."""
+    facets = setup.boundary.facets
+    axis = setup.axis
+    parts = [take(coords, column) for column in facets.T]
+    touching = np.flatnonzero(axis[facets].any(axis=1) & ~axis[facets].all(axis=1))
+    if not len(touching):
+        return parts
+    table = facets[touching]
+    nodes = take(coords, table.ravel())
+    # At the axis, corners are means of the nodes of their facet, component by component. Their
+    # shares are found with ones at a node of each facet, which gets nodes of its own.
+    own = np.arange(table.size).reshape(table.shape)
+    own[:, 2:] = np.where(table[:, 2:3] == table[:, 3:], own[:, 2:3], own[:, 2:])
+    shares = []
+    for place in range(table.shape[1]):
+        one = np.zeros((table.size, setup.coords.shape[1]))
+        one[own[:, place]] = own[:, [place]] != own[:, [place - 1]]
+        shares.append(corners_of(one, own, axis[table.ravel()]))
+    for k, part in enumerate(parts):
+        terms = [
+            multiply(take(nodes, own[:, place]), share[:, k]) for place, share in enumerate(shares)
         ]
-
-    def _maps(self, nodes: IntArray, local: IntArray, table: IntArray) -> FloatArray:
-        """Return matrices (k, f d, m d) from coordinates of nodes to corners of facets at the axis.
-
-        Of m nodes and f facets ``local`` (f, k), renumbered; found by probing
-        `slideviz.rbf.frames.corners` with unit vectors.
-        """
-        d = self.setup.coords.shape[1]
-        width = table.shape[1]
-        out = np.empty((width, len(table) * d, len(nodes) * d))
-        here = self.setup.axis[nodes]
-        for column in range(len(nodes) * d):
-            probe = np.zeros(len(nodes) * d)
-            probe[column] = 1.0
-            # Renumbered nodes: which are on the axis is all that counts.
-            found = corners_of(probe.reshape(-1, d), local, here)
-            out[:, :, column] = np.moveaxis(found, 1, 0).reshape(width, -1)
-        return out
-
-
-def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
-    """Return a matrix (f d, m d) times the entries of x (m, d), row by row, as (f, d)."""
-    v = value(x)
-    rows = len(matrix) // d
-
-    def there(t: FloatArray) -> FloatArray:
-        return (t.reshape(*t.shape[:-2], -1) @ matrix.T).reshape(*t.shape[:-2], rows, d)
-
-    def back(g: FloatArray) -> FloatArray:
-        return (g.reshape(*g.shape[:-2], -1) @ matrix).reshape(*g.shape[:-2], len(v), d)
-
-    return recorded(there(v), (x, there, back))
+        parts[k] = put(part, touching, reduce(add, terms))
+    return parts
 
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
     """Return the unit normal of each fan (m, d), as ``slideviz.mesh.fans.fan_normals``."""
     boundary = setup.boundary
     fans = setup.wall_fans
-    corners = _Corners(setup).of(coords)
+    corners = _corners(setup, coords)
     if boundary.dim == 2:
-        vectors = transform(TURN[2], corners[1] - corners[0])
+        vectors = transform(TURN, corners[1] - corners[0])
     else:
         vectors = cross(corners[2] - corners[0], corners[3] - corners[1])
     width = boundary.facets.shape[1]
