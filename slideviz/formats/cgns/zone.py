@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.formats.cgns.tree import DATA, Node
-from slideviz.formats.meshio.markers import in_node_sets
+from slideviz.formats.meshio.bridge import in_node_sets
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import DIMS, ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
