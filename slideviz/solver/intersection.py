@@ -228,7 +228,7 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     there = _beside(after, some)
     shell = boundary_of(mesh).facets
     # The markers have holes, so that they have no inside: take all sides of one cell alone.
-    if abs(winding_number(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:
+    if abs(winding_number(mesh.points, shell, before[0]) - 1.0) > OPEN:
         shell = shell_of(mesh)
     left = []
     for start, end in zip(before, there, strict=True):
@@ -255,7 +255,7 @@ def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
 
 def _is_out(facets: IntArray, points: FloatArray, at: FloatArray) -> bool:
     """Return whether all points ``at`` (m, d) are outside of a closed surface of facets (f, k)."""
-    return all(winding_number(points, facets, point[None])[0] < HALF for point in at)
+    return all(winding_number(points, facets, point) < HALF for point in at)
 
 
 def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Iterator[FloatArray]:
@@ -305,32 +305,20 @@ def _place(hit: Crossing) -> str:
     return f"({', '.join(f'{value:.4g}' for value in hit.point)})"
 
 
-def winding_number(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
-    """Return the winding number (m,) of a surface around each point: 1 inside it, 0 outside.
+def winding_number(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
+    """Return the winding number of a surface around a point: 1 inside it, 0 outside.
 
     An integer, but for rounding, for any closed surface; close to one where it has small gaps. It
     is the sum of the signed angles under which the point sees the facets, over the full angle: in
     3D the solid angles of two triangles for each quadrilateral, by Van Oosterom and Strackee (IEEE
     Trans. Biomed. Eng. 30, 1983).
     ``facets`` (f, k): the surface, its normals outwards, as of a ``Boundary``.
-    ``at`` (m, d): points that are not on it.
+    ``p`` (d,): a point that is not on it.
     """
     if facets.shape[1] == 2:
-        return np.array([_winding_2d(points[facets] - p) for p in at])
-    return np.array([_winding_3d(points, facets, p) for p in at])
-
-
-def _winding_2d(arms: FloatArray) -> float:
-    a, b = arms[:, 0].T
-    c, d = arms[:, 1].T
-    return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
-
-
-def _winding_3d(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
-    """Return the winding number of facets (f, 4) around a point ``p`` (3,).
-
-    Its bits do not depend on the number of threads: the sums of the parts are added in order.
-    """
+        a, b, c, d = (points[facets] - p).reshape(-1, 4).T
+        return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
+    # The sums of the parts are added in order: the bits do not depend on the number of threads.
     sums = np.zeros(-(-len(facets) // PART))
 
     def add(part: slice) -> None:

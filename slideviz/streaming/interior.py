@@ -132,12 +132,6 @@ class InteriorDisplacer:
         same = np.flatnonzero(nodes[at] == numbers)
         return at[same], low + same
 
-    @cached_property
-    def _sector(self) -> tuple[float, float]:
-        """Return the range of the skin's second coordinate: in a cylindrical frame its angles."""
-        angles = self.setup.coords[:, 1]
-        return float(angles.min()), float(angles.max())
-
     def _require_enclosed(
         self, nodes: IntArray, points: FloatArray, start: FloatArray, inner: np.ndarray
     ) -> None:
@@ -150,8 +144,9 @@ class InteriorDisplacer:
         frame = self.setup.frame
         if not frame.cylindrical:
             return
-        low, high = self._sector
-        out = (start[:, 0] > frame.radius) | (start[:, 1] < low) | (start[:, 1] > high)
+        angles = self.setup.coords[:, 1]
+        outside = (start[:, 1] < angles.min()) | (start[:, 1] > angles.max())
+        out = outside | (start[:, 0] > frame.radius)
         out &= inner
         if out.any():
             k = int(np.argmax(out))

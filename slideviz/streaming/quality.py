@@ -299,8 +299,8 @@ def facet_sums(path: Path, zone: int) -> Iterator[Callable[[tuple[int, int]], in
     with ExitStack() as stack:
         (source,) = FileSource.open(stack, (path, zone)).zones
         markers = read_markers(source.file, source.place)
-        hashes = [_marker_hashes(marker.cells) for marker in markers]
-        marked = np.unique(np.concatenate(hashes or [_NONE]))
+        tables = (nodes for m in markers for _, nodes in m.cells.by_type.values())
+        marked = np.unique(np.concatenate([_NONE, *(_hashes(np.sort(t, axis=1)) for t in tables)]))
 
         def add(part: tuple[int, int]) -> int:
             block = source.between(part[0], part[1] - part[0])
@@ -361,14 +361,6 @@ def folded_steps(
 
 
 _NONE = np.empty(0, np.uint64)
-
-
-def _marker_hashes(cells: Cells) -> Hashes:
-    """Return the hashes (f,) of the elements of a marker, in no particular order."""
-    out = [_NONE]
-    for _, nodes in cells.by_type.values():
-        out.append(_hashes(np.sort(nodes, axis=1)))
-    return np.concatenate(out)
 
 
 def _hashes(facets: IntArray) -> Hashes:

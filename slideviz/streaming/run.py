@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -20,7 +20,7 @@ import numpy as np
 from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, NodeError
-from slideviz.mesh.model import Assembly, IntArray, Mesh
+from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import zones_of
 from slideviz.rbf.projection import Tracks
@@ -63,33 +63,35 @@ class RemainingTime:
 
     def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:
         self._report = report
-        self._left_stages = [(stage, 1.0) for stage in stages]
+        self._ahead = [(stage, SECONDS[stage]) for stage in stages]
+        """The stage that goes on and those after it, with their usual seconds."""
         self._spent = self._usual = 0.0
         self._begin = monotonic()
         self._part = 0.0
 
     def divide(self, zones: int) -> None:
         """Let the two stages after this one be done for each zone by itself."""
-        now, *later = self._left_stages
-        self._left_stages = [now, *[(name, 1 / zones) for name, _ in later[:2]] * zones, *later[2:]]
+        now, *later = self._ahead
+        of_zone = [(stage, seconds / zones) for stage, seconds in later[:2]]
+        self._ahead = [now, *of_zone * zones, *later[2:]]
 
     def next(self) -> None:
         """Begin the next stage."""
-        done, share = self._left_stages.pop(0)
+        done, seconds = self._ahead.pop(0)
         if done != "solve":
             self._spent += monotonic() - self._begin
-            self._usual += SECONDS[done] * share
+            self._usual += seconds
         self._begin = monotonic()
         self._part = 0.0
 
-    def more(self, stage: str) -> None:
-        """Begin a stage that was not foreseen."""
-        self._left_stages.insert(1, (stage, self._left_stages[0][1]))
+    def again(self) -> None:
+        """Begin the next stage, and let it be done a second time."""
+        self._ahead.insert(1, self._ahead[1])
         self.next()
 
     def __call__(self, progress: Progress) -> None:
         """Pass a progress on, with the seconds that are left."""
-        stage, _ = self._left_stages[0]
+        stage = self._ahead[0][0]
         if stage == "solve":
             self._part = (progress.step - 1) / progress.total
             if progress.phase == "classify":  # which is done once, and not for each step
@@ -100,21 +102,20 @@ class RemainingTime:
 
     def _left(self) -> float | None:
         """Return an estimate of the seconds that are left; None before there is enough evidence."""
-        stage, share = self._left_stages[0]
+        (stage, seconds), *later = self._ahead
         now = monotonic() - self._begin
         spent = self._spent
         usual = self._usual
         if stage != "solve":
             spent = spent + now
-            usual = usual + SECONDS[stage] * share * self._part
+            usual = usual + seconds * self._part
         if usual < LEAST_PART:
             return None
         pace = spent / usual
-        this_stage = max(pace * SECONDS[stage] * share - now, 0.0)
+        this_stage = max(pace * seconds - now, 0.0)
         if self._part >= LEAST_PART:
             this_stage = now * (1.0 - self._part) / self._part
-        later = sum(SECONDS[name] * part for name, part in self._left_stages[1:])
-        return this_stage + pace * later
+        return this_stage + pace * sum(seconds for _, seconds in later)
 
 
 ReportProgress = Callable[[Progress], None]
@@ -260,7 +261,8 @@ class _ZoneRuns:
         zone = skin.zone - 1 if skin.zone and len(self._out.zones) > 1 else 0
         timer = step_timer(report, 1, max(1, case.steps))
         give_back()
-        with _naming_file_nodes(skin.numbering.points):
+        numbers = skin.numbering.points
+        try:
             with timer.phase("classify"):
                 setup = make_setup(prepared)
             require_memory(setup, case)
@@ -281,13 +283,16 @@ class _ZoneRuns:
                 return self._out.measure(zone, 0).after.quality()
 
             steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
+        except NodeError as problem:  # which names nodes of the skin
+            nodes = numbers[list(problem.nodes)].tolist()
+            raise NodeError(problem.sentence, *nodes) from problem
         del setup
         give_back()
         self._remaining.next()
         displacer = self._displacers[zone] = InteriorDisplacer(skin, lean, steps)
         self._out.displace(zone, displacer)
         if whole is not None and full is not None:
-            self._remaining.more("quality")
+            self._remaining.again()
             self._mend(zone, case, whole, full)
         self._remaining.next()
         yield from self._displacers[zone].steps
@@ -356,15 +361,6 @@ class _ZoneRuns:
             moved = displacer.steps[-1].mesh.origin.ffd
             boxes[zone] = None if moved is displacer.skin.origin.ffd else moved
         return boxes
-
-
-@contextmanager
-def _naming_file_nodes(numbers: IntArray) -> Iterator[None]:
-    """Context whose NodeErrors name nodes by ``numbers`` (n,): of the skin's nodes in the file."""
-    try:
-        yield
-    except NodeError as problem:
-        raise NodeError(problem.sentence, *numbers[list(problem.nodes)].tolist()) from problem
 
 
 def require_stream(case: Case) -> None:

@@ -20,7 +20,7 @@ from slideviz.errors import MeshError, path_error
 from slideviz.formats.meshio.bridge import MESHIO_TYPES, formats_of, load, meshio_errors
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import draft
 
@@ -240,10 +240,8 @@ def vtu_blocks(
     arrows want.
     """
     groups = [mesh.cells, *(marker.cells for marker in mesh.markers)]
-    lengths = [len(cells) for cells in groups]
-    types = np.concatenate([cells.types for cells in groups])
-    offsets = np.cumsum(np.concatenate([np.diff(cells.offsets) for cells in groups]))
-    nodes = np.concatenate([cells.connectivity for cells in groups])
+    every = Cells.joined(groups)
+    types = every.types
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.dim] = mesh.points
 
@@ -263,11 +261,11 @@ def vtu_blocks(
     ).encode()
     yield from _array("Points", points)
     yield b"</Points>\n<Cells>\n"
-    yield from _array("connectivity", _in_vtk_order(nodes, offsets, types))
-    yield from _array("offsets", offsets)
+    yield from _array("connectivity", _in_vtk_order(every))
+    yield from _array("offsets", every.offsets[1:])
     yield from _array("types", types)
     yield b"</Cells>\n<CellData>\n"
-    yield from _array("marker", np.repeat(np.arange(len(groups)), lengths))
+    yield from _array("marker", np.repeat(np.arange(len(groups)), list(map(len, groups))))
     for name, values in cell_data.items():
         padded = np.full((len(types), *values.shape[1:]), np.nan)
         padded[: len(values)] = values
@@ -279,14 +277,11 @@ def vtu_blocks(
     yield b"</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
 
 
-def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) -> IntArray:
-    """Return the connectivity with the nodes of prisms in the order of VTU files.
-
-    ``offsets`` (m,) are where the nodes of each element end.
-    """
-    first = offsets[types == 13][:, None] - len(_PRISM)
-    turned = nodes.copy()
-    turned[first + np.arange(len(_PRISM))] = nodes[first + _PRISM]
+def _in_vtk_order(cells: Cells) -> IntArray:
+    """Return the connectivity with the nodes of prisms in the order of VTU files."""
+    first = cells.offsets[:-1][cells.types == 13][:, None]
+    turned = cells.connectivity.copy()
+    turned[first + np.arange(len(_PRISM))] = turned[first + _PRISM]
     return turned
 
 
