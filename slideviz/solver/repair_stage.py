@@ -26,6 +26,7 @@ from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, Skin, sealed
+from slideviz.mesh.nearest import row_groups
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import VALID, checked_reference, quality
 from slideviz.mesh.repair.freedom import Freedom
@@ -474,6 +475,5 @@ def _projection(
 def unmarked_sides(mesh: Mesh, marked: IntArray) -> IntArray:
     """Return the outer sides (s, 2 or 4) that are none of ``marked`` (f, 2 or 4)."""
     shell = shell_of(without_halo(mesh)[0])
-    rows = np.sort(np.concatenate([marked, shell]), axis=1)
-    group = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    group = row_groups(np.sort(np.concatenate([marked, shell]), axis=1))
     return shell[~np.isin(group[len(marked) :], group[: len(marked)])]

@@ -87,15 +87,11 @@ def _places(stack: ExitStack, source: ZoneSource, folder: Path) -> IntArray | No
 def _gathered(source: ZoneSource, where: IntArray) -> Cells:
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
-    types = []
-    flats = []
+    found = []
     for part in np.split(ordered, cuts):
         block = source.elements_at(int(part[0]), int(part[-1] - part[0]) + 1)
-        some = Cells.from_types(block.types, block.nodes).take(part - part[0])
-        types.append(some.types)
-        flats.append(some.connectivity)
-    found = Cells.from_types(np.concatenate(types), np.concatenate(flats))
-    return found.take(np.searchsorted(ordered, where))
+        found.append(Cells.from_types(block.types, block.nodes).take(part - part[0]))
+    return Cells.joined(found).take(np.searchsorted(ordered, where))
 
 
 Warn = Callable[[str], object]

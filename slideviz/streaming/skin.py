@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, printable
 from slideviz.formats.su2.lines import boxes_elsewhere
@@ -174,11 +173,8 @@ class _BoundaryCells:
     """Cells of a block of the file that may have a side on the boundary."""
 
     first: int  # place in the file of the block's first cell
-    types: NDArray[np.uint8]
-    nodes: IntArray
-    ids: IntArray
-    """`types`, `nodes`, `ids` (k,), flat, (k,): of the cells that may have a side on the boundary:
-    VTK identifiers, nodes, numbers."""
+    cells: Cells  # the k cells that may have a side on the boundary
+    ids: IntArray  # (k,): their numbers
     all_ids: Index  # slice or (b,): the numbers of all cells of the block
 
 
@@ -201,10 +197,7 @@ def _boundary_cell_reader(
             _check_block(source, place, block, cells)
             near = np.add.reduceat(on_boundary[block.nodes], cells.offsets[:-1], dtype=np.int64)
             chosen = np.flatnonzero(near >= place.dim)
-            kept = cells.take(chosen)
-            return _BoundaryCells(
-                first, kept.types, kept.connectivity, block.ids[chosen], index_of(block.ids)
-            )
+            return _BoundaryCells(first, cells.take(chosen), block.ids[chosen], index_of(block.ids))
 
         yield read
 
@@ -237,11 +230,9 @@ def _join_boundary_cells(
     if not blocks:
         require_used(source, place.cells, 0)
         return Cells.from_blocks([]), np.empty(0, np.int64)
-    types = np.concatenate([near.types for near in blocks])
-    nodes = np.concatenate([near.nodes for near in blocks])
     numbers = np.concatenate([near.ids for near in blocks])
     order = np.argsort(numbers, kind="stable")
-    return Cells.from_types(types, nodes).take(order), numbers[order]
+    return Cells.joined([near.cells for near in blocks]).take(order), numbers[order]
 
 
 def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cells: Cells) -> None:

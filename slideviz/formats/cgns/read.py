@@ -59,13 +59,6 @@ class Interface:
     """Centre and angles of the rotation, and translation; empty if it is not periodic."""
     why: str = ""  # reason why it cannot be joined, for a remark; empty if it can, or is periodic
 
-    def gap(self, zones: Sequence[CgnsZone]) -> float:
-        """Return the largest distance between the two nodes of a pair."""
-        assert self.pairs is not None
-        here, there = self.pairs
-        apart = zones[self.zone].points[here] - zones[self.donor].points[there]
-        return float(np.sqrt((apart**2).sum(axis=1)).max(initial=0.0))
-
 
 @dataclass(frozen=True, eq=False)
 class Joined:
@@ -99,23 +92,12 @@ def join(zones: Sequence[CgnsZone]) -> Joined:
         assert one.pairs is not None
         here = np.append(here, one.pairs[0] + begins[one.zone])
         there = np.append(there, one.pairs[1] + begins[one.donor])
-    first, number = _numbered(components(len(points), here, there))
+    number = components(len(points), here, there)  # in the order of their first nodes
+    first = np.unique(number, return_index=True)[1]
     ends = np.array([(one.zone, one.donor) for one in closed], np.int64).reshape(-1, 2)
     parts = components(len(zones), ends[:, 0], ends[:, 1])
     numbers = tuple(number[a:b] for a, b in pairwise(begins))
     return Joined(points[first], numbers, tuple(left), parts)
-
-
-def _numbered(labels: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the indices (k,) where each label occurs first, ascending, and new labels (n,).
-
-    New labels count the labels (n,) in the order of their first occurrence.
-    """
-    found, first = np.unique(labels, return_index=True)
-    order = np.argsort(first)
-    number = np.empty(len(found), np.int64)
-    number[order] = np.arange(len(found))
-    return first[order], number[labels]
 
 
 def _interfaces(
@@ -148,10 +130,10 @@ def _interface(
         if kind != _ONE_TO_ONE:
             return Interface(node, zone, donor, None, why=f"it is {kind}, not one to one")
         pairs = _lists_meet(zones[zone], zones[donor], node)
-    interface = Interface(node, zone, donor, pairs)
-    gap = interface.gap(zones)
+    apart = zones[zone].points[pairs[0]] - zones[donor].points[pairs[1]]
+    gap = np.sqrt((apart**2).sum(axis=1)).max(initial=0.0)
     if gap <= tolerance:
-        return interface
+        return Interface(node, zone, donor, pairs)
     why = (
         f"its nodes lie up to {gap:.3g} from the nodes of {zones[donor].node.name}, more than "
         f"{tolerance:.3g} ({JOINED:g} of the extent)"
@@ -342,7 +324,8 @@ def _markers(
             if not len(facets):
                 remarks.append(f"{node.path} covers no face of its zone and is left out.")
                 continue
-            groups.setdefault(_family(base, node), []).append(_renumbered([facets], [number]))
+            family = node.word("FamilyName_t", "", "FamilyName").removeprefix(f"{base.path}/")
+            groups.setdefault(family or node.name, []).append(_renumbered([facets], [number]))
         if given or zone.sides is None:
             continue
         inner = outer_facets(mesh) if inner is None else inner
@@ -379,12 +362,6 @@ def _of_conditions(zone: CgnsZone, nodes: Sequence[Node]) -> list[tuple[Node, Ce
         (node, at if isinstance(at, Cells) else Cells.from_blocks(sets[node]))
         for node, at in regions.items()
     ]
-
-
-def _family(base: Node, node: Node) -> str:
-    """Return the name of the boundary that a condition is a part of."""
-    name = node.word("FamilyName_t", "", "FamilyName").removeprefix(f"{base.path}/")
-    return name or node.name
 
 
 def _add_open(
