@@ -73,17 +73,22 @@ def write_title(
     ``letters``: size of the letters. ``height``: height in pixels of the strip in which the title
     is vertically centred.
     """
-    title = pv.Text(words)
-    set_letters(title.prop, scheme, letters)
+    title = text_on_plate(words, scheme, letters)
     title.prop.SetLineSpacing(1.25)
-    # The mesh of a zoomed view may be behind it.
-    title.prop.SetBackgroundColor(*pv.Color(scheme.background_top).float_rgb)
-    title.prop.SetBackgroundOpacity(0.7)
-    title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
     high = 1.0 - 0.5 * height / plotter.window_size[1]
     title.GetPositionCoordinate().SetValue(CAPTION_AT, high)
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
+
+
+def text_on_plate(words: str, scheme: ColorScheme, letters: float) -> Any:
+    """Return an actor of words, vertically centred, which a mesh may be behind."""
+    text = pv.Text(words)
+    set_letters(text.prop, scheme, letters)
+    text.prop.SetBackgroundColor(*pv.Color(scheme.background_top).float_rgb)
+    text.prop.SetBackgroundOpacity(0.7)
+    text.prop.SetVerticalJustificationToCentered()
+    return text
 
 
 def resize(plotter: Any, size: tuple[int, int]) -> None:
@@ -98,10 +103,10 @@ def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image, dtype=np.uint8)
 
 
-def png_bytes(image: NDArray[np.uint8]) -> bytes:
-    """Return the content of a PNG file with an image (height, width, 3 or 4)."""
+def png_bytes(image: NDArray[np.uint8], **known: Any) -> bytes:
+    """Return the content of a PNG file with an image (height, width, 3 or 4), and what is known."""
     data = BytesIO()
-    Image.fromarray(image).save(data, format="PNG", optimize=False)
+    Image.fromarray(image).save(data, format="PNG", **known)
     return data.getvalue()
 
 

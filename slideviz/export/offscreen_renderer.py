@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
-from PIL import Image
 from pyvista import Color
 
 from slideviz.case.model import Case
@@ -24,6 +22,7 @@ from slideviz.export.offscreen import (
     check_size,
     image_of,
     offscreen,
+    png_bytes,
     resize,
     write_title,
 )
@@ -227,11 +226,10 @@ class OffscreenRenderer:
         file cannot be written.
         """
         check_png(file)
-        data = BytesIO()
         known = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}
-        Image.fromarray(self.image(options)).save(data, format="PNG", **known)
+        content = png_bytes(self.image(options), **known)
         with atomic_write(file) as out:
-            out.write(data.getvalue())
+            out.write(content)
 
     def _pane(
         self, session: Session, options: PictureOptions, words: str, size: float

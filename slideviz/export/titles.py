@@ -189,10 +189,9 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     ``scale`` is the factor of lengths and letters.
     """
     # Late: VTK takes 0.6 s.
-    import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
-    from slideviz.scene.legend import set_letters
+    from slideviz.export.offscreen import text_on_plate
 
     plotter.remove_actor(CELL_LABEL, reset_camera=False, render=False)
     words = mark_words(scene.session)
@@ -209,11 +208,7 @@ def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     seen = middle / plotter.window_size
     if not ((seen >= 0.0) & (seen <= 1.0)).all():
         return
-    text = pv.Text(words)
-    set_letters(text.prop, scene.scheme, 13.0 * scale)
-    text.prop.SetBackgroundColor(*pv.Color(scene.scheme.background_top).float_rgb)
-    text.prop.SetBackgroundOpacity(0.7)
-    text.prop.SetVerticalJustificationToCentered()
+    text = text_on_plate(words, scene.scheme, 13.0 * scale)
     # On the side towards the picture's middle, where there is room.
     side = 1.0 if seen[0] < 0.6 else -1.0
     if side < 0.0:

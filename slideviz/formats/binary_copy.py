@@ -32,7 +32,7 @@ from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick, equal_shares, ordered_map
+from slideviz.system.threads import Tick, cuts, equal_shares, ordered_map
 
 HEAD = 8  # bytes before the first zone
 PIECES = 16  # pieces of a text, each about a megabyte, in one task
@@ -139,9 +139,9 @@ def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: Seria
     zone = text.zone
     lines = text.lines
     tasks: list[_Task] = [
-        (kind, first, min(first + PIECES, len(pieces)))
+        (kind, first, end)
         for kind, pieces in (("cells", zone.elements), ("points", zone.points))
-        for first in range(0, len(pieces), PIECES)
+        for first, end in cuts(0, len(pieces), PIECES)
     ]
     missing: list[IntArray] = []
     with ranks.sharing(_layout_tasks, layout, path, ranks.size > 1) as do:

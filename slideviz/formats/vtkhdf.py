@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +27,7 @@ from slideviz.formats.hdf5 import Hdf5Draft, free_name, hdf5_write
 from slideviz.formats.table import WriteOptions
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.system.threads import cuts
 
 if TYPE_CHECKING:
     import h5py
@@ -174,10 +174,9 @@ def _add_block(
 
 def _partitions(cells: Cells) -> list[tuple[IntArray, Cells]]:
     """Return for each partition its nodes (k,), ascending, and its cells (with mesh nodes)."""
-    edges = [*range(0, len(cells), PARTITION), len(cells)]
     parts = [
         Cells.from_types(cells.types[a:b], cells.connectivity[cells.offsets[a] : cells.offsets[b]])
-        for a, b in pairwise(edges)
+        for a, b in cuts(0, len(cells), PARTITION)
     ]
     return [(part.nodes, part) for part in parts]
 

@@ -36,7 +36,7 @@ from slideviz.streaming.source import FileSource, PointTable, ZoneSource
 from slideviz.streaming.stream_input import StreamInput, patched_text
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SerialPool
-from slideviz.system.threads import Tick
+from slideviz.system.threads import Tick, cuts
 from slideviz.terms import SkewMetric
 
 CHUNK = 1 << 20  # most nodes or cells of a part: one part is in memory at a time
@@ -187,7 +187,7 @@ class Output:
 def parts(count: int) -> list[Part]:
     """Return the parts of ``count`` nodes or cells."""
     size = min(CHUNK, max(FEWEST, -(-count // PARTS)))
-    return [(first, min(first + size, count)) for first in range(0, count, size)]
+    return cuts(0, count, size)
 
 
 @contextmanager
@@ -245,9 +245,7 @@ def copying(
     ``source`` and ``ours``: the file to copy from, and the existing one to copy to.
     ``ranks``: the processes that copy.
     """
-    size = source.stat().st_size
-    ends = [*range(_PIECE, size, _PIECE), size]
-    tasks = list(zip([HEAD, *ends[:-1]], ends, strict=True))
+    tasks = cuts(HEAD, source.stat().st_size, _PIECE)
     way = _beside if ranks.size == 1 else _together
     return way((source, ours), tasks, ranks)
 

@@ -33,7 +33,7 @@ from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.skin import index_of
 from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch, ZoneSource
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick
+from slideviz.system.threads import Tick, cuts
 from slideviz.terms import Metric, SkewMetric
 
 Hashes = NDArray[np.uint64]
@@ -106,7 +106,7 @@ def quality_blocks(
                 remedy = ""
                 if zone.base is None:
                     remedy = "compare a deformed mesh with --reference UNDEFORMED, "
-                parts = [(k, min(k + CELLS, zone.n_cells)) for k in range(0, zone.n_cells, CELLS)]
+                parts = cuts(0, zone.n_cells, CELLS)
                 require_consistent_orientation(zone, parts, remedy=remedy)
         yield replace(block, quality=measured)
 

@@ -42,6 +42,11 @@ def core_limit(threads: int) -> Iterator[None]:
         _most.pop()
 
 
+def cuts(begin: int, end: int, size: int) -> list[tuple[int, int]]:
+    """Return the ends of the parts of a range, in order: at most ``size`` numbers in each."""
+    return [(first, min(first + size, end)) for first in range(begin, end, size)]
+
+
 def in_parts(
     work: Callable[[slice], object], count: int, tick: Callable[[float], object] = lambda _: None
 ) -> None:
@@ -51,7 +56,7 @@ def in_parts(
     ``tick``: called by the calling thread, before each of its parts, with the fraction begun. What
     it raises ends the work, as does what ``work`` raises.
     """
-    parts = iter([slice(first, min(first + PART, count)) for first in range(0, count, PART)])
+    parts = iter([slice(*ends) for ends in cuts(0, count, PART)])
 
     def run_remaining(report: Callable[[float], object]) -> None:
         try:

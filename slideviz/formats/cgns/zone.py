@@ -185,6 +185,7 @@ class CgnsZone:
     """A zone: its vertices, its cells, and where its coordinates are in the file."""
 
     node: Node  # its place in the tree
+    dim: int  # the dimension of its cells
     shape: tuple[int, ...]
     """Vertices along i, j (and k) of a structured zone; their number in an unstructured one."""
     points: FloatArray  # (n, p): vertices, i running fastest; p is the number of coordinates
@@ -193,11 +194,6 @@ class CgnsZone:
     """Elements of an unstructured zone with one dimension less; None for a structured zone."""
     sections: tuple[Node, ...]  # its sections of elements; empty for a structured zone
     datasets: tuple[str, ...]  # paths of the datasets of the p coordinates
-
-    @property
-    def dim(self) -> int:
-        """Return the dimension of its cells."""
-        return len(self.shape) if self.sides is None else int(DIMS[self.cells.types[0]])
 
     @cached_property
     def outer(self) -> Cells:
@@ -239,15 +235,14 @@ def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
     points, datasets = _points(node, shape, physical)
     if kind == "Structured":
         flat = points[:, :dim]
-        return CgnsZone(node, shape, points, grid_cells(shape, flat), None, (), datasets)
+        return CgnsZone(node, dim, shape, points, grid_cells(shape, flat), None, (), datasets)
     elements, sections = read_sections(node, len(points))
     dims = DIMS[elements.cells.types]
     if not (dims == dim).any():
         raise node.fault(f"has no cells of dimension {dim}; export the mesh with its volume cells")
     cells = elements.cells.take(dims == dim)
-    return CgnsZone(
-        node, shape, points, cells, elements.where(dims == dim - 1), tuple(sections), datasets
-    )
+    sides = elements.where(dims == dim - 1)
+    return CgnsZone(node, dim, shape, points, cells, sides, tuple(sections), datasets)
 
 
 def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:

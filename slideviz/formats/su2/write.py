@@ -24,7 +24,7 @@ from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 from slideviz.mesh.zones import zones_of
-from slideviz.system.threads import ordered_map
+from slideviz.system.threads import cuts, ordered_map
 
 _BLOCK_ROWS = 20_000  # most elements or points in a block of text
 _NUMBER_BYTES = 20  # most bytes of an index, with the blank after it
@@ -63,9 +63,9 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
         raw = document.raw
         begin, end = document.zone
         raw.require_same()
-        yield from (raw[a:b] for a, b in _ranges(0, begin))
+        yield from (raw[a:b] for a, b in cuts(0, begin, BLOCK_BYTES))
         yield from _zone_text(mesh)
-        yield from (raw[a:b] for a, b in _ranges(end, raw.size))
+        yield from (raw[a:b] for a, b in cuts(end, raw.size, BLOCK_BYTES))
         raw.require_same()
 
 
@@ -179,14 +179,10 @@ def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, 
     """Yield the parts of a range of bytes in order: blocks (first byte, end) and texts of edits."""
     for first, after, text in edits:
         if begin <= first < end:
-            yield from _ranges(begin, first)
+            yield from cuts(begin, first, BLOCK_BYTES)
             yield text
             begin = after
-    yield from _ranges(begin, end)
-
-
-def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
-    return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
+    yield from cuts(begin, end, BLOCK_BYTES)
 
 
 def _moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
@@ -257,15 +253,11 @@ def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) ->
     yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
     yield from _elements(*cells, numbered=True)
     yield f"NPOIN= {points[0]}\n".encode()
-    yield from ordered_map(partial(_point_rows, points[1]), _blocks(points[0]))
+    yield from ordered_map(partial(_point_rows, points[1]), cuts(0, points[0], _BLOCK_ROWS))
 
 
 def _some(cells: Cells, i: int, j: int) -> tuple[NDArray, ...]:
     return cells.types[i:j], cells.connectivity[slice(*cells.offsets[[i, j]])]
-
-
-def _blocks(count: int) -> list[tuple[int, int]]:
-    return [(i, min(i + _BLOCK_ROWS, count)) for i in range(0, count, _BLOCK_ROWS)]
 
 
 def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
@@ -284,7 +276,7 @@ def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
 
 
 def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
-    yield from ordered_map(partial(_cell_rows, cells, numbered), _blocks(count))
+    yield from ordered_map(partial(_cell_rows, cells, numbered), cuts(0, count, _BLOCK_ROWS))
 
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:

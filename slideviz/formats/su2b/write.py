@@ -24,6 +24,7 @@ from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.zones import zones_of
+from slideviz.system.threads import cuts
 
 SORTED = (3, 5, 9, 10, 12, 13, 14)  # SU2's order of the types of elements: ascending
 LARGEST_4 = 2**32 - 1
@@ -118,18 +119,18 @@ def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) 
 
     yield short(number, zone.dim) + np.array([zone.n_cells], conn).tobytes()
     start = 0
-    for i, j in _parts(zone.n_cells):
+    for i, j in cuts(0, zone.n_cells, BLOCK):
         ends = start + np.cumsum(SIZES[zone.types(i, j)] + 2)
         yield np.concatenate([[start], ends[:-1]]).astype(conn).tobytes()
         start = int(ends[-1])
     if width == 4 and max(start, zone.n_points) > LARGEST_4:
         raise MeshError("the mesh has more cells than a file with counts of 4 bytes can hold")
     yield np.array([start], conn).tobytes()
-    for i, j in _parts(zone.n_cells):
+    for i, j in cuts(0, zone.n_cells, BLOCK):
         yield rows_of(*zone.cells(i, j)).astype(conn, copy=False).tobytes()
     yield np.array([zone.n_points], conn).tobytes()
     kind = np.dtype([("x", f"{sign}f8", (zone.dim,)), ("i", conn)])
-    for i, j in _parts(zone.n_points):
+    for i, j in cuts(0, zone.n_points, BLOCK):
         block = np.empty(j - i, kind)
         block["x"] = zone.points(i, j)
         block["i"] = np.arange(i, j)
@@ -150,11 +151,6 @@ def marker_table(cells: Cells, conn: np.dtype) -> bytes:
     """Return count, offsets and list, of type ``conn``, of a marker's elements, as bytes."""
     head = np.concatenate([[len(cells), 0], np.cumsum(SIZES[cells.types] + 1)])
     return np.concatenate([head, rows_of(cells.types, cells.connectivity)]).astype(conn).tobytes()
-
-
-def _parts(count: int) -> Iterator[tuple[int, int]]:
-    for first in range(0, count, BLOCK):
-        yield first, min(first + BLOCK, count)
 
 
 def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
