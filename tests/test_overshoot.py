@@ -15,7 +15,7 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.solver.growth import Farthest, _cause, stray_warning
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
-from slideviz.streaming import output
+from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import stream
 from tests.builders import annulus, far_field, grid, layered, square
 
@@ -166,7 +166,7 @@ def test_nodes_that_stray_are_named_with_the_remedy(tmp_path, monkeypatch):
     assert [*sv.deform(case.change(influence_factor=factor), mesh)][-1].warnings == ()
     monkeypatch.undo()
     # A streamed run says the same, of nodes that are not in its skin.
-    monkeypatch.setattr(output, "CHUNK", 50)
+    monkeypatch.setattr(streamed_run, "CHUNK", 50)
     done = stream(case, tmp_path / "out.su2b")
     assert node not in done.mesh.numbering.points
     assert done.steps[-1].warnings == (said,)

@@ -11,7 +11,7 @@ from slideviz.cli.terminal import DONE, say
 from slideviz.errors import CaseError
 from slideviz.formats.files import convert
 from slideviz.solver.steps import Progress
-from slideviz.streaming.resources import missing_memory_of
+from slideviz.streaming.stream_input import missing_memory_of
 
 
 def main(arguments: Namespace) -> int:

@@ -33,7 +33,7 @@ from slideviz.mesh.metrics import rated_metric
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.scene.overview import require_detail
 from slideviz.solver.steps import RunResult
-from slideviz.streaming.resources import missing_memory
+from slideviz.streaming.stream_input import missing_memory
 from slideviz.system.file_checks import same_file
 from slideviz.system.ranks import SERIAL
 from slideviz.terms import METRICS, WALL_VALUES

@@ -16,9 +16,9 @@ from slideviz.session.inspect import WORST
 from slideviz.session.state import StepFrame
 from slideviz.solver.deform import free_memory
 from slideviz.streaming.quality import measure_mesh
-from slideviz.streaming.resources import NEEDED
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.source import CellBlock, FileSource
+from slideviz.streaming.stream_input import NEEDED
 from slideviz.terms import SkewMetric
 
 LARGE_CELLS = 5_000_000

@@ -20,9 +20,9 @@ from slideviz.formats.su2b.read import BLOCK, read_markers
 from slideviz.formats.su2b.write import halo_error, require_binary_names
 from slideviz.formats.table import ZoneContent, format_of
 from slideviz.mesh.model import Cells, IntArray
-from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
 from slideviz.streaming.source import FileSource, Scratch, ZoneSource
+from slideviz.streaming.stream_input import require_disk_space, text_size
 from slideviz.system.atomic import atomic_write
 from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat

@@ -11,7 +11,7 @@ from slideviz.cli import run
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text
 from slideviz.formats.su2 import write
-from slideviz.streaming import converting, resources
+from slideviz.streaming import converting, stream_input
 from tests.builders import grid
 from tests.formats.test_su2b import THREE_D, TWO_D, packed
 from tests.streaming.test_run_text import odd_mesh
@@ -126,7 +126,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(monkeypatch, caps
     sv.write("mesh.su2", grid((4, 4)))
     expected = converted(capsys, "mesh.su2", ".su2b")
     size = Path("mesh.su2").stat().st_size
-    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(stream_input, "free_memory", lambda: stream_input.NEEDED["su2"] * size - 1)
     found = converted(capsys, "mesh.su2", ".su2b")
     assert "mesh.su2 needs about 0 GB of memory, 0 GB are free; it is streamed" in found[2]
     assert found[3] == expected[3]

@@ -23,8 +23,6 @@ from slideviz.solver.deform import folded_at
 from slideviz.solver.steps import Progress, Step
 from slideviz.streaming import (
     interior,
-    output,
-    resources,
     stream_input,
     streamed_repair,
 )
@@ -113,7 +111,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
     mesh = sv.read(case.mesh_file)
     steps = list(sv.deform(case, mesh, certify=True))
     for chunk in (37, 1 << 20):
-        monkeypatch.setattr(output, "CHUNK", chunk)
+        monkeypatch.setattr(streamed_run, "CHUNK", chunk)
         monkeypatch.setattr(streamed_repair, "CELLS", chunk)
         done = stream(case, tmp_path / "out.su2b")
         moved = sv.read(tmp_path / "out.su2b")
@@ -128,7 +126,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
 
 
 def test_folded_cells_are_followed_through_the_steps(tmp_path, monkeypatch):
-    monkeypatch.setattr(output, "CHUNK", 50)
+    monkeypatch.setattr(streamed_run, "CHUNK", 50)
     case = made(tmp_path, "square", 25, ("STEPS=3", "SLIDING_MODE=none", "PERIODIC_MODE=none"))
     case = case.change(motions=(sv.Rotate(case.markers_with("moving")[0], 170.0),))
     mesh = sv.read(case.mesh_file)
@@ -144,7 +142,7 @@ def test_folded_cells_are_followed_through_the_steps(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["mixed", "prism"])
 def test_cells_in_another_order_and_other_zones_stay(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(output, "CHUNK", 40)
+    monkeypatch.setattr(streamed_run, "CHUNK", 40)
     mesh = grid((5, 4, 4), kind=kind)
     assert kind == "prism" or len(mesh.cells.by_type) > 1
     path = tmp_path / "mesh.su2b"
@@ -220,14 +218,16 @@ def test_a_streamed_run_says_at_once_that_it_measures_no_heights(tmp_path, capsy
 
 
 def test_a_run_that_is_stopped_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(output, "CHUNK", 60)
+    monkeypatch.setattr(streamed_run, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / "out.su2b"
     out.write_bytes(b"older")
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     for stop in sorted({0, 1, parts // 2, parts - 1}):
         with monkeypatch.context() as patch:
-            patch.setattr(output, "write_points", stopped_after(output.write_points, stop))
+            patch.setattr(
+                streamed_run, "write_points", stopped_after(streamed_run.write_points, stop)
+            )
             with pytest.raises(StoppedError):
                 stream(case, out)
         assert out.read_bytes() == b"older"
@@ -336,13 +336,13 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 from slideviz.__main__ import _heed_signals
 _heed_signals()
 from slideviz.cli import run
-from slideviz.streaming import output
-move = output.write_points
+from slideviz.streaming import run as streamed_run
+move = streamed_run.write_points
 def slow(*a):
     print("writes", flush=True)
     time.sleep(0.05)
     return move(*a)
-output.write_points, output.CHUNK = slow, int(sys.argv[1])
+streamed_run.write_points, streamed_run.CHUNK = slow, int(sys.argv[1])
 sys.exit(run(["run", *sys.argv[2:], "-q", "--stream"]))
 """
 ROOT = Path(sv.__file__).parents[1]
@@ -417,7 +417,7 @@ def both_ways(tmp_path, kind="plain", **changes):
 
 @pytest.mark.parametrize("kind", ["plain", "prism"])
 def test_cells_numbered_both_ways_give_the_bits_of_a_run_in_memory(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(output, "CHUNK", 5)
+    monkeypatch.setattr(streamed_run, "CHUNK", 5)
     case = both_ways(tmp_path, kind)
     mesh = sv.read(case.mesh_file)
     assert set(sv.quality(mesh).signs) == {1, -1}
@@ -431,7 +431,7 @@ def test_cells_numbered_both_ways_give_the_bits_of_a_run_in_memory(tmp_path, mon
 
 @pytest.mark.parametrize("change", ["folded", "unmarked"])
 def test_cells_numbered_both_ways_are_told_where_some_may_be_folded(tmp_path, monkeypatch, change):
-    monkeypatch.setattr(output, "CHUNK", 8)
+    monkeypatch.setattr(streamed_run, "CHUNK", 8)
     mesh = grid((4, 4, 3))
     points = mesh.points.copy()
     points[31] += 2.0
@@ -516,7 +516,7 @@ def test_of_two_that_write_one_file_each_writes_it_whole(tmp_path, ending):
 def test_a_copy_is_the_same_where_the_system_cannot_copy_by_itself(tmp_path, monkeypatch):
     case = made(tmp_path, "square", 8, ("STEPS=1",))
     stream(case, tmp_path / "one.su2b")
-    monkeypatch.setattr(output, "_PIECE", 100)
+    monkeypatch.setattr(streamed_run, "_PIECE", 100)
     monkeypatch.delattr(os, "copy_file_range")
     stream(case, tmp_path / "two.su2b")
     assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "two.su2b").read_bytes()
@@ -615,7 +615,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2b"] * size - 1)
+    monkeypatch.setattr(stream_input, "free_memory", lambda: stream_input.NEEDED["su2b"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2b"]) == 0
     told = capsys.readouterr().err
@@ -625,9 +625,9 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     for more in (["-o", "out.vtu"], ["-o", "b.su2b", "--steps-dir", "steps"]):
         assert run([*call, *more, "-q"]) == 0
     assert run([*call, "-q", "-o", "c.su2b", "--set", "METHOD=elastic"]) == 3  # done, with folds
-    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2b"] * size)
+    monkeypatch.setattr(stream_input, "free_memory", lambda: stream_input.NEEDED["su2b"] * size)
     assert run([*call, "-q", "-o", "d.su2b"]) == 0
-    assert resources.missing_memory(sv.Case()) == ""
+    assert stream_input.missing_memory(sv.Case()) == ""
 
 
 def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):

@@ -20,7 +20,8 @@ from slideviz.cli import run
 from slideviz.errors import MeshError, NodeError
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample
-from slideviz.streaming import output, skin
+from slideviz.streaming import run as streamed_run
+from slideviz.streaming import skin
 from slideviz.streaming.run import stream
 from slideviz.system import ranks, threads
 from slideviz.system.cleanup import PREFIX
@@ -35,17 +36,17 @@ needs_mpi = pytest.mark.skipif(
 DRIVER = """
 import os, signal, sys, time
 rank = int(os.environ.get("OMPI_COMM_WORLD_RANK", 0))
-from slideviz.streaming import output
+from slideviz.streaming import run as streamed_run
 from slideviz.streaming import skin
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text
-output.CHUNK, skin.BLOCK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
-move = output.write_points
+streamed_run.CHUNK, skin.BLOCK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
+move = streamed_run.write_points
 def late(*given):
     time.sleep({pause})
     {hook}
     return move(*given)
-output.write_points = late
+streamed_run.write_points = late
 from slideviz.__main__ import _heed_signals
 _heed_signals()
 from slideviz.cli import run
@@ -162,7 +163,7 @@ def test_what_moves_nodes_can_be_sent(tmp_path, monkeypatch, name, size, sets):
     """Every kind of field and frame."""
     case = made(tmp_path, name, size, sets)
     one = stream(case, tmp_path / "one.su2b")
-    monkeypatch.setattr(output, "CHUNK", 500)
+    monkeypatch.setattr(streamed_run, "CHUNK", 500)
     monkeypatch.setattr(skin, "BLOCK", 300)
     other = stream(case, tmp_path / "other.su2b", ranks=Sent())
     assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "other.su2b").read_bytes()

@@ -21,7 +21,7 @@ from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text
 from slideviz.formats.su2 import write
 from slideviz.samples.table import write_sample
-from slideviz.streaming import converting, output, resources
+from slideviz.streaming import converting, stream_input
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import stream
 from tests.builders import grid
@@ -46,7 +46,7 @@ def small(monkeypatch):
     """Pieces, parts and blocks have few rows."""
     monkeypatch.setattr(su2_text, "BLOCK_BYTES", 700)
     monkeypatch.setattr(binary_copy, "PIECES", 3)
-    monkeypatch.setattr(output, "CHUNK", 60)
+    monkeypatch.setattr(streamed_run, "CHUNK", 60)
 
 
 FEW = [RUNS[k] for k in (1, 6, 7, 8, 14)]
@@ -69,7 +69,7 @@ def test_bytes_are_those_of_a_run_in_memory(tmp_path, monkeypatch, ending, name,
     case = made(tmp_path, name, size, sets)
     expected = in_memory(case, tmp_path / f"memory.{ending}")
     for chunk, block in ((37, 700), (1 << 20, 1 << 20)):
-        monkeypatch.setattr(output, "CHUNK", chunk)
+        monkeypatch.setattr(streamed_run, "CHUNK", chunk)
         monkeypatch.setattr(su2_text, "BLOCK_BYTES", block)
         stream(case, tmp_path / f"out.{ending}")
         assert (tmp_path / f"out.{ending}").read_bytes() == expected
@@ -249,11 +249,13 @@ def test_a_run_that_is_stopped_leaves_nothing(tmp_path, monkeypatch, small, endi
 
     for stop in (-1, 0, 3, parts - 1, *([parts] if ending == "su2" else [])):
         with monkeypatch.context() as patch:
-            patch.setattr(output, "write_points", stopped_after(output.write_points, stop))
+            patch.setattr(
+                streamed_run, "write_points", stopped_after(streamed_run.write_points, stop)
+            )
             if stop == -1:
                 patch.setattr(binary_copy, "_write_points", stopped)
             if stop == parts:
-                patch.setattr(output, "patched_text", stopped)
+                patch.setattr(streamed_run, "patched_text", stopped)
             with pytest.raises(StoppedError):
                 stream(case, out)
         assert out.read_bytes() == b"older"
@@ -280,7 +282,7 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 import slideviz as sv
-from slideviz.streaming import converting, output, run
+from slideviz.streaming import run as streamed_run
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text
 def late(what):
@@ -288,12 +290,12 @@ def late(what):
         time.sleep(0.05)
         return what(*a)
     return slow
-output.CHUNK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
-output.write_points = late(output.write_points)
+streamed_run.CHUNK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
+streamed_run.write_points = late(streamed_run.write_points)
 binary_copy._write_cells = late(binary_copy._write_cells)
 from slideviz.formats.su2 import write
 write._moved_rows = late(write._moved_rows)
-run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]))
+streamed_run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]))
 """
 
 
@@ -370,7 +372,7 @@ def test_errors_name_the_text(tmp_path, small):
         roles={"x_p": "moving"},
         motions=(sv.Translate("x_p", (0.1, 0.0)),),
     )
-    output.CHUNK = 8  # the fixture puts it back
+    streamed_run.CHUNK = 8  # the fixture puts it back
     with pytest.raises(MeshError, match=r"mesh.su2: some cells are numbered the other way") as told:
         stream(case, tmp_path / "out.su2")
     assert ".binary" not in str(told.value)
@@ -380,7 +382,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(stream_input, "free_memory", lambda: stream_input.NEEDED["su2"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2"]) == 0
     assert "note: mesh.su2 needs about 0 GB of memory" in capsys.readouterr().err
@@ -389,5 +391,5 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     halo = with_halo(case.mesh_file.read_text())
     Path("halo.su2").write_text(halo)
     assert run([*call, "-o", "out.su2", "-q", "--set", "MESH_FILENAME=halo.su2"]) == 0
-    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size)
+    monkeypatch.setattr(stream_input, "free_memory", lambda: stream_input.NEEDED["su2"] * size)
     assert run([*call, "-o", "out.su2", "-q"]) == 0

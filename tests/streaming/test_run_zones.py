@@ -10,7 +10,8 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.model import Assembly, Skin
 from slideviz.mesh.zones import join_zones
-from slideviz.streaming import output, streamed_repair
+from slideviz.streaming import run as streamed_run
+from slideviz.streaming import streamed_repair
 from slideviz.streaming.run import stream
 from slideviz.streaming.skin import read_skin
 from tests.builders import grid, passage
@@ -97,7 +98,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, ending):
     found = sv.quality(steps[-1].mesh, mesh)
     sv.write(tmp_path / f"memory.{ending}", steps[-1].mesh)
     assert len(found.inverted_cells(100)) or name not in ("folded", "repaired")
-    monkeypatch.setattr(output, "CHUNK", 37)
+    monkeypatch.setattr(streamed_run, "CHUNK", 37)
     monkeypatch.setattr(streamed_repair, "CELLS", 37)
     done = stream(case.change(mesh_file=path), tmp_path / f"out.{ending}", worst=5)
     assert (done.mesh.zone, done.mesh.zones) == (None, 2)
@@ -144,13 +145,13 @@ def test_a_text_becomes_binary_and_back(tmp_path):
 def test_zones_are_read_through_one_lock(tmp_path, monkeypatch):
     """Threads write the zones of a text; a file has one place at which it is read."""
     files = []
-    patched = output.patched_text
+    patched = streamed_run.patched_text
 
     def spied(texts, moved, boxes):
         files.extend(zone.points.file for zone in moved)
         return patched(texts, moved, boxes)
 
-    monkeypatch.setattr(output, "patched_text", spied)
+    monkeypatch.setattr(streamed_run, "patched_text", spied)
     stream(both().change(mesh_file=rows(tmp_path)), tmp_path / "out.su2")
     assert len(files) == 2
     assert files[0] is files[1]
