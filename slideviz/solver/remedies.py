@@ -131,8 +131,7 @@ def _beyond_pitch_of_zone(case: Case, mesh: Mesh) -> str:
 def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
     if pair.kind == "translational":
         return float(np.abs(vectors @ (pair.vector / pair.period)).max(initial=0.0))
-    before, after = (
-        in_axis_frame(at, pair.axis, pair.origin) @ (1.0, 1.0j, 0.0)
-        for at in (points, points + vectors)
-    )
+    plane = (1.0, 1.0j, 0.0)
+    before = in_axis_frame(points, pair.axis, pair.origin) @ plane
+    after = in_axis_frame(points + vectors, pair.axis, pair.origin) @ plane
     return float(np.abs(np.angle(after * before.conj())).max(initial=0.0))
