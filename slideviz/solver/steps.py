@@ -159,8 +159,6 @@ class MeshRepair:
             return f"{before - after:,} of {before:,} folded cells mended{left}"
         if not len(self.cells):
             return "no cell needs repair"
-        if poor > len(self.cells):  # the lowest quality counts first
-            return f"lowest quality raised, {poor:,} cells are poor instead of {len(self.cells):,}"
         return f"{len(self.cells) - poor:,} of {len(self.cells):,} poor cells mended"
 
     @property

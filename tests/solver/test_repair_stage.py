@@ -12,7 +12,6 @@ from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError, UnsoundError, messages_of
 from slideviz.mesh.quality import VALID
 from slideviz.solver.repair_stage import find_freedom, repair_case
-from slideviz.solver.steps import MeshRepair
 from tests import builders
 
 MOTIONS = (sv.Translate("", (0.25, 0.1)), sv.Rotate("", 50.0))
@@ -104,15 +103,6 @@ def test_repair_does_not_hide_nodes_that_run_away(values, steps):
     )
     with pytest.raises(UnsoundError, match=r"would move by .*, more than 5 times the"):
         list(sv.deform(case.change(steps=steps), mesh))
-
-
-def test_a_report_counts_no_cells_that_became_poor_as_mended():
-    none = np.empty(0, np.int64)
-    few, more = np.arange(30), np.arange(41)
-    done = MeshRepair(
-        builders.square(2, block=False), few, more, none, none, none, np.empty((0, 2)), 0.0
-    )
-    assert done.words() == "lowest quality raised, 41 cells are poor instead of 30"
 
 
 @pytest.mark.parametrize("role", ["sliding", "internal"])

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +57,6 @@ TREND = 5  # rounds of a lift after which it ends if it will not reach the limit
 
 SHAPE = 10.0
 """Weight of the energy of shape beside that of the lift, which does not see short edges."""
-
-WORTH = 1.02
-"""Factor by which the lowest quality must rise if more cells are below the limit afterwards."""
 
 FLAT_SIDE = 1e-6
 """Sine of the angle between the normals of a side's corners, up to which it is flat. In a flat side
@@ -137,7 +134,11 @@ class _Work:
     metric: SkewMetric
     below: float
     report: Callable[[float], object]
-    hopeless: NDArray[np.bool_]  # (m,): cells that cannot be mended, which no energy counts
+    hopeless: NDArray[np.bool_]
+    bad: NDArray[np.bool_]
+    """`hopeless`, `bad` (m,): cells that cannot be mended, which no energy counts, and those that
+    were bad before the first round."""
+    wanted: float  # the limit of the last round
     pool: ThreadPoolExecutor
 
 
@@ -261,6 +262,7 @@ class _Rounds:
         self.regions = regions
         self.cells = cells
         self.ratings = ratings
+        self.before = cells
         self.below = below
         self.metric = metric
         self.pool = pool
@@ -290,8 +292,21 @@ class _Rounds:
                     self.impossible[one.cell] = one
             hopeless = np.isin(region.cells, list(self.impossible))
             wanted &= ~hopeless
-            settings = region.freedom, sums, signs, self.metric, limit, tick, hopeless, self.pool
-            _mend_patches(_Work(mesh, reference, *settings), wanted, RINGS[stage], points)
+            work = _Work(
+                mesh=mesh,
+                reference=reference,
+                freedom=region.freedom,
+                sums=sums,
+                signs=signs,
+                metric=self.metric,
+                below=limit,
+                report=tick,
+                hopeless=hopeless,
+                bad=np.isin(region.cells, self.before),
+                wanted=self.below,
+                pool=self.pool,
+            )
+            _mend_patches(work, wanted, RINGS[stage], points)
             now = quality_ratings(quality(mesh.with_points(points), reference, self.metric))
             if self._rate(region.cells, now):
                 self.regions.move(region, points)
@@ -301,15 +316,17 @@ class _Rounds:
             bad = region.cells[wanted & (now < (limit if stage + 1 < POOR else 0.0))]
 
     def _rate(self, cells: IntArray, ratings: FloatArray) -> bool:
-        """Take new ratings (m,) of the cells (m,) of a region; return whether they are better."""
+        """Take new ratings (m,) of the cells (m,) of a region, unless they are worse; return that.
+
+        They are if more cells are folded, or as many and more poor than at first and than before.
+        """
         beyond = ~np.isin(self.cells, cells)
         poor = ratings < self.below
         every = np.concatenate([self.cells[beyond], cells[poor]])
         now = np.concatenate([self.ratings[beyond], ratings[poor]])
-        more = len(every) > len(self.cells) and (now < 0.0).sum() == (self.ratings < 0.0).sum()
-        lowest = now[now >= 0.0].min(initial=1.0)
-        before = self.ratings[self.ratings >= 0.0].min(initial=1.0)
-        if more and not lowest > WORTH * before:
+        folded = (now < 0.0).sum() - (self.ratings < 0.0).sum()
+        most = max(len(self.before), len(self.cells))
+        if folded > 0 or (folded == 0 and len(now) > most):
             return False
         order = np.argsort(every)
         self.cells = every[order]
@@ -388,6 +405,16 @@ def _mend_patches(work: _Work, bad: NDArray[np.bool_], rings: int, points: Float
             points[patch.nodes] = patch.mended()
 
 
+class _Score(NamedTuple):
+    """How good a patch is; the greater tuple is better."""
+
+    proved: int
+    fewer: int
+    """`proved`, `fewer`: minus the number of cells that are not proved, and minus that of bad cells
+    beyond those before the first round."""
+    lowest: float  # the lowest quality
+
+
 class _Mending:
     """The work on one patch."""
 
@@ -414,6 +441,7 @@ class _Mending:
         ids = np.concatenate(order)
         self.signs = work.signs[ids]
         self.sums = work.sums[ids]
+        self.most = int(work.bad[ids].sum())
         length = _local_lengths(work.mesh.points[self.nodes], tables)
         self.parts = []
         for (vtk, local), some in zip(tables.items(), order, strict=True):
@@ -429,52 +457,60 @@ class _Mending:
         moves = free[self.nodes]
         moves[self.patch.freedom.curved] = False
         self.moves = moves
+        self.best_points = self.patch.start
+        self.best = self.score(self.best_points)
 
     def _patch(self, points: FloatArray, moves: NDArray[np.bool_]) -> Patch:
         """Return the patch, in which the nodes of the mask ``moves`` (k,) move."""
         freedom = self.work.freedom.of_part(self.nodes).only(moves)
         return Patch(points, freedom, self.parts, self.work.pool)
 
-    def score(self, points: FloatArray) -> tuple[int, float]:
-        """Return (minus the number of cells not proved, the lowest quality) at points (k, d)."""
-        unproved = 0
-        lowest = np.inf
+    def ratings(self, points: FloatArray) -> FloatArray:
+        """Return the quality (m,) of the cells at points (k, d), and -1 if they are not proved."""
+        out = np.empty(len(self.signs))
         first = 0
         for part in self.parts:
             here = slice(first, first + len(part.nodes))
             cells = part.nodes, self.signs[here], self.sums[here]
             size, skew, status = cell_quality(points, part.vtk, *cells, self.work.metric)
-            unproved += int((status != VALID).sum())
             values = np.sqrt(size) * skew if self.work.reference is not None else skew
-            lowest = min(lowest, float(values.min()))
+            out[here] = np.where(status == VALID, values, -1.0)
             first = here.stop
-        return -unproved, lowest
+        return out
 
-    def good(self, score: tuple[int, float]) -> bool:
-        """Return whether all cells are as they should be."""
-        return score[0] == 0 and score[1] >= self.work.below
+    def score(self, points: FloatArray) -> _Score:
+        """Return how good points (k, d) are."""
+        ratings = self.ratings(points)
+        bad = int((ratings < self.work.wanted).sum())
+        return _Score(-int((ratings < 0).sum()), min(self.most - bad, 0), float(ratings.min()))
+
+    def _keep(self, points: FloatArray) -> _Score:
+        """Take points (k, d) where they are better than all before; return their score."""
+        score = self.score(points)
+        if score > self.best:
+            self.best = score
+            self.best_points = points
+        return score
+
+    @property
+    def good(self) -> bool:
+        """Whether all cells are as they should be."""
+        return self.best >= (0, 0, self.work.below)
 
     def mended(self) -> FloatArray:
         """Return the best points (k, d)."""
-        best_points = self.patch.start
-        best = self.score(best_points)
-        if best[0] < 0:
-            best_points, best = self._unfolded(best_points, best)
-        if best[0] == 0:
-            self.patch.start = best_points
-            points = self._settled(self._descended(self.patch, LIFTED, POLISH), LIFTED)
-            if (score := self.score(points)) > best:
-                best_points = points
-                best = score
+        if self.best.proved < 0:
+            self._unfold()
+        if self.best.proved == 0:
+            self.patch.start = self.best_points
+            self._keep(self._settled(self._descended(self.patch, LIFTED, POLISH), LIFTED))
         # The quality of a cell that is folded in the reference is 0, however it is lifted.
-        if best[0] == 0 and best[1] > 0 and not self.good(best):
-            best_points, best = self._lifted(best_points, best)
-        return best_points
+        if self.best.proved == 0 and self.best.lowest > 0 and not self.good:
+            self._lift()
+        return self.best_points
 
-    def _unfolded(
-        self, best_points: FloatArray, best: tuple[int, float]
-    ) -> tuple[FloatArray, tuple[int, float]]:
-        """Return the best points (k, d) and their score, after rounds in which epsilon falls."""
+    def _unfold(self) -> None:
+        """Unfold cells in rounds in which epsilon falls."""
         patch = self.patch
         epsilon = 1.0
         vain = 0
@@ -482,12 +518,10 @@ class _Mending:
             before = patch.energy(patch.still, epsilon)[0]
             patch.start = self._settled(self._descended(patch, epsilon), epsilon)
             after = patch.energy(patch.still, epsilon)[0]
-            score = self.score(patch.start)
-            vain = 0 if score[0] > best[0] else vain + 1
-            if score > best:
-                best_points = patch.start
-                best = score
-            if best[0] == 0 or vain >= VAIN:
+            proved = self.best.proved
+            self._keep(patch.start)
+            vain = 0 if self.best.proved > proved else vain + 1
+            if self.best.proved == 0 or vain >= VAIN:
                 break
             depth = float(patch.least.min())
             if vain < 3:
@@ -496,7 +530,6 @@ class _Mending:
                 chi = 0.5 * (depth + np.hypot(epsilon, depth))
                 bound = (1 - max(1 - after / before, 0.1)) * chi
                 epsilon = float(2 * np.sqrt(bound * (bound - depth))) if depth < bound else 1e-10
-        return best_points, best
 
     def _descended(self, patch: Patch, epsilon: float, least: float | None = None) -> FloatArray:
         """Return points (k, d) of lower energy; ``least`` is the decrease that ends it."""
@@ -547,18 +580,20 @@ class _Mending:
         way = np.linalg.norm(direction[patch.freedom.place[curved]], axis=1)
         return float(np.min(0.5 * edges[way > 0] / way[way > 0], initial=np.inf))
 
-    def _lifted(
-        self, best_points: FloatArray, best: tuple[int, float]
-    ) -> tuple[FloatArray, tuple[int, float]]:
-        """Return the best points (k, d) and their score, after rounds that lift the worst cells."""
+    def _lift(self) -> None:
+        """Lift the worst cells in rounds."""
         patch = self.patch
         work = self.work
         vain = 0
-        first = best[1]
+        first = self.best.lowest
+        spares = False
         sized = work.reference is not None
         for count in range(1, ROUNDS + 1):
-            patch.start = best_points
-            beta = BETA / best[1]
+            patch.start = self.best_points
+            before = self.best
+            beta = np.full(len(self.signs), BETA / before.lowest)
+            if spares:
+                beta[self.ratings(self.best_points) >= work.wanted] = 1.0 / work.wanted
             inverse = patch.curvature(LIFTED)
             edges = self._edges(patch)
 
@@ -585,17 +620,15 @@ class _Mending:
                 iterations=LIFTS,
                 decrease=lambda: ENOUGH,
             )
-            points = self._settled(patch.points(found), LIFTED)
-            score = self.score(points)
-            vain = 0 if score[1] > best[1] * (1 + GAIN) else vain + 1
-            if score > best:
-                best_points = points
-                best = score
+            self._keep(self._settled(patch.points(found), LIFTED))
+            vain = 0 if self.best.lowest > before.lowest * (1 + GAIN) else vain + 1
             # The lowest quality after all rounds, if it rises as it did so far.
-            end = first * (best[1] / first) ** (ROUNDS / count)
-            if self.good(best) or vain >= 2 or (count >= TREND and end < work.below):
+            end = first * (self.best.lowest / first) ** (ROUNDS / count)
+            hopeless = count >= TREND and end < work.below
+            if not spares and (self.best is before or self.best.fewer < 0):
+                spares = True
+            elif self.good or vain >= 2 or self.best is before or hopeless:
                 break
-        return best_points, best
 
     def _progress(self) -> None:
         self.round += 1
@@ -637,7 +670,7 @@ def lift_energy(
     sums: FloatArray,
     sized: bool,
     metric: SkewMetric,
-    beta: float,
+    beta: FloatArray,
 ) -> tuple[float, FloatArray]:
     """Return the lift of a patch, which rises without bound as a cell comes near a limit.
 
@@ -658,15 +691,16 @@ def lift_energy(
         size, skew, status = cell_quality(points, part.vtk, nodes, turn, before, metric)
         with np.errstate(all="ignore"):
             inverse = 1.0 / (np.sqrt(size) * skew if sized else skew)
-            good = (status != INVERTED) & (inverse < beta)
-            gap = beta - inverse
+            limit = beta[cells]
+            good = (status != INVERTED) & (inverse < limit)
+            gap = limit - inverse
             patch.values[cells] = np.where(good, inverse / gap, np.inf)
             powers = np.array(EXPONENTS[metric][part.vtk], float)
             compared = before if sized else np.full(len(nodes), np.inf)
             write_slopes(
                 part.vtk, points, nodes, CORNERS[part.vtk], turn, powers, compared, slopes[here]
             )
-            slopes[here] *= np.where(good, -beta * inverse / gap**2, 0.0)[:, None, None]
+            slopes[here] *= np.where(good, -limit * inverse / gap**2, 0.0)[:, None, None]
 
     patch.of_cells(work)
     return float(patch.values.sum()), patch.gathered()
