@@ -156,7 +156,6 @@ class Running(QObject):
         log.info("run: %s, %s, %s", method_words(case), periodic, words)
         case = session.with_chosen_roles(case)
         if session.lacks_cells:
-            assert output is not None
             call = self._run_done, compute_streamed, case, session.first, output
             self.start_job("Starting", *call)
             return

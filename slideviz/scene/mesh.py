@@ -395,7 +395,6 @@ class CoarseLayer(Layer):
 
     def _draw(self) -> None:
         session = self._session
-        assert session.mesh is not None
         assert session.frame is not None
         if not self.drawn:
             self.drawn = {name: self._add(surface) for name, surface in self.surfaces.items()}

@@ -417,7 +417,6 @@ def compute_streamed(
         _tick(f"From file to file: {phase}", report, stopped)(overall(now))
 
     skin = first.mesh
-    assert skin.source is not None
     done = stream(case.change(mesh_file=skin.source), output, report=progress, worst=WORST)
     step = done.steps[-1]
     now = skin.with_points(step.mesh.points)

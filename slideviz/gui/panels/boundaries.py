@@ -213,7 +213,6 @@ class BoundariesPanel(Panel):
         guess = session.guesses.get(name)
         item = self.table.item(row, NAME)
         choice = self._choices[row]
-        assert choice is not None
         self._show_checked(item, name not in session.view.hidden)
         about = "".join(
             f"\nIt is {each.describe()}." for each in session.mesh.interfaces if each.marker == name
@@ -231,7 +230,6 @@ class BoundariesPanel(Panel):
         choice.setToolTip(wrapped(tip))
 
     def _show_checked(self, item: QTableWidgetItem | None, shown: bool) -> None:
-        assert item is not None
         item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
         item.setForeground(QBrush() if shown else self.palette().placeholderText())
 

@@ -465,7 +465,6 @@ class MotionEditor(QWidget):
         return (*value, *before[len(value) :]) if boxed else value
 
     def _browse(self) -> None:
-        assert self._motion is not None
         title = self._motion.file_words.capitalize()
         name, _ = QFileDialog.getOpenFileName(self, title, self.path.text())
         if name:

@@ -162,7 +162,6 @@ class FlatViews(QWidget):
 
     def show_section(self, session: Session, section: Section) -> None:
         """Show a section of the mesh of each 3D view, the views made or dropped as needed."""
-        assert session.mesh is not None
         other = second_session(session)
         first_pane = session, self.viewing.scene.sections.cuts
         second_pane = None if other is None else (other, self.viewing.second_cuts)

@@ -97,7 +97,6 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_last_tick(axes), *_legend_texts(axes))
     if key != place.key:
         engine = figure.get_layout_engine()
-        assert engine is not None
         engine.execute(figure)
         place = AxesPlace(key, axes.get_position().bounds)
     figure.set_layout_engine("none")
