@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
@@ -34,7 +35,10 @@ class BackgroundJob(QObject):
         super().__init__(parent)
         self.store = store
         self._runner = JobRunner(self)
-        self._timer = single_shot(self, self._start, wait_ms)
+        self._timer = single_shot(self, self._begin, wait_ms)
+        self._runner.finished.connect(self._finished)
+        self._runner.cancelled.connect(self._schedule)
+        self._runner.failed.connect(self._failed)
 
     @property
     def busy(self) -> bool:
@@ -44,7 +48,25 @@ class BackgroundJob(QObject):
         self._timer.stop()
         self._runner.close()
 
+    def _schedule(self) -> None:
+        """Start the timer, if there is something to do."""
+        self._timer.start()
+
+    def _begin(self) -> None:
+        if self._runner.busy:
+            self._timer.start()
+        else:
+            self._start()
+
     def _start(self) -> None:
+        """Start the job."""
+        raise NotImplementedError
+
+    def _finished(self, found: Any) -> None:
+        """Take the result of the job."""
+        raise NotImplementedError
+
+    def _failed(self, error: Exception) -> None:
         raise NotImplementedError
 
 
@@ -53,9 +75,6 @@ class IntersectionCheck(BackgroundJob):
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(store, parent, INTERSECTION_MS)
-        self._runner.finished.connect(self._finished)
-        self._runner.cancelled.connect(self._schedule)
-        self._runner.failed.connect(self._failed)
         self._running_key: tuple[object, ...] = ()
         self._checked_key: tuple[object, ...] = ()
         store.listen(self._changed)
@@ -72,9 +91,7 @@ class IntersectionCheck(BackgroundJob):
 
     def _start(self) -> None:
         session = self.store.session
-        if self._runner.busy:
-            self._timer.start()
-        elif session.mesh is not None:
+        if session.mesh is not None:
             self._running_key = jobs.intersection_key(session)
             self._runner.start(jobs.find_intersection, session.case, session.mesh)
 
@@ -93,9 +110,6 @@ class LimitCheck(BackgroundJob):
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(store, parent, INTERSECTION_MS)
-        self._runner.finished.connect(self._finished)
-        self._runner.cancelled.connect(self._schedule)
-        self._runner.failed.connect(lambda error: log.error("limits: %s", error))
         store.listen(lambda _old, _new: self._schedule())
 
     def _schedule(self) -> None:
@@ -106,14 +120,15 @@ class LimitCheck(BackgroundJob):
 
     def _start(self) -> None:
         session = self.store.session
-        if self._runner.busy:
-            self._timer.start()
-        elif session.frame is not None and session.mesh is not None:
+        if session.frame is not None and session.mesh is not None:
             self._runner.start(check_frame, session.frame, session.mesh, session.case)
 
     def _finished(self, checked: CheckedLimits) -> None:
         self.store.change(replace, checked=checked)
         self._schedule()
+
+    def _failed(self, error: Exception) -> None:
+        log.error("limits: %s", error)
 
 
 class SectionReader(BackgroundJob):
@@ -129,9 +144,6 @@ class SectionReader(BackgroundJob):
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(store, parent)
-        self._runner.finished.connect(self._read)
-        self._runner.cancelled.connect(self._timer.start)
-        self._runner.failed.connect(self._failed)
         self._runner.progressed.connect(lambda doing: self.progressed.emit(doing.text))
         self._running: tuple[Mesh, Section] | None = None
         self._unreadable: set[tuple[Mesh, Section]] = set()
@@ -149,19 +161,20 @@ class SectionReader(BackgroundJob):
             and (view.frame.mesh, cut_key(section)) not in self._unreadable
         ]
 
+    def _begin(self) -> None:
+        # The section being read may be dragged on, and its cells no longer wanted.
+        wanted = [(frame.mesh, section) for frame, section in self._awaited()]
+        if not self._runner.busy:
+            self._start()
+        elif self._running not in wanted:
+            self._runner.cancel()
+
     def _start(self) -> None:
-        awaited = self._awaited()
-        if self._runner.busy:
-            # The section being read may be dragged on, and its cells no longer wanted.
-            if self._running not in [(frame.mesh, section) for frame, section in awaited]:
-                self._runner.cancel()
-            return
-        if awaited:
-            frame, section = awaited[0]
+        for frame, section in self._awaited()[:1]:
             self._running = frame.mesh, section
             self._runner.start(_read_section, frame, section)
 
-    def _read(self, slab: StepFrame) -> None:
+    def _finished(self, slab: StepFrame) -> None:
         assert self._running is not None
         keep_slab(*self._running, slab)
         self.progressed.emit("")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
+from slideviz.rbf.closest import ClosestPoints
 from slideviz.session.state import StepFrame
 from slideviz.terms import (
     CELL_STATES,
@@ -74,34 +76,14 @@ def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
     near = nodes[np.argpartition(squares, some - 1)[:some]]
     at = np.flatnonzero(np.isin(cells.connectivity, near))
     elements = np.unique(np.searchsorted(cells.offsets, at, side="right") - 1)
-    best = float(np.sqrt(squares.min()))
+    pieces: list[list[FloatArray]] = []
     for element in elements:
         begin, end = cells.offsets[element : element + 2]
-        corners = mesh.points[cells.connectivity[begin:end]]
-        best = min(best, _to_polygon(corners, point))
-    return best
-
-
-def _to_polygon(corners: FloatArray, point: FloatArray) -> float:
-    """Return the distance of a point (d,) from a line segment (2, d) or a face (k, 3)."""
-    start = corners
-    end = np.roll(corners, -1, axis=0)
-    along = end - start
-    square = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)
-    part = np.clip(np.einsum("nd,nd->n", point - start, along) / square, 0.0, 1.0)
-    far = float(np.linalg.norm(start + part[:, None] * along - point, axis=1).min())
-    for k in range(1, len(corners) - 1 if corners.shape[1] == 3 else 0):
-        u = corners[k] - corners[0]
-        v = corners[k + 1] - corners[0]
-        w = point - corners[0]
-        normal = np.cross(u, v)
-        area = float(normal @ normal)
-        if area > 0:
-            a = np.cross(w, v) @ normal / area
-            b = np.cross(u, w) @ normal / area
-            if a >= 0 and b >= 0 and a + b <= 1:
-                far = min(far, abs(float(w @ normal)) / area**0.5)
-    return far
+        first, *rest = mesh.points[cells.connectivity[begin:end]]
+        # The last corner again: of a segment that is all.
+        pieces += ([first, one, other] for one, other in pairwise([*rest, rest[-1]]))
+    (closest,) = ClosestPoints(np.array(pieces)).query(point[None])
+    return float(np.linalg.norm(closest - point))
 
 
 WORST = 100  # length of the list of the worst cells

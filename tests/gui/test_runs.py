@@ -55,9 +55,7 @@ def click(driver, number, double=False, keys=Qt.KeyboardModifier.NoModifier):
 
 
 def actions(driver, number):
-    return {
-        act.text(): act for act in panel(driver).actions_table.menu(number).actions() if act.text()
-    }
+    return {act.text(): act for act in panel(driver).menu(number).actions() if act.text()}
 
 
 # The panel --------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from qtpy.QtCore import Qt
+from qtpy.QtCore import Qt, QTimer
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
@@ -24,6 +24,7 @@ from slideviz.gui.panels.worst import (
     info_text,
     place_digits,
 )
+from slideviz.gui.widgets import panel as panels
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
@@ -73,7 +74,7 @@ def flown():
 
 @pytest.fixture
 def panel(qtbot, monkeypatch, flown):
-    for module in (worst, plot_canvas):
+    for module in (panels, plot_canvas):
         monkeypatch.setattr(module, "REST_MS", 0)
     made = WorstPanel(Store(), flown.append, lambda: flown.append("back"))
     made.resize(300, 420)
@@ -164,9 +165,9 @@ def test_hidden_it_lists_nothing_and_catches_up(full, qtbot, monkeypatch):
 
 
 def test_while_steps_are_played_the_list_comes_when_there_is_time(full, qtbot, monkeypatch):
+    full.store.change(changes.show_frame, 0)
     before = cells(full)
-    monkeypatch.setattr(worst, "REST_MS", 40)
-    full._last = worst.time.monotonic()
+    monkeypatch.setattr(panels, "REST_MS", 1000)
     full.store.change(changes.show_frame, 1)
     assert cells(full) == before
     wanted = worst_cells(full.store.session.frames, 1, "size-skew").cells.tolist()
@@ -413,14 +414,14 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
 
 def test_a_list_that_is_hidden_before_its_turn_is_filled_when_it_is_seen(full, qtbot, monkeypatch):
     qtbot.waitUntil(lambda: full.model.worst is not None)
-    monkeypatch.setattr(worst, "REST_MS", 10_000)
+    monkeypatch.setattr(panels, "REST_MS", 10_000)
     full.store.change(changes.show_frame, 1)
-    assert full._timer.isActive()
+    (later,) = (timer for timer in full.findChildren(QTimer) if timer.isActive())
     before = full.model.worst
     full.hide()
-    monkeypatch.setattr(worst, "REST_MS", 0)
-    full._timer.start(0)
-    qtbot.waitUntil(lambda: not full._timer.isActive())
+    monkeypatch.setattr(panels, "REST_MS", 0)
+    later.start(0)
+    qtbot.waitUntil(lambda: not later.isActive())
     assert full.model.worst is before
     full.show()
     qtbot.waitUntil(lambda: full.model.worst is not before)

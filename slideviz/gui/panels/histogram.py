@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from qtpy.QtCore import QRectF, Qt, QTimer, Signal
+from qtpy.QtCore import QRectF, Qt, Signal
 from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen, QShortcut
 from qtpy.QtWidgets import QLabel
 
@@ -14,7 +14,7 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.gui.responsiveness.timers import SELECTING_MS, single_shot
 from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot, is_seen
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_plots import (
     draw_histogram,
@@ -24,7 +24,7 @@ from slideviz.plots.session_plots import (
 )
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import RATED, SIZE_SKEW, WALL_VALUES
 
@@ -129,7 +129,6 @@ class HistogramPanel(Panel):
     def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._pending_range: Range | None = None
-        self._described_frame: StepFrame | None = None
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._range_dragged)
@@ -145,7 +144,7 @@ class HistogramPanel(Panel):
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         escape.activated.connect(self.clear_range)
-        self.follow(_shown)
+        self.follow(_shown, seen=True)
 
     def _make_buttons(self) -> WrappingRow:
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
@@ -177,7 +176,7 @@ class HistogramPanel(Panel):
         self.show_all.setEnabled(session.view.threshold is not None)
         if not self._timer.isActive():
             self.canvas.show_band(session.view.threshold)
-        if session.frame is None:
+        if session.frame is None or session.mesh is None:
             self.range_text.hide()
             self.area.show_text(
                 "Open a mesh first. Then this panel shows how many cells have which quality."
@@ -186,15 +185,6 @@ class HistogramPanel(Panel):
         self.canvas.locked = bool(session.lacks_cells)
         self.canvas.setToolTip(session.lacks_cells or BRUSH)
         self.area.plot()
-        if is_seen(self):
-            self._sync_words(session)
-        else:
-            self._described_frame = None
-
-    def _sync_words(self, session: Session) -> None:
-        if session.frame is None or session.mesh is None:
-            return
-        self._described_frame = session.frame
         what = shown_measure(session)
         counted = session.frame.quality.counted
         quality = session.frame.quality
@@ -204,18 +194,18 @@ class HistogramPanel(Panel):
         bad = quality.inverted
         mean = quality.mean if what == "size-skew" else plain.mean()
         if what == "displacement":  # of a node: values of cells are means over their nodes
-            low = "highest"
+            word = "highest"
             ends = session.frame.largest_displacement(session.mesh)
         elif RATED[what].best == "low":
-            low = "max"
+            word = "max"
             ends = plain.max()
         else:
-            low = "min"
+            word = "min"
             ends = quality.min if what == "size-skew" else plain.min()
         form = ".4f" if what in SIZE_SKEW else ".4g"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
-            f"{low} <b>{float(ends):{form}}</b>&nbsp; mean <b>{mean:{form}}</b>&nbsp; "
+            f"{word} <b>{float(ends):{form}}</b>&nbsp; mean <b>{mean:{form}}</b>&nbsp; "
             f"<span{red}>inverted <b>{bad:,}</b></span>"
         )
         threshold = session.view.threshold
@@ -226,12 +216,6 @@ class HistogramPanel(Panel):
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"
             )
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        # While the panel was behind another tab, the text was not updated.
-        if self._described_frame is None and self.session.frame is not None:
-            QTimer.singleShot(0, self, lambda: self._sync_words(self.session))
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:

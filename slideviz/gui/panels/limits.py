@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from qtpy.QtCore import QSignalBlocker, QSize, Qt, QTimer
-from qtpy.QtGui import QBrush, QColor, QPaintEvent, QResizeEvent
+from qtpy.QtCore import QSignalBlocker, QSize, Qt
+from qtpy.QtGui import QBrush, QColor, QResizeEvent
 from qtpy.QtWidgets import (
     QHeaderView,
     QLabel,
@@ -27,7 +27,7 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.fields import TextField
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
+from slideviz.gui.widgets.plot_canvas import ask_and_write, words_label
 from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes, walls_table
@@ -124,7 +124,6 @@ class LimitsPanel(Panel):
     def __init__(self, store: Store, fly_to: Callable[[int], None]) -> None:
         super().__init__(store)
         self._fly_to = fly_to
-        self._walls_key: tuple[object, ...] = ()
         self.field = TextField()
         self.field.setObjectName("limits_text")
         self.field.setPlaceholderText(EXAMPLE)
@@ -151,7 +150,7 @@ class LimitsPanel(Panel):
         in_column(*parts, buttons, wide=wide, spacing=3, on=self, margins=(4, 4, 4, 4))
         self.follow(lambda one: one.case.limits, self._show_text)
         self.follow(lambda one: (one.limit_results, one.checked, one.limit), self._show_limits)
-        self.follow(lambda one: (one.frame, one.case.roles, one.mesh), self._show_walls)
+        self.follow(lambda one: (one.frame, one.case.roles, one.mesh), self._show_walls, seen=True)
 
     # State to widgets ------------------------------------------------------------------
     def _show_text(self, session: Session) -> None:
@@ -201,22 +200,17 @@ class LimitsPanel(Panel):
         return item
 
     def _show_walls(self, session: Session) -> None:
-        """Fill the table of walls, unless the panel is behind another."""
+        """Fill the table of walls."""
         frame = session.frame
         known = frame is not None and frame.walls is not None
         for widget in (self.hint, self.walls, self.export):
             widget.setVisible(known)
         self.words.setVisible(not known)
         if not known:
-            self._walls_key = ()
             opened = session.lacks_cells or "The walls of this mesh are not known."
             empty = "Open a mesh first. Then this panel has its limits and walls."
             self.words.setText(empty if session.mesh is None else opened)
             return
-        key = (frame, session.case.roles)
-        if key == self._walls_key or not is_seen(self):
-            return
-        self._walls_key = key
         with QSignalBlocker(self.walls):
             self.walls.clear()
             for row in walls_table.wall_rows(session):
@@ -230,13 +224,6 @@ class LimitsPanel(Panel):
                     item.setExpanded(row.layered)
         self.walls.fit_names()
         self.hint.setText(WALLS if self.walls.topLevelItemCount() else NO_WALLS)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        session = self.session
-        # While the panel was behind another tab, the table was not filled.
-        if (session.frame, session.case.roles) != self._walls_key and session.frame is not None:
-            QTimer.singleShot(0, self, lambda: self._show_walls(self.session))
 
     def take_theme(self, _scheme: object) -> None:
         self._show_limits(self.session)

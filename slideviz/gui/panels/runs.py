@@ -36,7 +36,7 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
-from slideviz.gui.widgets.services import Services, main_window
+from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
 from slideviz.session.runs_words import (
     QUALITY_FORMAT,
@@ -252,147 +252,6 @@ TABLE_FILTERS = "Table (*.csv)"
 OF_ALL = ("copy", "export")  # commands for all runs, whichever row is selected
 
 
-class RunActions:
-    """The actions of the runs panel, for the selected run or the run with a given number."""
-
-    def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
-        self.panel = panel
-        self.tree = tree
-        self.store = store
-        self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
-        for command in filter(None, RUN_COMMANDS):
-            self.buttons[command.name] = tool_button(
-                command.tip, lambda _=False, command=command: command.do(self), image=command.image
-            )
-        for name, button in self.buttons.items():
-            button.setObjectName(f"runs_{name}")
-            button.setIconSize(QSize(18, 18))
-        every = list(self.buttons.values())
-        left = 1 + RUN_COMMANDS.index(None)
-        self.row = WrappingRow(every[:left], every[left:], spacing=2)
-        """The buttons."""
-
-    @property
-    def _window(self) -> Services:
-        window = main_window(self.panel)
-        assert window is not None
-        return window
-
-    def _make_compare(self) -> QToolButton:
-        menu = QMenu()
-        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
-        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
-        return tool_button(tip, image="beside", text="Compare", menu=menu)
-
-    def sync(self, session: Session) -> None:
-        """Enable the buttons of the actions that the shown run allows, or the undeformed mesh."""
-        run = session.run_shown
-        self.buttons["compare"].setEnabled(run is not None and run.last is not None)
-        for command in filter(None, RUN_COMMANDS):
-            able = run is not None and command.enabled(run)
-            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
-            self.buttons[command.name].setEnabled(able and selected)
-
-    def menu(self, number: int) -> QMenu:
-        session = self.store.session
-        menu = QMenu(self.panel)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        run = session.run(number)
-        # A right click selects no row: the menu's first line names its run.
-        title = "Undeformed mesh" if run is None else f"Run {number}: {run_words(run)}"
-        menu.addAction(title).setEnabled(False)
-        menu.addSeparator()
-        beside = session.view.beside == number
-        for text, can, function in (
-            ("Show", True, lambda: self.show(number)),
-            (
-                "End the comparison" if beside else f"Show beside run {session.shown}",
-                beside or number != session.shown,
-                lambda: self.show_beside(number),
-            ),
-            ("Rename\tF2", run is not None, lambda: self.tree.edit_name(number)),
-        ):
-            menu.addAction(text, function).setEnabled(can)
-        for command in RUN_COMMANDS:
-            if command is None:
-                menu.addSeparator()
-                continue
-            act = menu.addAction(command.title, self._doing(command, number))
-            act.setEnabled(command.name in OF_ALL or (run is not None and command.enabled(run)))
-        return menu
-
-    def show(self, number: int) -> None:
-        """Show the last step of a run, or the undeformed mesh."""
-        if number == changes.UNDEFORMED:
-            self.store.change(changes.show_frame, 0)
-        else:
-            self.store.change(changes.show_run, number)
-
-    def _doing(self, command: Command, number: int) -> Callable[[], object]:
-        return lambda: command.do(self, number)
-
-    def show_beside(self, number: int) -> None:
-        """Show a run beside the shown one; if it is there already, end the comparison."""
-        session = self.store.session
-        if number != session.shown:
-            ends = session.view.beside == number
-            self.store.change(changes.show_beside, None if ends else number)
-
-    def take_settings(self, number: int | None = None) -> None:
-        """Put the settings of a run back into the panels."""
-        self.store.change(changes.adopt_settings, number or self.tree.number)
-
-    def save_mesh(self, number: int | None = None) -> None:
-        self.store.change(changes.show_run, number or self.tree.number)
-        self._window.files.save_mesh()
-
-    def remove(self, number: int | None = None) -> None:
-        number = number or self.tree.number
-        if number is None:
-            return
-        self.store.change(changes.remove_run, number)
-        self._window.show_status(f"Run {number} removed (Ctrl+Z brings it back)")
-
-    def copy_table(self, _number: int | None = None) -> None:
-        """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
-        QApplication.clipboard().setText(csv_text(table_rows(self.store.session.runs), "\t"))
-        self._window.show_status("Copied the table of runs")
-
-    def export_table(self, _number: int | None = None) -> None:
-        """Ask for a file name and write the table of all runs as CSV."""
-        session = self.store.session
-        folder = session.path.parent if session.path is not None else Path.home()
-        stem = session.path.stem if session.path is not None else "mesh"
-        ask_and_write(
-            self.panel,
-            "Export the table of runs",
-            folder / f"{stem}_runs.csv",
-            TABLE_FILTERS,
-            lambda path: write_csv(path, table_rows(session.runs)),
-        )
-
-
-# fmt: off
-RUN_COMMANDS: tuple[Command | None, ...] = (
-    Command("settings", "Put its settings back into the panels",
-            "Put its settings back into the panels", RunActions.take_settings, image="settings"),
-    Command("save", "Save its mesh…", "Save the mesh of this run", RunActions.save_mesh,
-            image="save", enabled=lambda run: bool(run.frames and run.end)),
-    Command("remove", "Remove", "Remove this run from the list", RunActions.remove,
-            image="remove", enabled=lambda run: bool(run.end)),
-    None,
-    Command("copy", "Copy the table", "Copy the table of all runs", RunActions.copy_table,
-            image="copy"),
-    Command("export", "Export the table…", "Export the table of all runs as CSV",
-            RunActions.export_table, image="table"),
-)
-# fmt: on
-"""The buttons' commands, which the menu of a row has too (None: a separator in the menu).
-
-``do`` is called with the `RunActions`, and from the menu with the number of its run; ``enabled``
-is called with a `Run`."""
-
-
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
 
 
@@ -403,10 +262,19 @@ class RunsPanel(Panel):
         super().__init__(store)
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
-        self.actions_table = RunActions(self, self.tree, store)
-        self.buttons = self.actions_table.buttons
+        self.buttons = {"compare": self._make_compare()}
+        for command in filter(None, RUN_COMMANDS):
+            self.buttons[command.name] = tool_button(
+                command.tip, lambda _=False, command=command: command.do(self), image=command.image
+            )
+        for name, button in self.buttons.items():
+            button.setObjectName(f"runs_{name}")
+            button.setIconSize(QSize(18, 18))
         self._connect()
-        parts = (self.empty, self.tree, self.actions_table.row)
+        every = list(self.buttons.values())
+        left = 1 + RUN_COMMANDS.index(None)
+        row = WrappingRow(every[:left], every[left:], spacing=2)
+        parts = (self.empty, self.tree, row)
         in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.follow(lambda one: (one.runs, one.shown, one.view.beside), self._fill)
         self.follow()
@@ -415,7 +283,7 @@ class RunsPanel(Panel):
         self.tree.session = lambda: self.session
         self.tree.currentItemChanged.connect(self._chosen)
         self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
-        self.tree.beside_wanted.connect(self.actions_table.show_beside)
+        self.tree.beside_wanted.connect(self.show_beside)
         self.tree.renamed.connect(
             lambda number, name: self.change(changes.rename_run, number, name)
         )
@@ -431,7 +299,7 @@ class RunsPanel(Panel):
             self._select(session)
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
-        self.actions_table.sync(session)
+        self._sync_buttons(session)
 
     def _select(self, session: Session) -> None:
         """Select the row of the shown run, or that of the undeformed mesh at its step 0."""
@@ -496,7 +364,7 @@ class RunsPanel(Panel):
     # Widgets to state ------------------------------------------------------------------
     def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
         if item is not None:
-            self.actions_table.show(item.data(RUN, NUMBER))
+            self.show_run(item.data(RUN, NUMBER))
 
     def _double_clicked(self) -> None:
         """Show the run beside the one shown before the double click, or end that comparison."""
@@ -515,5 +383,120 @@ class RunsPanel(Panel):
         item = self.tree.itemAt(where)
         if item is None:
             return
-        menu = self.actions_table.menu(item.data(RUN, NUMBER))
+        menu = self.menu(item.data(RUN, NUMBER))
         menu.popup(self.tree.viewport().mapToGlobal(where))
+
+    # Actions, of the selected run or that with a number --------------------------------
+    def _make_compare(self) -> QToolButton:
+        menu = QMenu()
+        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
+        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
+        return tool_button(tip, image="beside", text="Compare", menu=menu)
+
+    def _sync_buttons(self, session: Session) -> None:
+        """Enable the buttons of the actions that the shown run allows, or the undeformed mesh."""
+        run = session.run_shown
+        self.buttons["compare"].setEnabled(run is not None and run.last is not None)
+        for command in filter(None, RUN_COMMANDS):
+            able = run is not None and command.enabled(run)
+            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
+            self.buttons[command.name].setEnabled(able and selected)
+
+    def menu(self, number: int) -> QMenu:
+        session = self.session
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        run = session.run(number)
+        # A right click selects no row: the menu's first line names its run.
+        title = "Undeformed mesh" if run is None else f"Run {number}: {run_words(run)}"
+        menu.addAction(title).setEnabled(False)
+        menu.addSeparator()
+        beside = session.view.beside == number
+        for text, can, function in (
+            ("Show", True, lambda: self.show_run(number)),
+            (
+                "End the comparison" if beside else f"Show beside run {session.shown}",
+                beside or number != session.shown,
+                lambda: self.show_beside(number),
+            ),
+            ("Rename\tF2", run is not None, lambda: self.tree.edit_name(number)),
+        ):
+            menu.addAction(text, function).setEnabled(can)
+        for command in RUN_COMMANDS:
+            if command is None:
+                menu.addSeparator()
+                continue
+            act = menu.addAction(command.title, self._doing(command, number))
+            act.setEnabled(command.name in OF_ALL or (run is not None and command.enabled(run)))
+        return menu
+
+    def show_run(self, number: int) -> None:
+        """Show the last step of a run, or the undeformed mesh."""
+        if number == changes.UNDEFORMED:
+            self.change(changes.show_frame, 0)
+        else:
+            self.change(changes.show_run, number)
+
+    def _doing(self, command: Command, number: int) -> Callable[[], object]:
+        return lambda: command.do(self, number)
+
+    def show_beside(self, number: int) -> None:
+        """Show a run beside the shown one; if it is there already, end the comparison."""
+        session = self.session
+        if number != session.shown:
+            ends = session.view.beside == number
+            self.change(changes.show_beside, None if ends else number)
+
+    def take_settings(self, number: int | None = None) -> None:
+        """Put the settings of a run back into the panels."""
+        self.change(changes.adopt_settings, number or self.tree.number)
+
+    def save_mesh(self, number: int | None = None) -> None:
+        self.change(changes.show_run, number or self.tree.number)
+        main_window(self).files.save_mesh()
+
+    def remove(self, number: int | None = None) -> None:
+        number = number or self.tree.number
+        if number is None:
+            return
+        self.change(changes.remove_run, number)
+        main_window(self).show_status(f"Run {number} removed (Ctrl+Z brings it back)")
+
+    def copy_table(self, _number: int | None = None) -> None:
+        """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
+        QApplication.clipboard().setText(csv_text(table_rows(self.session.runs), "\t"))
+        main_window(self).show_status("Copied the table of runs")
+
+    def export_table(self, _number: int | None = None) -> None:
+        """Ask for a file name and write the table of all runs as CSV."""
+        session = self.session
+        folder = session.path.parent if session.path is not None else Path.home()
+        stem = session.path.stem if session.path is not None else "mesh"
+        ask_and_write(
+            self,
+            "Export the table of runs",
+            folder / f"{stem}_runs.csv",
+            TABLE_FILTERS,
+            lambda path: write_csv(path, table_rows(session.runs)),
+        )
+
+
+# fmt: off
+RUN_COMMANDS: tuple[Command | None, ...] = (
+    Command("settings", "Put its settings back into the panels",
+            "Put its settings back into the panels", RunsPanel.take_settings, image="settings"),
+    Command("save", "Save its mesh…", "Save the mesh of this run", RunsPanel.save_mesh,
+            image="save", enabled=lambda run: bool(run.frames and run.end)),
+    Command("remove", "Remove", "Remove this run from the list", RunsPanel.remove,
+            image="remove", enabled=lambda run: bool(run.end)),
+    None,
+    Command("copy", "Copy the table", "Copy the table of all runs", RunsPanel.copy_table,
+            image="copy"),
+    Command("export", "Export the table…", "Export the table of all runs as CSV",
+            RunsPanel.export_table, image="table"),
+)
+# fmt: on
+"""The buttons' commands, which the menu of a row has too (None: a separator in the menu).
+
+``do`` is called with the panel, and from the menu with the number of its run; ``enabled``
+is called with a `Run`."""

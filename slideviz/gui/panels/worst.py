@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from html import escape
 from typing import NamedTuple
 
 import numpy as np
-from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, QTimer, Signal
+from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from qtpy.QtGui import (
     QBrush,
     QColor,
     QGuiApplication,
     QKeyEvent,
     QKeySequence,
-    QPaintEvent,
     QResizeEvent,
     QShortcut,
 )
@@ -23,10 +21,9 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QStackedWidge
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.build import ModelIndex, in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
+from slideviz.gui.widgets.plot_canvas import ask_and_write, words_label
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
@@ -351,8 +348,6 @@ class WorstPanel(Panel):
     ) -> None:
         super().__init__(store)
         self._fly_to = fly_to
-        self._listed_key: tuple[object, ...] = ()
-        self._last = 0.0
         self._marked: int | None = None
         self._info_key: tuple[object, ...] = ()
         self.model = WorstModel()
@@ -383,7 +378,6 @@ class WorstPanel(Panel):
         self.repair = push_button("Repair", mend.tip, lambda: mend.do(main_window(self)), "repair")
         parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self._timer = single_shot(self, lambda: self.sync(self.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
@@ -391,7 +385,8 @@ class WorstPanel(Panel):
             shortcut = QShortcut(keys, self)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(function)
-        self.follow()
+        self.follow(seen=True)
+        self.follow(_listed, self._fill, seen=True, rests=True)
 
     def _make_table(self) -> WorstTable:
         table = WorstTable(self.model)
@@ -406,40 +401,20 @@ class WorstPanel(Panel):
         self._sync_mark(self.session)
 
     def sync(self, session: Session) -> None:
-        """Show the worst cells of the session's step; during play, at most every `REST_MS`."""
         there = session.frame is not None
         self.stack.setCurrentWidget(self.table if there else self.words)
         for widget in (self.back, self.export):
             widget.setVisible(there)
         self.repair.setVisible(to_mend(session) is not None)
         if not there:
-            self.info.hide()
             self.words.setText("Open a mesh first. Then this panel lists its worst cells.")
-            self.model.show(None)
-            self._listed_key = ()
-        elif is_seen(self) and self._key(session) != self._listed_key:
-            since = (time.monotonic() - self._last) * 1000.0
-            if since >= REST_MS:
-                self._fill(session)
-            elif not self._timer.isActive():
-                self._timer.start(round(REST_MS - since))
-        if is_seen(self):
-            self._sync_mark(session)
-
-    @staticmethod
-    def _key(session: Session) -> tuple[object, ...]:
-        return (
-            session.frame,
-            len(session.frames),
-            measure(session.view.color_by),
-            machine_pair(session),
-        )
+        self._sync_mark(session)
 
     def _fill(self, session: Session) -> None:
-        if session.frame is None or self._key(session) == self._listed_key:
+        """Show the worst cells of the session's step."""
+        if session.frame is None:
+            self.model.show(None)
             return
-        self._listed_key = self._key(session)
-        self._last = time.monotonic()
         at = session.frames.index(session.frame)
         what = measure(session.view.color_by)
         worst = worst_cells(session.frames, at, what)
@@ -470,13 +445,6 @@ class WorstPanel(Panel):
                 self._info_key = key
                 self.info.setText(info_text(session, cell))
                 self.info.setToolTip(info_text(session, cell, every=True))
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        session = self.session
-        # While the panel was behind another tab, the list was not filled.
-        if session.frame is not None and self._key(session) != self._listed_key:
-            QTimer.singleShot(0, self, lambda: self.sync(self.session))
 
     # What the user does ----------------------------------------------------------------
     def _fly_to_row(self, row: int) -> None:
@@ -522,6 +490,12 @@ class WorstPanel(Panel):
             "Comma-separated values (*.csv)",
             lambda path: write_csv(path, table_rows(worst)),
         )
+
+
+def _listed(session: Session) -> tuple[object, ...]:
+    """Return what the list of worst cells depends on."""
+    what = measure(session.view.color_by)
+    return session.frame, len(session.frames), what, machine_pair(session)
 
 
 def info_text(session: Session, cell: int, every: bool = False) -> str:

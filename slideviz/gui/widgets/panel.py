@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 
-from qtpy.QtCore import QObject
+from qtpy.QtCore import QObject, QTimer
+from qtpy.QtGui import QPaintEvent
 from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.fields import CheckedField, NumberBox
-from slideviz.gui.widgets.plot_canvas import PlotCanvas
+from slideviz.gui.widgets.plot_canvas import PlotCanvas, is_seen
 from slideviz.session import changes
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import PanelPlace, Session
@@ -82,6 +86,7 @@ class Panel(QWidget):
         super().__init__()
         self.store = store
         self.change = store.change
+        self._unseen: list[QTimer] = []
 
     @property
     def session(self) -> Session:
@@ -92,25 +97,47 @@ class Panel(QWidget):
         self,
         select: Callable[[Session], object] = lambda session: session,
         sync: Callable[[Session], object] | None = None,
+        *,
+        seen: bool = False,
+        rests: bool = False,
     ) -> None:
         """Call ``sync`` now, and after each change of what ``select`` returns of the session.
 
         ``select``: returns the values that are shown, to be compared; default: the session, which
         differs after each change. ``sync``: fills widgets from the session; default: `sync` of the
-        panel.
+        panel. ``seen``: whether it waits until anything of the panel is on screen. ``rests``:
+        whether it is called at most every `REST_MS`.
         """
         fill = sync or self.sync
         shown = select(self.session)
+        last_s = float("-inf")
 
-        def changed(_old: Session, new: Session) -> None:
-            nonlocal shown
-            before = shown
-            shown = select(new)
-            if shown != before:
-                fill(new)
+        def catch_up(session: Session) -> None:
+            nonlocal shown, last_s
+            now = select(session)
+            if now == shown or (seen and not is_seen(self)):
+                return
+            wait_ms = 1000.0 * (last_s - time.monotonic()) + REST_MS
+            if rests and wait_ms > 0:
+                if not later.isActive():
+                    later.start(math.ceil(wait_ms))
+                return
+            last_s = time.monotonic()
+            shown = now
+            fill(session)
 
-        self.store.listen(changed)
+        later = single_shot(self, lambda: catch_up(self.session))
+        self.store.listen(lambda _old, new: catch_up(new))
+        if seen:
+            self._unseen.append(later)
         fill(self.session)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        # What has changed while the panel was behind another tab.
+        for later in self._unseen:
+            if not later.isActive():
+                later.start(0)
 
     def sync(self, session: Session) -> None:
         """Fill the widgets from the session."""
