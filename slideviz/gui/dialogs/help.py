@@ -17,6 +17,7 @@ from qtpy.QtWidgets import (
     QLabel,
     QLineEdit,
     QPlainTextEdit,
+    QPushButton,
     QSplitter,
     QTextBrowser,
     QTreeWidget,
@@ -118,18 +119,55 @@ class Help(QObject):
             field.selectAll()
 
 
-class ShortcutsDialog(QDialog):
+class SearchDialog(QDialog):
+    """The base of dialogs with a search field above a body: ``words`` are shown in the empty field.
+
+    ``size``: its width and height in pixels, where the screen is large enough.
+    """
+
+    def __init__(self, parent: QWidget, title: str, size: QSize, words: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.resize(size.boundedTo(self.screen().availableSize()))
+        self.search = QLineEdit()
+        self.search.setPlaceholderText(words)
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self.look_for)
+        self.count = hint_label()
+        self.count.setWordWrap(False)
+
+    def lay_out(self, body: QWidget, *beside: QPushButton) -> None:
+        """Place the search field above the body, with buttons beside it."""
+        buttons = dialog_buttons(self, CLOSE)
+        for button in (*beside, buttons.button(CLOSE)):
+            button.setAutoDefault(False)  # Enter belongs to the search
+        head = in_row(self.search, self.count, *beside, wide=[self.search])
+        self.setLayout(in_column(head, body, buttons, wide=[body]))
+        self.search.setFocus()
+
+    def look_for(self, wanted: str) -> None:
+        """Show what has the searched words, and how often."""
+        raise NotImplementedError
+
+
+def show_matching(above: QTreeWidgetItem, matches: Callable[[QTreeWidgetItem], bool]) -> int:
+    """Hide the items below one that neither match nor have any that do; return the matches."""
+    count = 0
+    for item in filter(None, map(above.child, range(above.childCount()))):
+        found = matches(item) + show_matching(item, matches)
+        item.setHidden(not found)
+        count += found
+    return count
+
+
+class ShortcutsDialog(SearchDialog):
     """The dialog with the shortcuts of all commands, by menu, and of the mouse, with a filter."""
 
     def __init__(self, window: Services) -> None:
-        super().__init__(window)
-        self.setWindowTitle("Keyboard and mouse")
-        self.resize(QSize(1060, 700).boundedTo(self.screen().availableSize()))
-        self.search = _search_field("Find an action or a key")
-        self.nothing = hint_label("Nothing found")
-        self.nothing.setWordWrap(False)
-        self.nothing.hide()
-        self.search.textChanged.connect(self._filter)
+        title = "Keyboard and mouse"
+        super().__init__(window, title, QSize(1060, 700), "Find an action or a key")
+        self.count.setText("Nothing found")
+        self.count.hide()
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
         self.tree.setRootIsDecorated(False)
@@ -140,11 +178,9 @@ class ShortcutsDialog(QDialog):
         self._add("In the panels", list(PANELS))
         self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
         header = self.tree.header()
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
-        head = in_row(self.search, self.nothing, wide=[self.search])
-        self.setLayout(in_column(head, self.tree, dialog_buttons(self, CLOSE)))
-        self.search.setFocus()
+        for column in (0, 1):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        self.lay_out(self.tree)
 
     def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
         top = QTreeWidgetItem(self.tree, [title])
@@ -157,46 +193,29 @@ class ShortcutsDialog(QDialog):
             row.setToolTip(2, tip)
         top.setExpanded(True)
 
-    def _filter(self, wanted: str) -> None:
-        wanted = wanted.strip().lower()
-        total = 0
-        for index in range(self.tree.topLevelItemCount()):
-            top = self.tree.topLevelItem(index)
-            matches = 0
-            for k in range(top.childCount()):
-                row = top.child(k)
-                words = " ".join(row.text(column) for column in range(3)).lower()
-                row.setHidden(wanted not in words)
-                matches += not row.isHidden()
-            top.setHidden(not matches)
-            total += matches
-        self.nothing.setVisible(not total)
+    def look_for(self, wanted: str) -> None:
+        words = wanted.strip().lower()
+
+        def matches(row: QTreeWidgetItem) -> bool:
+            texts = " ".join(row.text(column) for column in range(3))
+            return row.parent() is not None and words in texts.lower()
+
+        self.count.setVisible(not show_matching(self.tree.invisibleRootItem(), matches))
 
 
-class TextDialog(QDialog):
+class TextDialog(SearchDialog):
     """A dialog with a long text and a field to search it."""
 
     def __init__(self, parent: QWidget, title: str, text: str) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(title)
-        self.resize(QSize(860, 640).boundedTo(self.screen().availableSize()))
-        self.search = _search_field("Find (Enter: the next one)")
-        self.count = hint_label()
-        self.count.setWordWrap(False)
+        super().__init__(parent, title, QSize(860, 640), "Find (Enter: the next one)")
         self.text = QPlainTextEdit(text)
         self.text.setReadOnly(True)
         self.text.setFont(fixed_font())
         self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        buttons = dialog_buttons(self, CLOSE)
-        # Enter belongs to the search.
-        buttons.button(CLOSE).setAutoDefault(False)
-        head = in_row(self.search, self.count, wide=[self.search])
-        self.setLayout(in_column(head, self.text, buttons))
-        self.search.textChanged.connect(self._typed)
         self.search.returnPressed.connect(self.next)
-        self.search.setFocus()
+        self.lay_out(self.text)
 
-    def _typed(self, wanted: str) -> None:
+    def look_for(self, wanted: str) -> None:
         self.text.moveCursor(QTextCursor.MoveOperation.Start)
         matches = self.text.toPlainText().lower().count(wanted.lower()) if wanted else 0
         self.count.setText(f"{matches} found" if wanted else "")
@@ -234,13 +253,6 @@ class AboutDialog(QDialog):
         self.copy.clicked.connect(lambda: QApplication.clipboard().setText(versions()))
         head = in_row(picture, 8, title, wide=[title])
         self.setLayout(in_column(head, self.text, licence, buttons))
-
-
-def _search_field(words: str) -> QLineEdit:
-    field = QLineEdit()
-    field.setPlaceholderText(words)
-    field.setClearButtonEnabled(True)
-    return field
 
 
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
@@ -390,19 +402,14 @@ class Pages(QTextBrowser):
         self.setSource(QUrl.fromLocalFile(str(path)))
 
 
-class ManualDialog(QDialog):
+class ManualDialog(SearchDialog):
     """The dialog with a list of the manual's pages, a page, and a search in all of them."""
 
     def __init__(self, parent: QWidget, folder: Path) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Manual")
-        self.resize(QSize(1120, 760).boundedTo(parent.screen().availableSize()))
+        words = "Find pages with these words (Enter: the next place)"
+        super().__init__(parent, "Manual", QSize(1120, 760), words)
         self.pages = Pages()
-        self.search = _search_field("Find pages with these words (Enter: the next place)")
-        self.count = hint_label()
-        self.count.setWordWrap(False)
         self._found: list[Path] = []
-        self.search.textChanged.connect(self._filter)
         self.search.returnPressed.connect(self._next)
         self.tree = QTreeWidget()
         self.tree.setHeaderHidden(True)
@@ -417,13 +424,8 @@ class ManualDialog(QDialog):
         split.addWidget(self.tree)
         split.addWidget(self.pages)
         split.setSizes([300, 820])
-        buttons = dialog_buttons(self, CLOSE)
-        for button in (back, buttons.button(CLOSE)):
-            button.setAutoDefault(False)  # Enter belongs to the search
-        head = in_row(self.search, self.count, back, wide=[self.search])
-        self.setLayout(in_column(head, split, buttons, wide=[split]))
+        self.lay_out(split, back)
         self.pages.show_page(folder / "index.md")
-        self.search.setFocus()
 
     def _fill(self, folder: Path) -> None:
         above: list[QTreeWidget | QTreeWidgetItem] = [self.tree]
@@ -440,28 +442,24 @@ class ManualDialog(QDialog):
 
     def _select(self, url: QUrl) -> None:
         path = f"{url.toLocalFile().removesuffix('.md')}.md"  # some links leave the ending out
-        items = (one for section in self._items() for one in (section, *self._items(section)))
-        places = (self.tree.indexFromItem(one) for one in items if one.data(0, PATH) == path)
+        how = Qt.MatchFlag.MatchExactly | Qt.MatchFlag.MatchRecursive
+        model = self.tree.model()
+        places = model.match(model.index(0, 0), PATH, path, 1, how)
         with QSignalBlocker(self.tree):
-            self.tree.setCurrentIndex(next(places, QModelIndex()))
+            self.tree.setCurrentIndex(places[0] if places else QModelIndex())
 
-    def _items(self, item: QTreeWidgetItem | None = None) -> list[QTreeWidgetItem]:
-        top = item or self.tree.invisibleRootItem()
-        children = (top.child(k) for k in range(top.childCount()))
-        return [child for child in children if child is not None]
-
-    def _filter(self, words: str) -> None:
-        """Show the pages whose text has the words, below their sections, and their number."""
-        words = words.strip().lower()
+    def look_for(self, wanted: str) -> None:
+        words = wanted.strip().lower()
         self._found = []
-        for section in self._items():
-            pages = (section, *self._items(section))
-            paths = [Path(one.data(0, PATH)) for one in pages]
-            matches = [words in page_text(path).lower() for path in paths]
-            for one, there in zip(pages, matches, strict=True):
-                one.setHidden(not there)
-            section.setHidden(not any(matches))
-            self._found += [path for path, there in zip(paths, matches, strict=True) if there]
+
+        def matches(item: QTreeWidgetItem) -> bool:
+            path = Path(item.data(0, PATH))
+            there = words in page_text(path).lower()
+            if there:
+                self._found.append(path)
+            return there
+
+        show_matching(self.tree.invisibleRootItem(), matches)
         found = counted(len(self._found), "page") if self._found else "Nothing found"
         self.count.setText(found if words else "")
 
