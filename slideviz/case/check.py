@@ -187,7 +187,9 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
     found = _without_motion(case, mesh)
     for place, motion in enumerate(case.motions):
         wrong = motion.incomplete() or _text_problem(motion)
-        problems = [wrong] if wrong else motion.problems(case, mesh, place)
+        problems = [wrong] if wrong else [*motion.problems(case, mesh, place)]
+        if motion.only_3d and mesh.dim == 2 and not problems:
+            problems = [f"{motion.verb} is for 3D meshes, and the mesh has 2 dimensions"]
         found += [
             Message(text, place=(f"motion {place + 1}",), keys=("MOTION",)) for text in problems
         ]

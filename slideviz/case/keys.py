@@ -17,6 +17,7 @@ from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.motion import Motion
 from slideviz.case.values import (
     AXIS,
     COUPLES,
@@ -122,9 +123,9 @@ PERIODIC_ROWS = (
 )
 
 
-def _leading_file(case: Case) -> tuple[FromFile, ...]:
+def _leading_file(case: Case) -> tuple[Motion, ...]:
     """Return the displacement file of all moving markers, if motions begin with one."""
-    return tuple(m for m in case.motions[:1] if type(m) is FromFile and not m.marker)
+    return tuple(motion for motion in case.motions[:1] if motion.is_case_file)
 
 
 def _put_file(case: Case, path: Path | None) -> Case:
@@ -189,7 +190,7 @@ _ROWS = (
         PATH,
         "Displacements of the moving nodes: node, dx, dy[, dz] in each line; the others stay.",
         _put_file,
-        lambda case: next((motion.path for motion in _leading_file(case)), None),
+        lambda case: next((motion.files[0] for motion in _leading_file(case)), None),
         label="a displacement file",
     ),
     Key(

@@ -16,7 +16,7 @@ from slideviz.case.check import marker_problems, motion_problems
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
-from slideviz.case.motions.kinds import IN_ZONES, OF_MESH
+from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.zone_cases import each_zone, of_several_zones, zone_motion
 from slideviz.errors import CaseError, Message, raise_all
@@ -33,7 +33,7 @@ def placed_displacements(
     mesh: Mesh,
     on: Mapping[str, IntArray],
     problems: list[Message],
-    families: Iterable[type[Motion]] = (*IN_ZONES, *OF_MESH),
+    families: Iterable[type[Motion]] = FAMILIES,
 ) -> dict[int, Displacements]:
     """Return the displacements from undeformed places, by the place of their motion in a case.
 
@@ -42,7 +42,7 @@ def placed_displacements(
     """
     found: dict[int, Displacements] = {}
     for family in families:
-        if isinstance(mesh, Assembly) and family in IN_ZONES:
+        if isinstance(mesh, Assembly) and family.in_zones:
             found |= _of_zones(case, mesh, on, problems, family)
         else:
             found |= family.placed(case, mesh, on, problems)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from slideviz.case.motions.motion import Motion, applies_to, named
-from slideviz.case.motions.onto import Onto
 from slideviz.case.words import first_of
 from slideviz.errors import CaseError, note
 from slideviz.mesh.model import Assembly, Mesh, ZonePart
@@ -93,7 +92,7 @@ def zone_cases(case: Case, mesh: Mesh, computed: bool = True) -> tuple[Case, ...
     if not isinstance(mesh, Assembly):
         return (case,)
     for place, motion in enumerate(case.motions, start=1):
-        if (computed or isinstance(motion, Onto)) and of_several_zones(motion, case, mesh):
+        if (computed or motion.one_zone) and of_several_zones(motion, case, mesh):
             raise CaseError(
                 f"motion {place} is of boundaries of several zones together, which are deformed "
                 "alone; give one for each"

@@ -88,7 +88,7 @@ def _write_surface(path: Path, found: Gradients) -> None:
 
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
     """Write a line with the name of the objective, and one with the gradient of each variable."""
-    objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
+    objective = config.values["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
     rows = [f"{objective} gradient", *(repr(value) for value in found.variables.tolist())]
     with atomic_write(path, CaseError) as file:
         file.write(("\n".join(rows) + "\n").encode())

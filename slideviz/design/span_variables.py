@@ -8,7 +8,7 @@ import numpy as np
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
-from slideviz.case.motions.span import SpanMotion, blades_of
+from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.moving_nodes import displacements
 from slideviz.design.sweeps.columns import numbers_of
 from slideviz.errors import CaseError
@@ -60,7 +60,7 @@ class SpanVariables:
             The case has no motion over the span, or rotates, scales or pushes the same boundary
             after one; or the case does not fit the mesh.
         """
-        span = [k for k, motion in enumerate(case.motions) if isinstance(motion, SpanMotion)]
+        span = [k for k, motion in enumerate(case.motions) if motion.has_derivatives]
         if not span:
             raise CaseError("the case has no motion over the span; add one, e.g. SpanMotion(...)")
         _require_last(case, span[0])
@@ -91,8 +91,8 @@ class SpanVariables:
         """Return the derivative (m, d) of the displacement at ``values`` in a direction (k,)."""
         out = np.zeros((len(self.nodes), self.mesh.dim))
         change = self._checked("direction", direction)
-        for rows, columns, by_total, slope in self._slopes(values):
-            out[rows] += by_total * (slope @ change[columns])[:, None]
+        for rows, columns, by_number, slope in self._slopes(values):
+            out[rows] += by_number * (slope @ change[columns])[:, None]
         return out
 
     @check_types
@@ -106,8 +106,8 @@ class SpanVariables:
                 f"weights has the shape {adjoint.shape}; expected {shape}, a row for each node of "
                 "`nodes`"
             )
-        for rows, columns, by_total, slope in self._slopes(values):
-            out[columns] += np.sum(adjoint[rows] * by_total, axis=1) @ slope
+        for rows, columns, by_number, slope in self._slopes(values):
+            out[columns] += np.sum(adjoint[rows] * by_number, axis=1) @ slope
         return out
 
     def _checked(self, name: str, values: FloatArray) -> FloatArray:
@@ -127,19 +127,13 @@ class SpanVariables:
     def _slopes(
         self, values: FloatArray
     ) -> Iterator[tuple[IntArray, list[int], FloatArray, FloatArray]]:
-        """Yield for each motion its rows of nodes, its variables, and two factors of derivatives.
-
-        They are that of points (n, d) by the total of motions, and of the total (n, k) by values.
-        """
+        """Yield for each motion its rows of nodes, its variables, and `Motion.derivatives`."""
         case = self.case_of(values)
         on = {name: self.mesh.marker(name).nodes for name in case.markers_with("moving")}
-        for blade in blades_of(case, self.mesh, on):
-            totals, slopes = blade.totals()
-            by_totals = blade.sections.moved(totals[-1])[1]
-            rows = np.searchsorted(self.nodes, blade.nodes)
-            for place, (row, slope) in zip(blade.places, slopes, strict=True):
+        for family in FAMILIES:
+            for place, nodes, by_number, slope in family.derivatives(case, self.mesh, on):
                 columns = [k for k, at in enumerate(self._at.values()) if at.motion == place]
-                yield rows, columns, by_totals[:, :, row], slope
+                yield np.searchsorted(self.nodes, nodes), columns, by_number, slope
 
 
 def _require_last(case: Case, first: int) -> None:

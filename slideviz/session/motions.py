@@ -15,10 +15,9 @@ from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
-from slideviz.case.motions.file import FromFile
-from slideviz.case.motions.kinds import IN_ZONES
+from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
-from slideviz.case.motions.onto import Onto, is_laid
+from slideviz.case.motions.onto import is_laid
 from slideviz.case.moving_nodes import displacements, moved_together, placed_displacements
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -349,11 +348,10 @@ class Ghosts:
             for name in case.markers_with("moving")
             if name in self._nodes and any(applies_to(motion, name) for motion in case.motions)
         }
-        families = [*IN_ZONES, FromFile]
-        if wait or is_laid(case, self.mesh):
-            families.append(Onto)
         placed: dict[int, Displacements] = {}
-        for family in families:
+        for family in FAMILIES:
+            if family.takes_time and not (wait or is_laid(case, self.mesh)):
+                continue
             with suppress(SlidevizError):
                 placed |= placed_displacements(case, self.mesh, on, [], (family,))
         points = self.mesh.points

@@ -1,5 +1,6 @@
 """The grammar of MOTION."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -8,10 +9,13 @@ from slideviz.case.motion_text import GRAMMAR, read_motions, write_motions
 from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.file import FromFile, Prescribed
+from slideviz.case.motions.kinds import KIND_OF
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
 
+KNOWN = {*KIND_OF, "centroid", "path", "upper", "lower", "a", "stl", "z"}
+"""Words of examples that are no numbers."""
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -117,6 +121,7 @@ def test_examples_of_the_reference_are_read():
             "VERB, ...": "translate, 1, 2",
         }.items():
             text = text.replace(word, value)
+        text = re.sub(r"[a-z-]+", lambda word: word[0] if word[0] in KNOWN else "1", text)
         assert len(read_motions(text)) == 1, line
 
 
@@ -128,10 +133,7 @@ def test_examples_of_the_reference_are_read():
         ("(B, translate, 1, 0))", "each motion needs a pair of brackets"),
         ("(B, translate, 1, 0", "a bracket is not closed; .* needs a backslash at the end"),
         ('(B, file, "a)', "the quotation mark .* is not closed"),
-        (
-            "(B)",
-            "motion 1: expected a marker and one of translate, rotate, scale, radial, hicks",
-        ),
+        ("(B)", f"motion 1: expected a marker and one of {', '.join(KIND_OF)}"),
         ("(B, translate, 1, 0) ; ()", "motion 2: expected a marker and one of"),
         ('("", translate, 1, 0)', "motion 1: it does not begin with the name of a marker"),
         ("(B, twist, 0:1, 1)", "'0:1 1' is not a curve over the span; write span:value, e.g. 0:0"),

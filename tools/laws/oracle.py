@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import Motion
-from slideviz.case.motions.rigid import Radial, Rotate, Scale
+from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
 from tools.laws.draw import Period
@@ -50,8 +49,8 @@ def goals(case: Case, mesh: Mesh) -> dict[int, FloatArray]:
 
 def _moved(motion: Motion, x: FloatArray) -> FloatArray:
     dim = x.shape[1]
-    assert not isinstance(motion, FromFile)
-    if not isinstance(motion, Rotate | Scale | Radial):
+    assert isinstance(motion, Translate | Rotate | Scale | Radial), "a formula is missing here"
+    if isinstance(motion, Translate):
         return x + np.array(motion.vector)
     centre = x.mean(axis=0) if motion.point == "centroid" else np.array(motion.point[:dim])
     arm = x - centre

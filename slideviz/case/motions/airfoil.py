@@ -17,6 +17,7 @@ from slideviz.case.motions.motion import (
     Target,
     applies_to,
     marker_words,
+    nodes_moved,
     number_texts,
     vector_words,
     without_brackets,
@@ -107,7 +108,7 @@ class OnAirfoil(Motion):
             markers = [name for name in on if applies_to(motion, name)]
             if not markers or not isinstance(motion, OnAirfoil):
                 continue
-            nodes = np.unique(np.concatenate([on[name] for name in markers]))
+            nodes = nodes_moved(motion, on)
             low, high = motion.chord
             t = (mesh.points[nodes, 0] - low) / (high - low)
             along = (t > 0.0) & (t < 1.0)
@@ -190,8 +191,20 @@ class OneSided(OnAirfoil):
         return f"{super().design_name()}.{self.side}"
 
 
+class _WithPeak(OnAirfoil):
+    """A motion whose shape is a bump of Hicks and Henne, 1 at its peak."""
+
+    peak: float
+
+    def height_words(self, by: str, form: str) -> str:
+        return f"{self.side_words} {by} at {format(100.0 * self.peak, form)} % chord"
+
+    def shape(self, t: FloatArray) -> FloatArray:
+        return hicks_henne(t, self.peak)
+
+
 @dataclass(frozen=True)
-class HicksHenne(OneSided):
+class HicksHenne(_WithPeak, OneSided):
     """Raise one side of an airfoil outwards by a bump (Hicks and Henne 1978).
 
     It is ``height`` at ``peak``, a part of the ``chord`` between two x, and 0 at its ends. Nodes
@@ -225,12 +238,6 @@ class HicksHenne(OneSided):
 
     def described(self, dim: int, extent: float) -> str:
         return f"move {self.height_words(f'outwards by {self.height:.4g}', '.4g')}"
-
-    def height_words(self, by: str, form: str) -> str:
-        return f"{self.side_words} {by} at {format(100.0 * self.peak, form)} % chord"
-
-    def shape(self, t: FloatArray) -> FloatArray:
-        return hicks_henne(t, self.peak)
 
     def along_y(self, side: float) -> float:
         return side
@@ -278,7 +285,7 @@ class Cst(OneSided):
 
 
 @dataclass(frozen=True)
-class Bump(OnAirfoil):
+class Bump(_WithPeak):
     """Raise all sides of an airfoil towards +y by a bump; otherwise as `HicksHenne`."""
 
     marker: Target
@@ -300,12 +307,6 @@ class Bump(OnAirfoil):
 
     def arguments(self) -> list[str]:
         return number_texts(self.peak, self.height, *self.chord)
-
-    def height_words(self, by: str, form: str) -> str:
-        return f"{self.side_words} {by} at {format(100.0 * self.peak, form)} % chord"
-
-    def shape(self, t: FloatArray) -> FloatArray:
-        return hicks_henne(t, self.peak)
 
 
 def hicks_henne(x: FloatArray, peak: float) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -322,6 +322,7 @@ class FfdTwist(BoxMotion):
     )
     rows = ("plane", "box", "angle", "point", "axis")
     proportional = ("angle_deg",)
+    words: ClassVar[Mapping[str, str]] = {**Motion.words, "degrees": "angle_deg"}
     only_3d = True
 
     @classmethod

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
+from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named, nodes_moved
 from slideviz.case.values import path_text
 from slideviz.case.words import Word
 from slideviz.errors import CaseError, Message
@@ -46,6 +46,7 @@ class FromFile(Motion):
     has_table = True
     lists_nodes = True
     checked_as_text = False
+    in_zones = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -92,7 +93,7 @@ class FromFile(Motion):
 
     def listed(self, case: Case, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
         """Return what the file lists for markers and their nodes; read again if it has changed."""
-        nodes = np.unique(np.concatenate([*moved.values(), np.empty(0, np.int64)]))
+        nodes = nodes_moved(self, moved)
         names = " or ".join(repr(name) for name in named(self.marker))
         of = f"marker {names}" if names else "a moving marker"
         read = partial(read_displacements, self.path, mesh, nodes, of)
@@ -189,6 +190,10 @@ class Prescribed(Motion):
         _, here, listed = np.intersect1d(nodes, self.nodes, return_indices=True)
         out[here] = self.vectors[listed]
         return out
+
+    @property
+    def content(self) -> tuple[FloatArray | IntArray, ...]:
+        return self.nodes, self.vectors
 
     def of_zone(self, part: ZonePart, zone: Case) -> Motion | None:
         nodes = self.nodes - part.points.start

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne, OnAirfoil
-from slideviz.case.motions.box import BoxMotion, Ffd, FfdCamber, FfdThickness, FfdTwist
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import Motion
 from slideviz.case.motions.onto import Onto
@@ -31,8 +31,11 @@ KINDS: tuple[type[Motion], ...] = (
 KIND_OF: dict[str, type[Motion]] = {verb: kind for kind in KINDS for verb in kind.verbs}
 """The kind of each verb of ``MOTION``."""
 
-IN_ZONES: tuple[type[Motion], ...] = (BoxMotion, OnAirfoil, SpanMotion)
-"""Families whose displacements (`Motion.placed`) are those of each zone of a mesh."""
 
-OF_MESH: tuple[type[Motion], ...] = (FromFile, Onto)
-"""Families whose displacements are those of the whole mesh."""
+def _family(kind: type[Motion]) -> type[Motion]:
+    """Return the class whose `Motion.placed` serves a kind; a kind that takes time is alone."""
+    return kind if kind.takes_time else next(c for c in kind.__mro__ if "placed" in vars(c))
+
+
+FAMILIES: tuple[type[Motion], ...] = tuple(dict.fromkeys(map(_family, KINDS)))
+"""Classes of kinds whose displacements (`Motion.placed`) are found together."""

@@ -51,6 +51,12 @@ def applies_to(motion: Motion, marker: str) -> bool:
     return not motion.marker or marker in named(motion.marker)
 
 
+def nodes_moved(motion: Motion, on: Mapping[str, IntArray]) -> IntArray:
+    """Return the nodes (m,) that a motion moves, of those of each moving marker; ascending."""
+    moved = (nodes for name, nodes in on.items() if applies_to(motion, name))
+    return np.unique(np.concatenate([np.empty(0, np.int64), *moved]))
+
+
 @dataclass(frozen=True)
 class NewMotion:
     """What a motion begins with that the user adds."""
@@ -103,6 +109,17 @@ class Motion(CheckedFields):
     """What its file is."""
     has_table: ClassVar[bool] = False
     """Whether its file is a table that the user can edit in the window."""
+    words: ClassVar[Mapping[str, str]] = {
+        **{f"d{axis}": axis for axis in "xyz"},
+        **{f"p{axis}": f"point_{axis}" for axis in "xyz"},
+    }
+    """Words of ``grammar`` for numbers that `design_numbers` names otherwise, and these names."""
+    in_zones: ClassVar[bool] = True
+    """Whether what `placed` returns is found in each zone of a mesh alone."""
+    one_zone: ClassVar[bool] = False
+    """Whether it cannot move boundaries of several zones together."""
+    has_derivatives: ClassVar[bool] = False
+    """Whether `derivatives` has those of its displacement by its numbers."""
     lists_nodes: ClassVar[bool] = False
     """Whether it lists displacements of nodes; they cannot be scaled, and may be rounded."""
     only_3d: ClassVar[bool] = False
@@ -184,6 +201,18 @@ class Motion(CheckedFields):
         """
         return {}
 
+    @classmethod
+    def derivatives(
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+    ) -> Iterator[tuple[int, IntArray, FloatArray, FloatArray]]:
+        """Yield the derivative of the displacement by each motion of this family, in two factors.
+
+        Place of the motion in the case; nodes (n,); the derivative (n, d) of their displacement by
+        a number of each node; and the derivative (n, k) of that by the k numbers of the motion, in
+        the order of `design_numbers`. ``on`` has the nodes (k,) of each moving marker.
+        """
+        yield from ()
+
     def change(
         self, points: FloatArray, nodes: IntArray, placed: Displacements | None
     ) -> FloatArray:
@@ -196,6 +225,11 @@ class Motion(CheckedFields):
     def as_one(self, points: FloatArray) -> Motion:
         """Return the motion of several markers as one body, with all its nodes at ``points``."""
         return self
+
+    @property
+    def content(self) -> tuple[FloatArray | IntArray, ...]:
+        """Return the arrays of a motion that no file has; ()."""
+        return ()
 
     @property
     def is_case_file(self) -> bool:

@@ -85,6 +85,7 @@ class Onto(FromFile):
     file_words = "surface to lie on"
     has_table = False
     takes_time = True
+    one_zone = True
     checked_as_text = True
 
     def __post_init__(self) -> None:

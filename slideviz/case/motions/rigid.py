@@ -6,7 +6,7 @@ Each begins where the motions before it have taken the boundary.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -41,8 +41,21 @@ if TYPE_CHECKING:
 _Z = (0.0, 0.0, 1.0)
 
 
+class _ByFormula(Motion):
+    """A motion by a formula of the place, after the motions before it."""
+
+    def shift(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (k, d) of points (k, d)."""
+        raise NotImplementedError
+
+    def change(
+        self, points: FloatArray, nodes: IntArray, placed: Displacements | None
+    ) -> FloatArray:
+        return self.shift(points)
+
+
 @dataclass(frozen=True)
-class Translate(Motion):
+class Translate(_ByFormula):
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
     marker: Target
@@ -78,13 +91,11 @@ class Translate(Motion):
         count = len(self.vector)
         yield from require_dimension(count, mesh.dim, f"the shift has {count} components")
 
-    def change(
-        self, points: FloatArray, nodes: IntArray, placed: Displacements | None
-    ) -> FloatArray:
+    def shift(self, points: FloatArray) -> FloatArray:
         return np.broadcast_to(np.array(self.vector, np.float64), points.shape)
 
 
-class _AboutPoint(Motion):
+class _AboutPoint(_ByFormula):
     """A motion about a point; where that is the centroid, several markers have one in common."""
 
     point: Point
@@ -130,6 +141,7 @@ class Rotate(_AboutPoint):
     )
     rows = ("angle",)
     proportional = ("angle_deg",)
+    words: ClassVar[Mapping[str, str]] = {**Motion.words, "degrees": "angle_deg"}
 
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
@@ -177,9 +189,7 @@ class Rotate(_AboutPoint):
         yield from super().problems(case, mesh, place)
         yield from _axis_problems(self.axis, mesh.dim)
 
-    def change(
-        self, points: FloatArray, nodes: IntArray, placed: Displacements | None
-    ) -> FloatArray:
+    def shift(self, points: FloatArray) -> FloatArray:
         return rotated(points - _centre(self.point, points), self.angle_deg, self.axis)
 
     def turned(self, part: float) -> Motion:
@@ -252,9 +262,7 @@ class Scale(_AboutPoint):
                 f"{mesh.dim}"
             )
 
-    def change(
-        self, points: FloatArray, nodes: IntArray, placed: Displacements | None
-    ) -> FloatArray:
+    def shift(self, points: FloatArray) -> FloatArray:
         arm = points - _centre(self.point, points)
         return arm * (np.array(self.factors, np.float64) - 1.0)
 
@@ -282,6 +290,7 @@ class Radial(_AboutPoint):
     stays_at = ("point",)
     proportional = ("distance",)
     ratios = ("factor",)
+    words: ClassVar[Mapping[str, str]] = {**Motion.words, "dr": "distance"}
 
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
@@ -324,9 +333,7 @@ class Radial(_AboutPoint):
         yield from super().problems(case, mesh, place)
         yield from _axis_problems(self.axis, mesh.dim)
 
-    def change(
-        self, points: FloatArray, nodes: IntArray, placed: Displacements | None
-    ) -> FloatArray:
+    def shift(self, points: FloatArray) -> FloatArray:
         arm = points - np.array(self.point, np.float64)
         if arm.shape[1] == 3:
             unit = np.array(self.axis, np.float64) / math.hypot(*self.axis)

@@ -76,6 +76,7 @@ class SpanMotion(Motion):
     stays_at = ("line", "point")
     only_3d = True
     keeps_span = True
+    has_derivatives = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -164,6 +165,16 @@ class SpanMotion(Motion):
                 found[place] = Displacements(blade.nodes, after - before)
                 before = after
         return found
+
+    @classmethod
+    def derivatives(
+        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+    ) -> Iterator[tuple[int, IntArray, FloatArray, FloatArray]]:
+        for blade in blades_of(case, mesh, on):
+            totals, slopes = blade.totals()
+            by_totals = blade.sections.moved(totals[-1])[1]
+            for place, (row, slope) in zip(blade.places, slopes, strict=True):
+                yield place, blade.nodes, by_totals[:, :, row], slope
 
     def amounts(self) -> list[Amount]:
         return [Amount("values", self.values, SPAN_KINDS[self.kind].neutral)]

@@ -16,7 +16,6 @@ from slideviz.case.boxes import (
     system_of,
 )
 from slideviz.case.ffd_keys import ffd_contradictions
-from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
 from slideviz.design.su2.on_mesh import problems_of_markers
 from slideviz.design.su2.shapes import Displacer
@@ -33,13 +32,12 @@ def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Pla
     """Return the planes of control points that FFD_CONTINUITY= ``continuity`` holds, by axis."""
     depth = CONTINUITIES[continuity]
     if not depth:
-        fixed = []
-        for axis, letter in enumerate("IJK"):
-            words = list_of(config.words[f"FFD_FIX_{letter}"])
-            fixed.append(_planes(box, axis) & {int(word.text) for word in words})
-        return fixed[0], fixed[1], fixed[2]
+        i, j, k = (
+            _planes(box, axis) & config.values[f"FFD_FIX_{'IJK'[axis]}"] for axis in range(3)
+        )
+        return i, j, k
     ends = _edges(mesh, config.markers, box)
-    symmetric = config.words["FFD_SYMMETRY_PLANE"].upper() == "YES" and mesh.dim == 3
+    symmetric = config.values["FFD_SYMMETRY_PLANE"] and mesh.dim == 3
     cartesian = box.system.kind == "CARTESIAN"
     held = []
     for axis, degree in enumerate(box.degrees):
@@ -119,8 +117,7 @@ def request_of(config: Su2Config, variable: DesignVariable) -> Request:
     """Return what a variable asks of its box."""
     count = len(DIRECTIONS[variable.kind])
     index = tuple(int(number) for number in variable.numbers[:count])
-    length = float(config.words["REF_LENGTH"])
-    return Request(variable.kind, index, variable.numbers[count:], length)
+    return Request(variable.kind, index, variable.numbers[count:], config.values["REF_LENGTH"])
 
 
 def reach(move: Move) -> int:
@@ -140,7 +137,7 @@ def held_by_continuity(
     warnings = []
     for name, box in boxes.items():
         zones = [config, *(zone for zone in config.beside if name in _boxes_moved(zone))]
-        asking = [zone for zone in zones if zone.words["FFD_CONTINUITY"]]
+        asking = [zone for zone in zones if zone.values["FFD_CONTINUITY"]]
         held = _held_in(asking or zones, mesh, box)
         every[name] = held if asking else NONE
         stuck = []
@@ -157,7 +154,7 @@ def held_by_continuity(
                 partly.append(place)
         effects = [(stuck, "do nothing"), (partly, "leave the control points there")]
         if asking:
-            asked = asking[0].words["FFD_CONTINUITY"].upper()
+            asked = asking[0].values["FFD_CONTINUITY"]
             note = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
             warnings += [
                 f"{note}{places_words(places)} will {effect}"
@@ -184,7 +181,7 @@ def _boxes_moved(config: Su2Config) -> set[str]:
 def _held_in(zones: list[Su2Config], mesh: Mesh, box: Box) -> Planes:
     """Return the planes of a box that any zone holds, by axis."""
     held_by_zone = [
-        held_planes(zone, mesh, box, zone.words["FFD_CONTINUITY"].upper() or SU2_CONTINUITY)
+        held_planes(zone, mesh, box, zone.values["FFD_CONTINUITY"] or SU2_CONTINUITY)
         for zone in zones
     ]
     i, j, k = zip(*held_by_zone, strict=True)
@@ -299,13 +296,9 @@ class MovedBoxes(Displacer):
 
 def limits_of(config: Su2Config) -> Limits:
     """Return what keeps boxes from being deformed too much."""
-    words = config.words
-    prevents = words["FFD_INTPREV"].upper() == "YES"
-    return Limits(
-        float(words["OPT_LINE_SEARCH_BOUND"]),
-        int(float(words["FFD_INTPREV_ITER"])) if prevents else 0,
-        int(float(words["FFD_INTPREV_DEPTH"])),
-    )
+    values = config.values
+    iterations = values["FFD_INTPREV_ITER"] if values["FFD_INTPREV"] else 0
+    return Limits(values["OPT_LINE_SEARCH_BOUND"], iterations, values["FFD_INTPREV_DEPTH"])
 
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:

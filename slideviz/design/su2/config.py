@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.key import MOTION
+from slideviz.case.key import MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import (
     Entry,
@@ -73,30 +73,22 @@ def radial_keys(rows: Mapping[str, Entry]) -> set[str]:
     return {"DEFORM_KIND", *READ_ALWAYS, *with_rbf, *elastic}
 
 
-def radial_settings(
-    case: Case, rows: Mapping[str, Entry], note: Callable[..., None], warnings: list[Remark]
-) -> Case:
-    """Return the case with SU2's settings of its method, where slideviz's own are not given.
-
-    ``note`` takes a key with a wrong value, and a why about it.
-    """
+def radial_settings(case: Case, reader: _Reader) -> Case:
+    """Return the case with SU2's settings of its method, where slideviz's own are not given."""
+    rows = reader.rows
     kind = _word(rows, "DEFORM_KIND")
     if kind not in ("", "ELASTIC", "RBF"):
-        note(rows["DEFORM_KIND"], not_one_of(kind, ("ELASTIC", "RBF")))
+        reader.note(rows["DEFORM_KIND"], not_one_of(kind, ("ELASTIC", "RBF")))
     if kind == "ELASTIC" and "METHOD" not in rows:
         why = "DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; write METHOD="
-        warnings.append(Message(f"{why} elastic for elasticity", level="note"))
-    fields: dict[str, Any] = {}
-    for name, form in {**READ_ALWAYS, **(READ_WITH_RBF if kind == "RBF" else {})}.items():
-        if name in rows:
-            try:
-                fields[name] = form.read(rows[name].value)
-            except CaseError as problem:
-                note(rows[name], *problem.messages)
+        reader.warnings.append(Message(f"{why} elastic for elasticity", level="note"))
+    forms = READ_ALWAYS | (READ_WITH_RBF if kind == "RBF" else {})
+    read = {name: reader.read(name, form.read) for name, form in forms.items()}
+    fields = {name: value for name, value in read.items() if value is not None}
     if kind == "RBF":
         word = _word(rows, FUNCTION) or "WENDLAND_C2"
         if word not in KERNELS:
-            note(rows[FUNCTION], not_one_of(word, KERNELS))
+            reader.note(rows[FUNCTION], not_one_of(word, KERNELS))
         kernel, factor = KERNELS.get(word, KERNELS["WENDLAND_C2"])
         case = case if "RBF_KERNEL" in rows else case.change(kernel=kernel)
         radius = fields.get("RADIAL_BASIS_FUNCTION_PARAMETER")
@@ -105,21 +97,12 @@ def radial_settings(
         if "DEFORM_NONLINEAR_ITER" in fields and "STEPS" not in rows:
             case = case.change(steps=fields["DEFORM_NONLINEAR_ITER"])
     if case.method == "elastic":
-        case = _elastic(case, rows, note)
+        for name, default in ELASTIC.items():
+            key = KEYS["STEPS" if name == "DEFORM_NONLINEAR_ITER" else name]
+            if key.name not in rows or key.name == name:
+                usual = key.put(case, key.kind.read(default))
+                case = reader.put(case, name, key) if name in rows else usual
     return _reduced(case, rows, fields)
-
-
-def _elastic(case: Case, rows: Mapping[str, Entry], note: Callable[..., None]) -> Case:
-    """Return the case with SU2's settings of linear elasticity, or its defaults."""
-    for name, default in ELASTIC.items():
-        key = KEYS["STEPS" if name == "DEFORM_NONLINEAR_ITER" else name]
-        if key.name in rows and key.name != name:
-            continue
-        try:
-            case = key.put(case, key.kind.read(rows[name].value if name in rows else default))
-        except CaseError as problem:
-            note(rows[name], *problem.messages)
-    return case
 
 
 def _reduced(case: Case, rows: Mapping[str, Entry], given: Mapping[str, Any]) -> Case:
@@ -156,39 +139,67 @@ FILES = {
     "GRAD_OBJFUNC_FILENAME": "of_grad.dat",
 }
 """Keys that name files, with SU2's defaults."""
-WORDS = {
-    "DV_SENSITIVITY_FORMAT": "SU2_NATIVE",
-    "OBJECTIVE_FUNCTION": "DRAG",
-    "OPT_RELAX_FACTOR": "1.0",
-    "READ_BINARY_RESTART": "YES",
-    "FFD_CONTINUITY": "",
-    "FFD_SYMMETRY_PLANE": "NO",
-    "FFD_FIX_I": "NONE",
-    "FFD_FIX_J": "NONE",
-    "FFD_FIX_K": "NONE",
-    "FFD_INTPREV": "NO",
-    "FFD_INTPREV_ITER": "10",
-    "FFD_INTPREV_DEPTH": "3",
-    "CONVEXITY_CHECK": "NO",
-    "CONVEXITY_CHECK_ITER": "10",
-    "CONVEXITY_CHECK_DEPTH": "3",
-    "OPT_LINE_SEARCH_BOUND": "1E6",
-    "REF_LENGTH": "1.0",
-    "MULTIZONE_MESH": "YES",
+
+
+def _supported(*words: str) -> Callable[[str], str]:
+    def read(text: str) -> str:
+        if text.upper() not in words:
+            raise CaseError(
+                f"{shown(text)} is not supported; supported: {', '.join(filter(None, words))}"
+            )
+        return text.upper()
+
+    return read
+
+
+def _yes(text: str) -> bool:
+    return _supported("YES", "NO")(text) == "YES"
+
+
+def _above(least: float) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        if (value := number(text)) <= least:
+            raise CaseError(f"{shown(text)} is not a number above {least:g}")
+        return value
+
+    return read
+
+
+def _count(text: str) -> int:
+    if (value := number(text)) <= 0.0 or value != int(value):
+        raise CaseError(f"{shown(text)} is not a whole number above 0")
+    return int(value)
+
+
+def _planes(text: str) -> frozenset[int]:
+    words = [word.text for word in list_of(text)]
+    if not all(map(str.isdecimal, words)):
+        raise CaseError(f"{shown(text)} is not a list of whole numbers")
+    return frozenset(map(int, words))
+
+
+CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
+"""Values of FFD_CONTINUITY, and how many planes of control points each holds at a side."""
+VALUES: dict[str, tuple[Callable[[str], Any], str]] = {
+    "DV_SENSITIVITY_FORMAT": (_supported("SU2_NATIVE", "UNORDERED_ASCII"), "SU2_NATIVE"),
+    "OBJECTIVE_FUNCTION": (str, "DRAG"),
+    "OPT_RELAX_FACTOR": (_above(-inf), "1.0"),
+    "READ_BINARY_RESTART": (lambda text: text.upper() == "YES", "YES"),
+    "FFD_CONTINUITY": (_supported("", *CONTINUITIES), ""),
+    "FFD_SYMMETRY_PLANE": (_yes, "NO"),
+    **{f"FFD_FIX_{letter}": (_planes, "NONE") for letter in "IJK"},
+    "FFD_INTPREV": (_yes, "NO"),
+    "FFD_INTPREV_ITER": (_count, "10"),
+    "FFD_INTPREV_DEPTH": (_count, "3"),
+    "CONVEXITY_CHECK": (_yes, "NO"),
+    "CONVEXITY_CHECK_ITER": (_count, "10"),
+    "CONVEXITY_CHECK_DEPTH": (_count, "3"),
+    "OPT_LINE_SEARCH_BOUND": (_above(0.0), "1E6"),
+    "REF_LENGTH": (_above(0.0), "1.0"),
+    "MULTIZONE_MESH": (_yes, "YES"),
 }
-"""Other keys of one value or list, with SU2's defaults; except FFD_CONTINUITY, which is empty:
-control points are held only if the key is given."""
-NUMBERS = {
-    "OPT_RELAX_FACTOR": -inf,
-    "OPT_LINE_SEARCH_BOUND": 0.0,
-    "REF_LENGTH": 0.0,
-    "FFD_INTPREV_ITER": 0.0,
-    "FFD_INTPREV_DEPTH": 0.0,
-    "CONVEXITY_CHECK_ITER": 0.0,
-    "CONVEXITY_CHECK_DEPTH": 0.0,
-}
-"""Keys of numbers among them, and what these must be above."""
-COUNTS = ("_ITER", "_DEPTH")  # endings of those whose number is a whole one
+"""Other keys of one value or list: how each is read, and SU2's default; except FFD_CONTINUITY,
+which is empty: control points are held only if the key is given."""
 LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
 NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES, *ELASTIC)
 """Keys of case files that mean something else in SU2, or are read in another way."""
@@ -211,8 +222,6 @@ NOT_MISTYPED = {"NZONES"}
 """Keys of SU2 that resemble one of slideviz and are not read."""
 ZONE_KEYS = {"CONFIG_LIST", "MULTIZONE", "SOLVER"}
 """Keys that are read where the first of them is there."""
-CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
-"""Values of FFD_CONTINUITY, and how many planes of control points each holds at a side."""
 
 
 @dataclass(frozen=True)
@@ -223,7 +232,7 @@ class Su2Config:
     markers: tuple[str, ...]  # the boundaries that the design variables move
     variables: tuple[DesignVariable, ...]
     files: dict[str, Path]
-    words: dict[str, str]  # `files`, `words`: values of the keys in ``FILES`` and ``WORDS``
+    values: dict[str, Any]  # `files`, `values`: those of the keys in ``FILES`` and ``VALUES``
     ignored: tuple[str, ...]  # the keys that are not read
     named: dict[str, str]  # for each marker with a role, the key that lists it
     present: frozenset[str]  # the keys that it has
@@ -246,7 +255,7 @@ class Su2Config:
     @property
     def relaxation(self) -> float:
         """Return OPT_RELAX_FACTOR, which multiplies values."""
-        return float(self.words["OPT_RELAX_FACTOR"])
+        return float(self.values["OPT_RELAX_FACTOR"])
 
 
 def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
@@ -311,7 +320,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     strange = [key for key in rows if key not in _read_keys(rows)]
     case = first.case.change(
         source=path,
-        mesh_file=mesh if first.words["MULTIZONE_MESH"].upper() == "YES" else first.case.mesh_file,
+        mesh_file=mesh if first.values["MULTIZONE_MESH"] else first.case.mesh_file,
         mesh_out=_with_ending(out, first.case),
         warnings=(*warnings, *_perhaps_ours(path, strange, rows), *first.case.warnings),
     )
@@ -385,8 +394,8 @@ def _config(
     variables = read_variables(rows, problems, notes)
     ignored = tuple(key for key in rows if key not in _read_keys(rows))
     files = {key: reader.file(key, default) for key, default in FILES.items()}
-    words = {key: reader.word(key, default) for key, default in WORDS.items()}
-    reader.check(words)
+    values = {key: reader.value(key, *how) for key, how in VALUES.items()}
+    reader.check()
     if zone is None and "DV_KIND" not in rows:
         sentence = (
             f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
@@ -404,7 +413,7 @@ def _config(
     )
     variables = variables or NOTHING
     keys = frozenset(rows)
-    return Su2Config(case, markers, variables, files, words, ignored, reader.named, keys, zone)
+    return Su2Config(case, markers, variables, files, values, ignored, reader.named, keys, zone)
 
 
 def _perhaps_ours(path: Path, ignored: Iterable[str], rows: dict[str, Entry]) -> list[str]:
@@ -443,7 +452,7 @@ def _read_keys(rows: Mapping[str, Entry] | None = None) -> set[str]:
     """Return the names of all keys that are read, of a configuration if it is given."""
     formats = {"MESH_FORMAT", "MESH_OUT_FORMAT"}
     zones = ZONE_KEYS if rows and "CONFIG_LIST" in rows else ()
-    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats, *zones, *radial_keys(rows or {})}
+    return {*OURS, *ROLE_KEYS, *FILES, *VALUES, *LISTS, *formats, *zones, *radial_keys(rows or {})}
 
 
 def _with_ending(path: Path, case: Case) -> Path:
@@ -475,15 +484,27 @@ class _Reader:
 
     def names(self, key: str) -> tuple[str, ...]:
         """Return the markers that a key lists; none if it is missing or wrong, which is noted."""
+        kind = KEYS["MARKER_PERIODIC" if key == "MARKER_PERIODIC" else "MARKER_FIXED"].kind
+        return tuple(self.read(key, kind.read) or ())
+
+    def value(self, key: str, read: Callable[[str], Any], default: str) -> Any:
+        """Return what ``read`` returns of the value of a key, or of its default."""
+        return self.read(key, lambda _: read(self.word(key, default)), read(default))
+
+    def put(self, case: Case, name: str, row: Key) -> Case:
+        """Return the case with the value of a key put into it, if that is there and right."""
+        return self.read(name, lambda text: row.put(case, row.kind.read(text)), case)
+
+    def read(self, key: str, read: Callable[[str], Any], default: Any = None) -> Any:
+        """Return what ``read`` returns of a text; ``default`` without it, or where it is noted."""
         entry = self.rows.get(key)
         if entry is None:
-            return ()
+            return default
         try:
-            kind = KEYS["MARKER_PERIODIC" if key == "MARKER_PERIODIC" else "MARKER_FIXED"].kind
-            return tuple(kind.read(entry.value))
+            return read(entry.value)
         except CaseError as problem:
             self.note(entry, *problem.messages)
-            return ()
+            return default
 
     def note(self, entry: Entry, *messages: str | Message) -> None:
         """Append messages about a key, with its line, to the problems."""
@@ -498,14 +519,9 @@ class _Reader:
             roles |= dict.fromkeys(names, role)
             self.named |= dict.fromkeys(names, key)
         for name, row in OURS.items():
-            entry = self.rows.get(name)
-            if entry is None or name in ROLE_KEYS:
-                continue
-            try:
-                case = row.put(case, row.kind.read(entry.value))
-            except CaseError as problem:
-                self.note(entry, *problem.messages)
-        case = radial_settings(case, self.rows, self.note, self.warnings)
+            if name not in ROLE_KEYS:
+                case = self.put(case, name, row)
+        case = radial_settings(case, self)
         mover = "DV_MARKER" if self.names("DV_MARKER") else "MARKER_DEFORM_MESH"
         moving = self.names(mover)
         self.named |= {name: ROLES[role].key for name, role in case.roles.items()}
@@ -533,20 +549,8 @@ class _Reader:
             formats[field] = value.lower() if known else None
         return formats
 
-    def check(self, words: dict[str, str]) -> None:
-        """Note unsupported values, and keys that belong in a case file."""
-        for key, allowed in (
-            ("FFD_CONTINUITY", ("", *CONTINUITIES)),
-            ("FFD_SYMMETRY_PLANE", ("YES", "NO")),
-            ("FFD_INTPREV", ("YES", "NO")),
-            ("CONVEXITY_CHECK", ("YES", "NO")),
-            ("MULTIZONE_MESH", ("YES", "NO")),
-            ("DV_SENSITIVITY_FORMAT", ("SU2_NATIVE", "UNORDERED_ASCII")),
-        ):
-            if words[key].upper() not in allowed:
-                listed = ", ".join(filter(None, allowed))
-                sentence = f"{shown(words[key])} is not supported; supported: {listed}"
-                self.note(self.rows[key], sentence)
+    def check(self) -> None:
+        """Note keys that belong in a case file, and warn of DEFORM_MESH."""
         if self.word("DEFORM_MESH", "NO").upper() == "YES":
             sentence = "DEFORM_MESH= YES: SU2 would ignore the design variables; here they move"
             self.warnings.append(f"{sentence} DV_MARKER")
@@ -554,14 +558,3 @@ class _Reader:
             if key in self.rows:
                 sentence = "belongs into a case file (slideviz run); here DV_KIND says what moves"
                 self.note(self.rows[key], sentence)
-        for key in ("FFD_FIX_I", "FFD_FIX_J", "FFD_FIX_K"):
-            if any(not word.text.isdecimal() for word in list_of(words[key])):
-                self.note(self.rows[key], f"{shown(words[key])} is not a list of whole numbers")
-        for key, least in NUMBERS.items():
-            try:
-                value = number(words[key])
-                if value <= least or (key.endswith(COUNTS) and value != int(value)):
-                    needed = "whole number" if key.endswith(COUNTS) else "number"
-                    raise CaseError(f"{shown(words[key])} is not a {needed} above {least:g}")
-            except CaseError as problem:
-                self.note(self.rows[key], *problem.messages)

@@ -57,7 +57,7 @@ def design_gradients(
     With CONVEXITY_CHECK both are of the part of the design that `slideviz def` does; gradients are
     with respect to the values in the configuration.
     """
-    if config.words["CONVEXITY_CHECK"].upper() != "YES":
+    if not config.values["CONVEXITY_CHECK"]:
         surface = make_surface(config, mesh)
         return surface, find_gradients(surface, progress)
 

@@ -31,7 +31,7 @@ def read_mesh(config: Su2Config) -> Mesh:
     file = config.case.mesh_file
     form = config.case.mesh_format
     assert file is not None
-    if config.words["MULTIZONE_MESH"].upper() == "YES" or not config.zones:
+    if config.values["MULTIZONE_MESH"] or not config.zones:
         raise_all(
             f"{zone_config.source}: MESH_FILENAME= {zone_config.case.mesh_file}, and with "
             f"MULTIZONE_MESH= YES all zones are in one file, {file}; leave the key out there, or "
@@ -131,11 +131,7 @@ def joined(config: Su2Config, zones: tuple[Su2Config, ...]) -> Su2Config:
     if len(groups) > 1 and groups.keys() & UNMIXED:
         kinds = " and ".join(zone_config.variables[0].kind for zone_config in groups.values())
         raise CaseError(f"{config.source}: zones have {kinds}, which need a run each; make two")
-    checked = [
-        zone_config
-        for zone_config in moving
-        if zone_config.words["CONVEXITY_CHECK"].upper() == "YES"
-    ]
+    checked = [zone_config for zone_config in moving if zone_config.values["CONVEXITY_CHECK"]]
     boxes = {
         box: degrees
         for zone_config in zones
@@ -170,7 +166,7 @@ def joined(config: Su2Config, zones: tuple[Su2Config, ...]) -> Su2Config:
         case=case,
         markers=tuple(name for zone_config in moving for name in zone_config.markers),
         variables=tuple(chain(*dict.fromkeys(zone_config.variables for zone_config in moving))),
-        words=(checked or moving)[0].words,
+        values=(checked or moving)[0].values,
         named={name: key for zone_config in zones for name, key in zone_config.named.items()},
         zones=tuple(
             replace(zone_config, beside=tuple(other for other in zones if other is not zone_config))

@@ -205,7 +205,7 @@ def _read(path: Path, mesh: Mesh, moving: IntArray) -> Sensitivities:
 
 def _is_unordered(config: Su2Config) -> bool:
     """Return whether DV_SENSITIVITY_FORMAT says that rows are matched by position."""
-    return config.words["DV_SENSITIVITY_FORMAT"].upper() == "UNORDERED_ASCII"
+    return bool(config.values["DV_SENSITIVITY_FORMAT"] == "UNORDERED_ASCII")
 
 
 def sensitivity_files(config: Su2Config, mesh: Mesh) -> tuple[Path, ...]:
@@ -223,14 +223,14 @@ def sensitivity_files(config: Su2Config, mesh: Mesh) -> tuple[Path, ...]:
 
 def _restart(config: Su2Config, zone: str = "") -> Path:
     adjoint_file = config.files["SOLUTION_ADJ_FILENAME"]
-    objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").upper()
+    objective = config.values["OBJECTIVE_FUNCTION"].strip("() ").upper()
     stem = adjoint_file.with_suffix("") if adjoint_file.suffix in (".csv", ".dat") else adjoint_file
     plain = stem.name
     suffix = "combo" if "," in objective else SUFFIXES.get(objective, "")
     stem = stem.with_name(stem.name + zone)
     stems = [stem.with_name(f"{plain}_{suffix}{zone}")] if suffix else []
     endings = [".csv", ".dat"]
-    if config.words["READ_BINARY_RESTART"].upper() == "YES":
+    if config.values["READ_BINARY_RESTART"]:
         endings.reverse()
     tried = [base.with_name(base.name + end) for base in (*stems, stem) for end in endings]
     if not zone:

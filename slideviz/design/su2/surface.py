@@ -46,7 +46,7 @@ def scaled(config: Su2Config, part: float) -> Su2Config:
 
 
 def _is_checked(config: Su2Config) -> bool:
-    return config.words["CONVEXITY_CHECK"].upper() == "YES"
+    return bool(config.values["CONVEXITY_CHECK"])
 
 
 def _scaled(variable: DesignVariable, part: float) -> DesignVariable:
@@ -94,7 +94,7 @@ def convex_part(
     step = 1.0
     depth = 0
     valid = False
-    for _ in range(_count(config, "ITER")):
+    for _ in range(config.values["CONVEXITY_CHECK_ITER"]):
         step /= 2.0
         part += step if valid else -step
         found, inverted = tried(scaled(config, part))
@@ -102,7 +102,7 @@ def convex_part(
         if found is not None and valid:  # which is larger than the one before
             best = (part, found)
             depth = depth + 1
-        if depth == _count(config, "DEPTH"):
+        if depth == config.values["CONVEXITY_CHECK_DEPTH"]:
             break
     note = f"CONVEXITY_CHECK: all of the design would invert {first} more cells"
     note = f"CONVEXITY_CHECK: {impossible[0]}" if full is None else note
@@ -112,10 +112,6 @@ def convex_part(
         assert full is not None
         return 1.0, full, (f"{note}, and so does the smallest part that was tried, {part:g}",)
     return *best, (f"{note}; {best[0]:g} of it is done: its values times {best[0]:g}",)
-
-
-def _count(config: Su2Config, name: str) -> int:
-    return int(float(config.words[f"CONVEXITY_CHECK_{name}"]))
 
 
 POSITION = Columns("position", ("x", "y", "z"), flat=True)
@@ -324,11 +320,9 @@ class MovingSurface:
         cases = [zone._case() for zone in self.zones]
         settings = {zone.zone: zone.case for zone in self.config.zones}
         settings |= {zone.config.zone: case for zone, case in zip(self.zones, cases, strict=True)}
-        moved = [one for case in cases for one in case.motions if isinstance(one, Prescribed)]
-        motion = Prescribed(
-            np.concatenate([one.nodes for one in moved]),
-            np.concatenate([one.vectors for one in moved]),
-        )
+        moved = [motion.content for case in cases for motion in case.motions]
+        nodes, vectors = zip(*moved, strict=True)
+        motion = Prescribed(np.concatenate(nodes), np.concatenate(vectors))
         warnings = *self.config.case.warnings, *self.warnings
         if self.moves_whole_mesh:
             warnings = *warnings, *torn_interfaces(self.mesh, self.moved().points)

@@ -20,7 +20,7 @@ from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
-from slideviz.case.motions.kinds import KIND_OF
+from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.motion import Motion
 from slideviz.case.words import number
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
@@ -28,17 +28,7 @@ from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""
 
-_ALSO = {
-    "angle": "angle_deg",
-    "degrees": "angle_deg",
-    "dx": "x",
-    "dy": "y",
-    "dz": "z",
-    "px": "point_x",
-    "py": "point_y",
-    "pz": "point_z",
-    "dr": "distance",
-}
+_ALSO = {"angle": "angle_deg"} | {k: v for kind in KINDS for k, v in kind.words.items()}
 """Names of numbers in the grammar of ``MOTION``, and their names here."""
 TIME = "time"
 """The column with the time of a design, which changes nothing but the name of its mesh."""

@@ -26,7 +26,6 @@ from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.box import box_motions
-from slideviz.case.motions.file import Prescribed
 from slideviz.design.sweeps.columns import Value
 from slideviz.design.sweeps.table import (
     WORDS,
@@ -264,7 +263,6 @@ def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
 
     A mesh that is None stays in its file, which counts by its size and its time of change.
     """
-    prescribed = [motion for motion in case.motions if isinstance(motion, Prescribed)]
     written = tuple(motion for motion in case.motions if motion.verb)
     plain = effective(case.change(motions=written))
     if mesh is None:
@@ -278,8 +276,9 @@ def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
     if mesh is not None and box_motions(case):
         boxes = boxes_of(mesh, system_of(case))
         found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes))
-    for at, one in enumerate(prescribed, start=1):
-        found[f"displacement {at}"] = _digest(one.nodes, one.vectors)
+    arrays = (motion.content for motion in case.motions if motion.content)
+    for at, content in enumerate(arrays, start=1):
+        found[f"displacement {at}"] = _digest(*content)
     for path in (path for motion in written for path in motion.files):
         try:
             found[f"file {path.name}"] = _digest(path.read_bytes())
