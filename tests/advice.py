@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
-from slideviz.cli.run_outcome import _advice
+from slideviz.cli.report import _advice
 
 
 def advice_for(case: Any, step: Any = None, mesh: Any = None, found: Any = None) -> str:

@@ -18,7 +18,7 @@ import pyvista as pv
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.cli.inputs import changed
+from slideviz.cli.mesh_source import changed
 from slideviz.cli.parser import parse
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
 from slideviz.errors import CaseError

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.case.keys import KEYS
-from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import DONE

@@ -11,21 +11,25 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz import write
 from slideviz.case.words import counted
-from slideviz.cli.inputs import changed
+from slideviz.cli.mesh_source import changed
 from slideviz.cli.output_paths import (
     OutputPath,
     add_case_inputs,
     qualities_path,
     require_output_paths,
 )
-from slideviz.cli.report import print_remarks, run_report, save_json
+from slideviz.cli.report import (
+    CELLS,
+    print_remarks,
+    report_outcome,
+    run_report,
+    save_json,
+    write_qualities,
+)
 from slideviz.cli.run_command import measured, run_steps, silent_timer
-from slideviz.cli.run_outcome import CELLS, report_outcome, write_qualities
 from slideviz.cli.terminal import DONE, say
-from slideviz.design.su2.boxes import set_boxes
-from slideviz.design.su2.config import own_changes, read_config
-from slideviz.design.su2.on_mesh import on_mesh, read_mesh
-from slideviz.design.su2.surface import at_rest, convex_part, make_surface
+from slideviz.design.su2.config import on_mesh, own_changes, read_config, read_mesh
+from slideviz.design.su2.surface import at_rest, convex_part, make_surface, set_boxes
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.formats.losses import warning_of_losses
 

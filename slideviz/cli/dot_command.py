@@ -13,8 +13,7 @@ from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json
 from slideviz.cli.terminal import DONE
-from slideviz.design.su2.gradients import design_gradients
-from slideviz.design.su2.sensitivities import sensitivity_files
+from slideviz.design.su2.gradients import design_gradients, sensitivity_files
 from slideviz.errors import CaseError
 from slideviz.system.atomic import atomic_write
 

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 from slideviz import deform, quality
 from slideviz.case.keys import KEYS
 from slideviz.case.words import counted
-from slideviz.cli.inputs import changed, read_case, read_mesh, require_mesh_file
+from slideviz.cli.mesh_source import changed, read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE, INVERTED
-from slideviz.design.sweeps.columns import TIME, number_of
-from slideviz.design.sweeps.table import read_designs, require_distinct_times
+from slideviz.design.sweeps.table import TIME, number_of, read_designs, require_distinct_times
 from slideviz.errors import CaseError, Remark
 from slideviz.export.encode import film_kind
 from slideviz.export.film import FilmOptions, check_film, require_pair_width

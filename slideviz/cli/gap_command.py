@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz import deform, gaps, quality
-from slideviz.cli.inputs import read_inputs
+from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
 from slideviz.cli.terminal import DONE, INVERTED

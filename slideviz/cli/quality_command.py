@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz import walls, write
 from slideviz.case.limits import MeasuredMesh, check_limits, require_streamed
-from slideviz.cli.inputs import optional_case
-from slideviz.cli.mesh_source import open_mesh
+from slideviz.cli.mesh_source import open_mesh, optional_case
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.report import (
     WORST,
@@ -21,11 +20,11 @@ from slideviz.cli.report import (
     quality_lines,
     quality_report,
     reference_words,
+    report_limits,
     save_json,
     table,
     wall_lines,
 )
-from slideviz.cli.run_outcome import report_limits
 from slideviz.cli.terminal import INVERTED
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import metric_data, quality_data

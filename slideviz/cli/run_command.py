@@ -14,14 +14,17 @@ from typing import TYPE_CHECKING
 
 from slideviz import deform, quality, walls, write
 from slideviz.case.zone_cases import with_marker_names
-from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import LISTED, folded_cells, metrics_report, run_report
-from slideviz.cli.run_outcome import (
+from slideviz.cli.report import (
     CELLS,
+    LISTED,
     QUALITY_BYTES,
+    folded_cells,
+    metrics_report,
     report_outcome,
+    run_report,
     write_qualities,
 )
 from slideviz.cli.terminal import say

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
-from slideviz.cli.inputs import optional_case
-from slideviz.cli.mesh_source import open_mesh, progress_of
+from slideviz.cli.mesh_source import open_mesh, optional_case, progress_of
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.report import reference_words, save_json
 from slideviz.cli.terminal import DONE, INVERTED

@@ -15,14 +15,12 @@ from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.limits import MET
 from slideviz.case.words import counted, first_of
-from slideviz.cli.inputs import read_case, read_mesh, require_mesh_file
+from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
 from slideviz.cli.terminal import DONE
-from slideviz.design.sweeps.columns import numbers_of
-from slideviz.design.sweeps.results import RESULTS
-from slideviz.design.sweeps.table import read_designs
+from slideviz.design.sweeps.table import RESULTS, numbers_of, read_designs
 from slideviz.errors import CaseError, Remark
 from slideviz.system.cleanup import keep_partial
 

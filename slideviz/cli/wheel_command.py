@@ -6,10 +6,9 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from slideviz import wheel
-from slideviz.cli.inputs import read_inputs
+from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import limit_lines, limits_report, print_remarks, save_json
-from slideviz.cli.run_outcome import report_limits
+from slideviz.cli.report import limit_lines, limits_report, print_remarks, report_limits, save_json
 from slideviz.cli.terminal import INVERTED
 
 if TYPE_CHECKING:

@@ -2,45 +2,495 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Translate
-from slideviz.case.moving_nodes import moving_nodes
-from slideviz.design.checks import (
-    Checks,
-    facets_of,
-    note_of_refinement,
-    usual_edge,
-    warn_of_condition,
-    warn_of_error_estimate,
-    warn_of_errors,
-    without_repair,
+from slideviz.case.moving_nodes import ROUNDING, moving_nodes
+from slideviz.case.words import counted, wrong_by
+from slideviz.design.frozen_step import REMEDY, FrozenStep, StepState, choose_steps
+from slideviz.errors import (
+    CaseError,
+    ConditionWarning,
+    DeformError,
+    Message,
+    Remark,
+    SlidevizError,
+    ToleranceWarning,
+    UnsoundError,
+    not_one_of,
+    note,
 )
-from slideviz.design.choosing import choose_steps
-from slideviz.design.frozen.step import FrozenStep, StepState
-from slideviz.design.known_nodes import known_node_map
-from slideviz.design.zone_designs import Work, ZoneDesign, over_zones, zone_designs
-from slideviz.errors import CaseError, DeformError, Remark, SlidevizError, not_one_of, note
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
-from slideviz.mesh.model import Assembly, FloatArray, Mesh, largest_coordinate
+from slideviz.mesh.model import (
+    Assembly,
+    FloatArray,
+    IntArray,
+    Mesh,
+    frozen_array,
+    largest_coordinate,
+)
+from slideviz.mesh.periodic import TOLERANCE
 from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
-from slideviz.rbf.images import FAR
-from slideviz.rbf.loops import to_points
-from slideviz.rbf.tape import Array, Tape, Variable, value
+from slideviz.rbf.images import FAR, ImageDisplacements, largest_misfit, misfits
+from slideviz.rbf.loops import farthest, to_points
+from slideviz.rbf.operations import difference, flat
+from slideviz.rbf.problem import Solution
+from slideviz.rbf.refine import NOTED, TRUSTED
+from slideviz.rbf.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.solver.deform import Progress
-from slideviz.solver.growth import wall_warnings
+from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness, wall_warnings
+from slideviz.solver.interface_motion import InterfaceMotion
 from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.prescribed import displaced, support_radius
-from slideviz.solver.setup import make_setup
+from slideviz.solver.setup import AUTO_TOLERANCE, Setup, make_setup
+
+BADLY_CONDITIONED = 1e14
+"""Above this condition number, the effect of moving a single node has few correct digits."""
+
+
+def largest_condition(steps: Sequence[FrozenStep]) -> float:
+    """Return the largest condition number of the steps' systems at the reference; 1.0 if none."""
+    return max((step.condition for step in steps), default=1.0)
+
+
+def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[Message, ...]:
+    """Return a note about systems that are solved with twice the digits; empty if none is."""
+    refined = max((step.refined for step in steps), default=0.0)
+    if not refined:
+        return ()
+    return (
+        note(
+            f"the system is nearly singular (condition number {largest_condition(steps):.0e}): "
+            f"between the boundary nodes designs would be wrong by up to {100 * refined:.2g} % "
+            "of the largest displacement, so all are solved with twice the digits; a "
+            "ConditionWarning names those for which that does not suffice"
+        ),
+    )
+
+
+def without_repair(case: Case) -> tuple[Case, tuple[Remark, ...]]:
+    """Return the case without repair, and a note or, where it is asked for, a warning of that."""
+    if case.repair == "no":
+        return case, ()
+    said = (
+        f"REPAIR= {case.repair.upper()} is ignored by a Deformer, because repaired positions are "
+        "not differentiable; points and derivatives are those before the repair"
+    )
+    return case.change(repair="no"), (said if case.repair == "yes" else note(said),)
+
+
+def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
+    """Warn where designs that are less smooth than the reference may have few digits."""
+    worst = max((step.condition for step in steps if not step.refined), default=0.0)
+    error_estimate = max((step.error_estimate for step in steps), default=0.0)
+    if error_estimate > TRUSTED:
+        worst = largest_condition(steps)
+        amount = f"may be wrong by {wrong_by(error_estimate, bounded=False)}"
+    elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
+        amount = "may have few correct digits"
+    else:
+        return
+    said = (
+        f"the condition number of the system is {worst:.0e}, so that derivatives by single "
+        "nodes, and displacements between the boundary nodes where neighbours move very "
+        f"differently, {amount}; {REMEDY}"
+    )
+    little = TRUSTED < error_estimate <= NOTED
+    warnings.warn(ConditionWarning(note(said) if little else said), stacklevel=3)
+
+
+def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArray) -> bool:
+    """Warn if the error estimate (...,) of a design is above `TRUSTED`; return whether it is."""
+    worst = float(error_estimate.max(initial=0.0))
+    if worst <= TRUSTED:
+        return False
+    of = (
+        ""
+        if error_estimate.ndim == 0
+        else f" of {counted(int((error_estimate > TRUSTED).sum()), 'design')}"
+    )
+    said = (
+        f"the condition number of the system is {largest_condition(steps):.0e}: derivatives may "
+        f"have few correct digits, and displacements{of} between the boundary nodes may be wrong "
+        f"by {wrong_by(worst, bounded=all(step.refined for step in steps))}; {REMEDY}"
+    )
+    warnings.warn(ConditionWarning(said if worst > NOTED else note(said)), stacklevel=3)
+    return True
+
+
+def warn_of_errors(
+    errors: FloatArray, allowed: FloatArray, reference: NDArray[np.bool_], *, reduced: bool
+) -> None:
+    """Warn where designs miss what they must do by more than is allowed.
+
+    ``errors`` and ``allowed`` (...,). ``reference`` (...,) bool: whether all was chosen for a
+    design.
+    ``reduced``: whether control nodes were chosen, beside the facets of sliding nodes.
+    """
+    above = errors > allowed
+    if not above.any():
+        return
+    worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
+    chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
+    of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
+    why = f": {chosen} belong to another displacement"
+    remedy = "renew them with `deformer = deformer.refresh(displacement)`"
+    if reference[worst]:
+        why = f", with {chosen} chosen for this displacement"
+        remedy = "use more STEPS, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
+        remedy += "displacement"
+    rule = f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
+    warnings.warn(
+        ToleranceWarning(Message(f"{rule}{allowed[worst]:.3g}{why}", remedy)), stacklevel=3
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Checks:
+    """The checks of a design."""
+
+    mesh: Mesh
+    setup: Setup
+    steps: tuple[FrozenStep, ...]
+    facets: Mapping[int, IntArray]
+    """dict of int to (s,) int64: for each track, by its index, the simplex that each of its sliding
+    nodes is on at the reference."""
+    least: float
+    """A motion that nodes may make in any design, in the frame: the reference's, or an edge of the
+    moving boundary."""
+
+    def errors(self, targets: FloatArray, states: list[StepState]) -> FloatArray:
+        """Return the largest error of each design, (...,), in the mesh's length unit.
+
+        Raises DeformError if coordinates are infinite, nodes move much farther than the boundary,
+        or periodic images moved differently. ``targets`` (..., a, d): displacements of the known
+        nodes, in the frame. ``states``: after each step.
+        """
+        errors = self.off_track(value(states[-1].coords))
+        for index, (step, state) in enumerate(zip(self.steps, states, strict=True), start=1):
+            self.require_sound(index, step.part, targets, state)
+            self.require_alike(value(state.points))
+            errors = np.maximum(errors, state.number("max_error"))
+        return errors
+
+    def require_sound(self, index: int, part: float, targets: FloatArray, state: StepState) -> None:
+        """Raise DeformError where the results of a step cannot be right, as in every run.
+
+        Nodes may always move as far as at the reference, or by an edge of the moving boundary: so
+        a finite difference, which moves one node by next to nothing, is not refused. ``index``:
+        number of the step, from 1, for the message. ``part``: part of the whole displacement after
+        the step.
+        """
+        shape = self.mesh.points.shape
+        coords = value(state.coords).reshape(-1, *shape)
+        targets = targets.reshape(len(coords), *targets.shape[-2:])
+        lost = np.broadcast_to(state.number("lost").reshape(-1), len(coords))
+        far = farthest(coords, self.setup.coords)
+        for k, target in enumerate(targets):
+            if not np.isfinite(far[k]):
+                raise DeformError(f"step {index}: coordinates became infinite; use more steps")
+            largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
+            reach = max(largest, part * self.least)
+            if far[k] > GROWTH * reach or lost[k] > HOPELESS * largest:
+                solution = Solution(
+                    coords[k],
+                    0,
+                    0.0,
+                    self.setup.known[:0],
+                    largest_condition(self.steps),
+                    lost=float(lost[k]),
+                )
+                setup = replace(self.setup, target=target)
+                unsound = unsoundness(
+                    setup,
+                    self.mesh,
+                    solution,
+                    coords[k],
+                    part=part,
+                    farthest=float(far[k]),
+                    least=self.least,
+                )
+                if unsound:
+                    raise UnsoundError(f"step {index}: {unsound}")
+
+    def require_alike(self, points: FloatArray) -> None:
+        """Raise DeformError where periodic images of Cartesian points (n, d) moved differently."""
+        setup = self.setup
+        if not len(setup.images):
+            return
+        gaps = misfits(setup.frame, setup.coords, points, setup.images)
+        if not gaps.max() <= FAR * largest_coordinate(
+            self.mesh.points
+        ):  # else it is rounding, without a closer look
+            largest_misfit(setup.frame, setup.coords, points, setup.images)
+
+    def off_track(self, coords: FloatArray) -> FloatArray:
+        """Return the largest distance, (...,), of a sliding node from its track, in the frame."""
+        tracks = self.setup.tracks
+        sliding = self.setup.classes.sliding
+        label = tracks.of_node[sliding]
+        off = np.zeros(coords.shape[:-2])
+        for index, facets in self.facets.items():
+            at = flat(coords[..., sliding[label == index], :])
+            guess = np.tile(facets, len(at) // len(facets))
+            gap = np.linalg.norm(tracks.tracks[index].nearest(at, guess)[0] - at, axis=1)
+            off = np.maximum(off, gap.reshape(*off.shape, -1).max(axis=-1))
+        return off
+
+    def tolerance(self, designs: FloatArray) -> FloatArray:
+        """Return the allowed error of each design, (...,), in the mesh's length unit.
+
+        The tolerance of the data reduction, or a part of the largest displacement of ``designs``
+        (..., m, d).
+        """
+        if self.setup.reduction is not None:
+            return np.full(designs.shape[:-2], self.setup.reduction.tolerance)
+        largest = np.linalg.norm(designs, axis=-1).max(axis=-1, initial=0.0)
+        return AUTO_TOLERANCE * largest + ROUNDING * self.mesh.extent
+
+
+def facets_of(setup: Setup, coords: FloatArray) -> dict[int, IntArray]:
+    """Return for each track the simplex (s,) of each sliding node, at ``coords`` in the frame."""
+    tracks = setup.tracks
+    sliding = setup.classes.sliding
+    label = tracks.of_node[sliding]
+    return {
+        index: tracks.tracks[index].nearest(coords[sliding[label == index]])[1]
+        for index in np.unique(label[label >= 0]).tolist()
+    }
+
+
+def usual_edge(setup: Setup) -> float:
+    """Return the median edge length of the moving boundary, in the frame; 0 without one."""
+    facets = setup.boundary.facets
+    facets = facets[np.isin(facets, setup.classes.moving).all(axis=1)]
+    ends = setup.coords[np.roll(facets, -1, axis=1)] - setup.coords[facets]
+    gaps = np.linalg.norm(ends, axis=-1)
+    gaps = gaps[gaps > 0.0]
+    return float(np.median(gaps)) if len(gaps) else 0.0
+
+
+Work = Callable[["Deformer", Array], Array]
+"""Returns the points (..., n_z, d) of a zone from its deformer and displacements (..., m_z, d)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneDesign:
+    """The deformer of a zone, as a part of that of all zones."""
+
+    number: int  # of the zone, from 1
+    points: IntArray  # (n_z,): its points in the mesh of all zones
+    rows: IntArray
+    """(m_z,): for each of its moving nodes the row of the design that it goes by, which of one that
+    follows another zone is that of the other node; -1 where there is none."""
+    led: IntArray
+    leaders: IntArray
+    """`led`, `leaders` (f,): moving nodes that follow sliding nodes of zones before it, by their
+    place among its own, and the nodes that they follow, by their number in the mesh."""
+    deformer: Deformer
+
+    def moved(self, design: Array, points: Array, start: FloatArray) -> Array:
+        """Return the displacements (..., m_z, d) of its moving nodes, from those of a design.
+
+        ``design`` (..., m, d). ``points`` (..., n, d): of all zones, those before it deformed,
+        which were at ``start`` (n, d).
+        """
+        shift = take(points, self.leaders) - start[self.leaders]
+        return put(zone_rows(self.rows, design), self.led, shift, overwrite=True)
+
+
+def zone_rows(rows: IntArray, design: Array) -> Array:
+    """Return rows (..., m_z, d) of a design (..., m, d), as `ZoneDesign.rows` has them."""
+    shape = value(design).shape
+    out = np.zeros((*shape[:-2], len(rows), shape[-1]))
+    moved = np.flatnonzero(rows >= 0)
+    return put(out, moved, take(design, rows[moved]), overwrite=True)
+
+
+def over_zones(zones: Sequence[ZoneDesign], start: FloatArray, design: Array, work: Work) -> Array:
+    """Return the points (..., n, d) of all zones, each by ``work`` after those that it follows.
+
+    A zone that stays is at ``start`` (n, d). ``design`` (..., m, d).
+    """
+    out: Array = start
+    for zone in zones:
+        out = put(out, zone.points, work(zone.deformer, zone.moved(design, out, start)))
+    return out
+
+
+def zone_designs(
+    prepared: Prepared,
+    mesh: Assembly,
+    nodes: IntArray,
+    references: FloatArray,
+    make: Callable[[Mesh, Case, FloatArray], Deformer],
+) -> tuple[ZoneDesign, ...]:
+    """Return the designs of the zones that move, in the order in which a run deforms them.
+
+    ``nodes`` (m,): the nodes of the design. ``references`` (k, m, d): the designs to choose control
+    nodes for. ``make`` returns a deformer for a zone, its case and its designs.
+    """
+    motion = InterfaceMotion(prepared, mesh)
+    designs = list[ZoneDesign]()
+    shared = np.concatenate([nodes[:0], *(each.nodes for each in motion.interfaces)])
+    shift = np.zeros((len(references), *mesh.points.shape))
+    deformed = np.zeros(len(mesh.points), bool)
+    for index, ahead in motion.leaders_first():
+        part = mesh.parts[index]
+        own = motion.cases[index]
+        points = np.arange(part.points.start, part.points.stop)
+        on = [part.mesh.marker(name).nodes for name in own.markers_with("moving")]
+        mine = np.unique(np.concatenate(on)) + part.points.start
+        leaders = motion.leader[mine]
+        place = np.searchsorted(nodes, leaders).clip(max=len(nodes) - 1)
+        rows = np.where(nodes[place] == leaders, place, -1)
+        # Rims that are kept on walls go otherwise than the design says.
+        follows = motion.led[mine] & ((rows < 0) | (own.rims == "slide") & deformed[leaders])
+        rows[follows] = -1
+        led = np.flatnonzero(follows)
+        leaders = leaders[led]
+        asked = value(zone_rows(rows, references))
+        asked[:, led] = shift[:, leaders]
+        deformer = make(part.mesh, own, asked)
+        deformed[points] = True
+        designs.append(ZoneDesign(index + 1, points, rows, led, leaders, deformer))
+        at = np.intersect1d(points, shared)
+        for k, each in enumerate(asked if len(at) and ahead else ()):
+            run = None if k else deformer.as_run()
+            there = deformer._deformed(each)[0] if run is None else run
+            shift[k, at] = there[at - points[0]] - mesh.points[at]
+        moved = np.zeros_like(part.mesh.points)
+        farthest = np.linalg.norm(shift[:, at], axis=2).argmax(axis=0)
+        moved[at - points[0]] = shift[farthest, at]
+        moving = np.flatnonzero(moved.any(axis=1))
+        if not len(moving):  # at rest: other designs move all that is not fixed
+            moving = np.setdiff1d(points - points[0], deformer._setup.classes.fixed)
+        motion.slid(index, moved, moving, ahead)
+    return tuple(designs)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownNodeMap:
+    """The map from the displacement of the moving nodes to that of the known nodes."""
+
+    mesh: Mesh
+    setup: Setup
+    nodes: IntArray  # (m,): the moving nodes, ascending
+    points: FloatArray
+    """(s, d): the sources, undeformed: nodes whose displacement all their periodic images have."""
+    rows: IntArray
+    turn: FloatArray | None
+    """`rows`, `turn` (s,) int64, (s, d, d) float64 or None: the moving node, by its place in
+    ``nodes``, whose displacement each source has, and the rotation of it (None: none is rotated).
+    They differ for copies in a halo."""
+    known: IntArray
+    source: IntArray
+    """`known`, `source` (k,): known nodes that move, by their place in ``setup.known``, and the
+    source that each follows."""
+    others: IntArray
+    followed: IntArray
+    """`others`, `followed` (o,): moving nodes that are not sources, by their place in ``nodes``,
+    and the source that each must follow."""
+
+    def target(self, vectors: Array) -> Array:
+        """Return the displacement (..., a, d) of the known nodes, in the frame.
+
+        From that of the moving nodes, ``vectors`` (..., m, d), Cartesian. Raises DeformError where
+        images, or copies in a halo and their originals, are displaced differently.
+        """
+        setup = self.setup
+        overwrite = take(vectors, self.rows)
+        if self.turn is not None:
+            overwrite = transform(self.turn, overwrite)
+        moved = difference(setup.frame, self.points, overwrite)
+        self._require_alike(value(vectors), value(moved))
+        shape = (len(setup.known), self.mesh.dim)
+        return put(np.zeros(shape), self.known, take(moved, self.source))
+
+    def _require_alike(self, vectors: FloatArray, moved: FloatArray) -> None:
+        """Raise DeformError where images, or copies and their originals, are displaced differently.
+
+        ``vectors`` and ``moved`` (..., m, d), (..., s, d): Cartesian displacements of the moving
+        nodes, and those of the sources in the frame.
+        """
+        setup = self.setup
+        mesh = self.mesh
+        if len(self.others):
+            overwrite = vectors[..., self.others, :]
+            follow = difference(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
+            gap = np.abs(value(follow) - moved[..., self.followed, :])
+            largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
+            allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
+            if (gap.max(axis=(-1, -2)) > allowed).any():
+                self._refuse(vectors)
+        if mesh.halo is not None:
+            self._refuse(vectors)
+
+    def _refuse(self, vectors: FloatArray) -> None:
+        setup = self.setup
+        mesh = self.mesh
+        for each in vectors.reshape(-1, *vectors.shape[-2:]):
+            moved = displaced(Displacements(self.nodes, each), mesh)
+            there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
+            largest = float(np.linalg.norm(there, axis=1).max(initial=0.0))
+            allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
+            ImageDisplacements(moved.nodes, there, setup.classes.representative).require_alike(
+                allowed
+            )
+
+
+def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeMap:
+    """Return the map from the displacement of the moving nodes to that of the known nodes.
+
+    Raises CaseError if a moving node in a halo is a copy of a node that does not move.
+    """
+    moved = displaced(asked, mesh)
+    spread = ImageDisplacements(moved.nodes, moved.vectors, setup.classes.representative)
+    of_known = spread.source(setup.known)
+    known = np.flatnonzero(of_known >= 0)
+    nodes, place = np.unique(of_known[known], return_inverse=True)
+    given = nodes.copy()
+    turn = None
+    if mesh.halo is not None:
+        turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
+        row = np.full(len(mesh.points), -1)
+        row[mesh.halo.receivers] = np.arange(len(mesh.halo.receivers))
+        copies = row[nodes] >= 0
+        given[copies] = mesh.halo.donors[row[nodes[copies]]]
+        turn[copies] = mesh.halo.rotations[row[nodes[copies]]]
+    rows = np.searchsorted(asked.nodes, given)
+    inside = np.isin(given, asked.nodes)
+    if not inside.all():
+        raise CaseError(
+            f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
+            "is on no moving marker; give both the same role"
+        )
+    lead = spread.source(moved.nodes)
+    others = np.flatnonzero(lead != moved.nodes)
+    return KnownNodeMap(
+        mesh,
+        setup,
+        asked.nodes,
+        frozen_array(mesh.points[nodes], np.float64),
+        rows,
+        turn,
+        known,
+        place,
+        np.searchsorted(asked.nodes, moved.nodes[others]) if mesh.halo is None else others[:0],
+        np.searchsorted(nodes, lead[others]) if mesh.halo is None else others[:0],
+    )
+
 
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""

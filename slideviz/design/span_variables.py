@@ -10,7 +10,7 @@ from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.moving_nodes import displacements
-from slideviz.design.sweeps.columns import numbers_of
+from slideviz.design.sweeps.table import numbers_of
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 

@@ -58,7 +58,7 @@ class Cycle:
 
 
 class FrozenChoices(Protocol):
-    """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen`)."""
+    """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen_step`)."""
 
     out: FloatArray | None  # (..., n, d): an array for the displacement of all nodes, to be reused
 

@@ -16,13 +16,15 @@ from slideviz.case.keys import KEYS
 from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number
-from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.design.sweeps.table import (
     DesignRow,
+    case_values,
     cells_of,
+    columns_of,
     design_columns,
     head_of,
+    numbers_of,
     read_designs,
     result_of,
 )

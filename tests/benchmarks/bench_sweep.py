@@ -11,7 +11,7 @@ import time
 import pytest
 
 import slideviz as sv
-from slideviz.design.sweeps.processes import usable_cores
+from slideviz.design.sweeps.sweep import usable_cores
 from slideviz.samples.table import sample
 
 DESIGNS = 200

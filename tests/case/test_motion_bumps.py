@@ -9,7 +9,7 @@ import slideviz as sv
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.moving_nodes import displacements
-from slideviz.design.sweeps.columns import applied, columns_of, numbers_of
+from slideviz.design.sweeps.table import applied, columns_of, numbers_of
 from slideviz.errors import CaseError
 from slideviz.session.jobs import find_intersection
 from slideviz.solver.prepare import prepare

@@ -15,8 +15,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.design.checks import warn_of_condition, warn_of_error_estimate
-from slideviz.design.frozen.solve import full_factor
+from slideviz.design.deformer import warn_of_condition, warn_of_error_estimate
+from slideviz.design.frozen_step import full_factor
 from slideviz.errors import ConditionWarning, DeformError, ToleranceWarning, messages_of
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.reduction import Reduction

@@ -13,7 +13,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.design.frozen import fit
+from slideviz.design import frozen_step
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS
@@ -401,8 +401,8 @@ def test_points_and_derivatives_at_one_design_share_its_factors(monkeypatch, sli
     design = 1.1 * deformer.displacement
     weights = np.cos(mesh.points)
     calls: list[int] = []
-    extend = fit.extend
-    monkeypatch.setattr(fit, "extend", lambda *rest: calls.append(1) or extend(*rest))
+    extend = frozen_step.extend
+    monkeypatch.setattr(frozen_step, "extend", lambda *rest: calls.append(1) or extend(*rest))
     other.deform(0.9 * design)
     calls.clear()
     points = deformer.deform(design)

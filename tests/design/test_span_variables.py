@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.design.sweeps.columns import applied, columns_of
+from slideviz.design.sweeps.table import applied, columns_of
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 

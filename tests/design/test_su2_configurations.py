@@ -17,7 +17,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.su2.variables import KINDS, form
+from slideviz.design.su2.config import KINDS, form
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from tests.builders import airfoil, annulus, grid, sphere_in_box

@@ -456,7 +456,7 @@ def test_continuity_holds_planes_where_it_is_asked_for(here):
 
 
 def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
-    from slideviz.design.su2.boxes import _meets
+    from slideviz.design.su2.surface import _meets
 
     side = np.array([[0.0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]])
     through = np.array([[[-1.0, 0.9, 0.9], [1.0, 0.8, 0.8]], [[-1.0, 0.1, 0.1], [1.0, 0.2, 0.1]]])
@@ -466,7 +466,7 @@ def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
 
 
 def test_continuity_in_2d_continues_the_sides_beyond_the_box_as_su2_does():
-    from slideviz.design.su2.boxes import _meets
+    from slideviz.design.su2.surface import _meets
 
     side = np.array([[0.0, 0, -0.5], [0, 0, 0.5], [0, 1, -0.5], [0, 1, 0.5]])
     edges = np.array([[[-1.0, 5.0, 0.0], [1.0, 6.0, 0.0]], [[0.5, 0.0, 0.0], [0.5, 1.0, 0.0]]])
@@ -633,7 +633,7 @@ def test_a_long_list_of_markers_is_cut(here):
     ],
 )
 def test_boundaries_of_su2s_keys_that_the_mesh_lacks_are_passed_over(row, roles, modes, here):
-    from slideviz.design.su2.on_mesh import on_mesh
+    from slideviz.design.su2.config import on_mesh
 
     found = on_mesh(config(f"DV_KIND= SCALE\nDV_VALUE= 1.1\n{row}\n"), sv.read("mesh.su2"))
     assert dict(found.case.roles) == {"low": "moving", **roles}
@@ -662,7 +662,7 @@ def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
 
 
 def test_internal_boundaries_of_su2_are_passed_over_where_the_mesh_lacks_them(here):
-    from slideviz.design.su2.on_mesh import on_mesh
+    from slideviz.design.su2.config import on_mesh
 
     text = "DV_KIND= SCALE\nDV_VALUE= 1.1\nMARKER_INTERNAL= (left, core)\n"
     found = on_mesh(config(text), sv.read("mesh.su2"))

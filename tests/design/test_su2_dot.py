@@ -315,7 +315,7 @@ def test_surface_sensitivity_does_not_say_what_a_moved_grid_does(case, capsys):
 
 def test_surface_sensitivity_of_a_real_restart_is_its_sensitivity_along_the_normals(here):
     from slideviz.case.motions.airfoil import normals_at
-    from slideviz.design.su2.sensitivities import SURFACE, read_restart
+    from slideviz.design.su2.gradients import SURFACE, read_restart
 
     unpacked("solution_adj_custom.csv")
     unpacked("burner_hx.su2")

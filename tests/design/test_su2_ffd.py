@@ -11,9 +11,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.boxes import defined_boxes
 from slideviz.cli import run
-from slideviz.design.su2.boxes import held_planes
 from slideviz.design.su2.config import read_config
-from slideviz.design.su2.surface import make_surface
+from slideviz.design.su2.surface import held_planes, make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem
 from slideviz.ffd.section import boxes_of

@@ -9,8 +9,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.su2.config import read_config
-from slideviz.design.su2.on_mesh import on_mesh, read_mesh
+from slideviz.design.su2.config import on_mesh, read_config, read_mesh
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of

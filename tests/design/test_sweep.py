@@ -16,8 +16,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
-from slideviz.design.sweeps.processes import (
+from slideviz.design.sweeps.sweep import (
     Packed,
     Task,
     TaskResult,
@@ -25,8 +24,14 @@ from slideviz.design.sweeps.processes import (
     pack_mesh,
     run_task,
 )
-from slideviz.design.sweeps.results import lock_folder
-from slideviz.design.sweeps.table import DesignRow, read_designs
+from slideviz.design.sweeps.table import (
+    DesignRow,
+    case_values,
+    columns_of,
+    lock_folder,
+    numbers_of,
+    read_designs,
+)
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
 from slideviz.session.design_table import read_results
@@ -416,7 +421,7 @@ def test_a_design_has_one_thread(passage, monkeypatch):
     from numba import get_num_threads
     from threadpoolctl import threadpool_info
 
-    from slideviz.design.sweeps import processes
+    from slideviz.design.sweeps import sweep as module
 
     def threads():
         return [get_num_threads(), *(one["num_threads"] for one in threadpool_info())]
@@ -427,7 +432,7 @@ def test_a_design_has_one_thread(passage, monkeypatch):
         found.append(threads())
         return sv.deform(*values)
 
-    monkeypatch.setattr(processes, "deform", watched)
+    monkeypatch.setattr(module, "deform", watched)
     mesh = pack_mesh(passage.mesh)
     run_task(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
     before = threads()

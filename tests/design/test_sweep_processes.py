@@ -17,9 +17,9 @@ from multiprocessing import Pipe
 import pytest
 
 import slideviz as sv
-from slideviz.design.sweeps import processes
+from slideviz.design.sweeps import sweep as module
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.processes import Processes, pack_mesh
+from slideviz.design.sweeps.sweep import Processes, pack_mesh
 from slideviz.errors import DeformError
 from slideviz.samples.table import sample
 from tests.processes import is_running, wait_until
@@ -84,8 +84,8 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import sys, time\n"
-        "from slideviz.design.sweeps.processes import Processes\n"
-        "from slideviz.design.sweeps.processes import Packed\n"
+        "from slideviz.design.sweeps.sweep import Processes\n"
+        "from slideviz.design.sweeps.sweep import Packed\n"
         "import pickle\n"
         "if __name__ == '__main__':\n"
         "    workers = Processes(1, Packed('none', pickle.dumps(None)))\n"
@@ -111,7 +111,7 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     ],
 )
 def test_why_no_process_starts_is_told(passage, monkeypatch, end, said):
-    monkeypatch.setattr(processes, "_begin", end)
+    monkeypatch.setattr(module, "_begin", end)
     if "__name__" in said:
         monkeypatch.setattr(sys.modules["__main__"], "__file__", "script.py", raising=False)
     with pytest.raises(DeformError, match=re.escape(said)) as found:
@@ -184,7 +184,7 @@ def test_no_worker_heeds_ctrl_c_while_it_starts():
     script = (
         "import signal\n"
         "from multiprocessing import resource_tracker\n"
-        "from slideviz.design.sweeps.processes import _settings_of_workers\n"
+        "from slideviz.design.sweeps.sweep import _settings_of_workers\n"
         "with _settings_of_workers():\n"
         "    resource_tracker.getfd()  # as `Popen` does before it starts a process\n"
         "    print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
@@ -200,4 +200,4 @@ def test_a_worker_whose_parent_has_ended_says_nothing(has_mesh):
     if has_mesh:
         here.send(pack_mesh(sample("square", 4).mesh))
     here.close()
-    assert processes._serve_calls(there, lambda: None) is None
+    assert module._serve_calls(there, lambda: None) is None

@@ -10,8 +10,7 @@ from slideviz.case.check import check_case
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.moving_nodes import displacements
-from slideviz.design.sweeps.columns import numbers_of
-from slideviz.design.sweeps.results import sources_of
+from slideviz.design.sweeps.table import numbers_of, sources_of
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes

@@ -15,7 +15,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.cli.inputs import changed
+from slideviz.cli.mesh_source import changed
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample

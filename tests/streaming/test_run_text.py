@@ -15,7 +15,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.cli.inputs import changed
+from slideviz.cli.mesh_source import changed
 from slideviz.errors import MeshError
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import text as su2_text

@@ -1,7 +1,23 @@
-"""Sweeps: one mesh deformed by many designs, in many processes or on many machines."""
+"""Sweeps: one mesh deformed by many designs, in many processes or on many machines.
+
+A process of this machine that is lost loses one design only. ``ProcessPoolExecutor`` ends all its
+processes when one is lost, and all their work is lost; a pool of Pebble does so where one ends
+between two designs, or before its first. Here a thread for each process hands it one call at a
+time, and starts another process when it was lost.
+
+The mesh is sent to a process once and kept there, with what is computed once for it (boundary,
+undeformed quality); a task is then the case only. A process without the mesh answers so, and is
+sent the mesh with its next task.
+"""
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import (
@@ -12,29 +28,408 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import closing, nullcontext
-from dataclasses import replace
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
+from functools import cache
+from hashlib import blake2b
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Lock
+from typing import Any, NamedTuple, NoReturn
 
+from numba import get_num_threads, set_num_threads
+from threadpoolctl import ThreadpoolController
+
+from slideviz import __version__
 from slideviz.argument_types import check_types
+from slideviz.case.limits import check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.box import box_motions
-from slideviz.design.sweeps.processes import (
-    Packed,
-    Processes,
-    Task,
-    TaskResult,
-    pack_mesh,
-    run_task,
-    usable_cores,
+from slideviz.design.sweeps.table import (
+    Design,
+    DesignRow,
+    SweepResults,
+    Table,
+    iterations,
+    read_designs,
+    sources_of,
 )
-from slideviz.design.sweeps.results import SweepResults, sources_of
-from slideviz.design.sweeps.table import Design, DesignRow, Table, iterations, read_designs
-from slideviz.errors import CaseError, DeformError
-from slideviz.formats.files import read
+from slideviz.errors import CaseError, DeformError, SlidevizError, messages_of
+from slideviz.formats.files import read, write
 from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
-from slideviz.streaming.run import require_stream
+from slideviz.mesh.quality import quality
+from slideviz.solver.deform import deform
+from slideviz.solver.steps import Step
+from slideviz.streaming.run import require_stream, stream
+from slideviz.system.cleanup import clean_up, starting
+from slideviz.terms import FileFormat
+
+_KEPT = 2  # number of meshes that a process keeps: that of the sweep, and one of another sweep
+_meshes: dict[str, Mesh] = {}  # the meshes of this process, by name
+_one_at_a_time = Lock()
+"""Held during a task: Numba ends the process if loops of two threads run at once."""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A mesh as bytes, and a name that is unique to them."""
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True)
+class Task:
+    """A design as it is sent to a worker."""
+
+    design: int  # its number, from 1
+    case: Case
+    mesh: str  # name of the packed mesh
+    version: str = __version__  # of the slideviz that sends it
+    packed: Packed | None = None  # the mesh, for a worker that lacks it
+    output: Path | None = None  # where the deformed mesh is written; None: it is not
+    file_format: FileFormat | None = None  # of ``output``; None: as its ending says
+    streamed: bool = False  # whether the mesh goes from file to file; no worker needs it then
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """The result of a task, and the name of the worker; no row where the worker lacks the mesh."""
+
+    worker: str
+    row: DesignRow | None = None
+
+
+def pack_mesh(mesh: Mesh) -> Packed:
+    """Return a mesh as bytes, named by their digest."""
+    content = pickle.dumps(mesh, protocol=pickle.HIGHEST_PROTOCOL)
+    return Packed(blake2b(content, digest_size=16).hexdigest(), content)
+
+
+def cache_mesh(mesh: Packed) -> str:
+    """Keep a mesh in this process; return the name of the process."""
+    if mesh.name not in _meshes:
+        while len(_meshes) >= _KEPT:
+            _meshes.pop(next(iter(_meshes)))
+        _meshes[mesh.name] = pickle.loads(mesh.content)
+    return _worker_name()
+
+
+def run_task(task: Task) -> TaskResult:
+    """Deform the mesh by a design; return its row. An exception becomes a row with the reason."""
+    if task.version != __version__:
+        reason = f"the worker {_worker_name()} has slideviz {__version__}, this is {task.version}"
+        return TaskResult(
+            _worker_name(), DesignRow(task.design, problem=f"{reason}; install the same version")
+        )
+    with _one_at_a_time:
+        if task.packed is not None:
+            cache_mesh(task.packed)
+        mesh = _meshes.get(task.mesh)
+        if mesh is None and not task.streamed:
+            return TaskResult(_worker_name())
+        begin = time.perf_counter()
+        try:
+            with nullcontext() if task.streamed else _one_thread():
+                row = _result(task, mesh, begin)
+        except SlidevizError as problem:
+            row = DesignRow(task.design, problem="; ".join(map(str, problem.messages)))
+        except MemoryError:
+            row = DesignRow(task.design, problem="out of memory; a coarser mesh or fewer workers")
+        except Exception as problem:
+            row = DesignRow(
+                task.design, problem=f"internal error ({type(problem).__name__}: {problem})"
+            )
+        return TaskResult(_worker_name(), row)
+
+
+def _result(task: Task, mesh: Mesh | None, begin: float) -> DesignRow:
+    """Deform the mesh as ``slideviz run`` does, and return the row."""
+    last = None
+    errors = []
+    if mesh is None:
+        assert task.output is not None
+        done = stream(task.case, task.output, file_format=task.file_format)
+        mesh = done.mesh
+        last = done.steps[-1]
+        measured = done.quality
+        errors = [step.max_error for step in done.steps]
+    else:
+        for step in deform(task.case, mesh):
+            last = step
+            errors.append(step.max_error)
+        assert last is not None
+        measured = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
+    if task.output is not None and not task.streamed:
+        write(task.output, last.mesh, base=mesh, file_format=task.file_format)
+    return DesignRow(
+        design=task.design,
+        min=measured.min,
+        mean=measured.mean,
+        inverted=measured.inverted,
+        max_error=max(errors),
+        control_nodes=last.control_nodes,
+        steps=last.total,
+        seconds=time.perf_counter() - begin,
+        mesh=task.output,
+        warnings=_warnings(last),
+        limits=outcome(check_case_limits(task.case, measured, last.mesh, mesh)),
+    )
+
+
+def _warnings(last: Step) -> tuple[str, ...]:
+    return tuple(str(one) for one in messages_of(last.messages) if one.level != "note")
+
+
+def _worker_name() -> str:
+    return f"{os.uname().nodename}, process {os.getpid()}"
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Context in which loops and linear algebra use one thread: designs run in parallel."""
+    before = get_num_threads()
+    set_num_threads(1)
+    try:
+        with _libraries().limit(limits=1):
+            yield
+    finally:
+        set_num_threads(before)
+
+
+@cache
+def _libraries() -> Any:
+    """Return the libraries of linear algebra of this process; finding them takes milliseconds."""
+    return ThreadpoolController()
+
+
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_STARTS = 2
+"""Number of processes in a row that end before their first call, at which no more are started."""
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Call(NamedTuple):
+    future: Future
+    work: tuple[Callable, tuple, dict]
+
+
+class Processes(Executor):
+    """An executor with ``count`` processes of this machine, each with one thread.
+
+    A call that was given to no process yet is never lost with one. ``count``: number of processes.
+    ``mesh``: sent to each process when it starts.
+    """
+
+    def __init__(self, count: int, mesh: Packed) -> None:
+        self._max_workers = count
+        self._mesh = mesh
+        self._lock = threading.Lock()
+        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
+        self._processes: dict[int, SpawnProcess] = {}
+        self._threads: list[threading.Thread] = []
+        self._failed_starts = 0
+        self._cancelled = False
+        self.lost = 0
+        """Number of processes that ended during a call."""
+        self.exit_codes: list[int] = []
+        """Exit codes of processes that ended before their first call; negative for a signal."""
+
+    @property
+    def why_none_starts(self) -> str:
+        """Return why no process starts, after `_STARTS` failures in a row; "" before."""
+        if self._failed_starts < _STARTS:
+            return ""
+        if any(code < 0 for code in self.exit_codes):
+            return (
+                "processes are killed before they begin, perhaps because memory is short; use "
+                "fewer at a time (workers)"
+            )
+        main = sys.modules["__main__"]
+        if main.__package__ == "slideviz" or not str(getattr(main, "__file__", "")).endswith(".py"):
+            return "processes end before they begin; their output says why"
+        return (
+            "processes end before they begin; in a script, the sweep must be under "
+            '`if __name__ == "__main__":`, because each process imports the script'
+        )
+
+    @property
+    def pids(self) -> list[int]:
+        """Return the process ids of the processes that run."""
+        return list(self._processes)
+
+    def submit(self, fn: Callable, /, *args: Any, **kwargs: Any) -> Future:
+        """Queue a call for the first process that is free; return its future."""
+        future: Future = Future()
+        self._calls.put(_Call(future, (fn, args, kwargs)))
+        if len(self._threads) < self._max_workers:
+            thread = threading.Thread(target=self._serve, name="slideviz-sweep", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; with ``cancel_futures`` drop queued calls and kill busy processes."""
+        with self._lock:
+            self._cancelled = self._cancelled or cancel_futures
+            busy = list(self._processes.values()) if cancel_futures else []
+        with suppress(Empty):
+            while cancel_futures:
+                call = self._calls.get_nowait()
+                if call is not None:
+                    call.future.cancel()
+        for process in busy:
+            with suppress(OSError, ValueError):
+                process.terminate()
+        for _ in self._threads:
+            self._calls.put(None)
+        for thread in self._threads if wait else ():
+            thread.join()
+
+    def _serve(self) -> None:
+        """Give calls to a process, and to another one when it was lost, until there are no more."""
+        process: SpawnProcess | None = None
+        connection: Connection | None = None
+        while (call := self._calls.get()) is not None:
+            if not call.future.set_running_or_notify_cancel():
+                continue
+            problem: BaseException | None
+            try:
+                if process is None or connection is None or connection.poll():  # its pipe ended
+                    process = None
+                    process, connection = self._start()
+                connection.send(call.work)
+                result, problem = connection.recv()
+            except (EOFError, OSError) as ended:
+                problem = BrokenProcessPool(str(ended))
+                if process is not None:
+                    self._discard(process)
+                    with self._lock:
+                        self.lost += 1
+                process = None
+            except Exception as unsendable:
+                problem = unsendable
+            if problem is None:
+                call.future.set_result(result)
+            else:
+                call.future.set_exception(problem)
+        if process is not None and connection is not None:
+            connection.close()  # which ends it
+            self._discard(process)
+
+    def _start(self) -> tuple[SpawnProcess, Connection]:
+        """Return a new process that has the mesh, and the pipe to it; EOFError if it ended."""
+        context = get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_serve_calls, args=(there, _begin), daemon=True)
+        try:
+            with _settings_of_workers():
+                process.start()
+            there.close()
+            with self._lock:
+                self._processes[process.pid or 0] = process
+                if self._cancelled:
+                    process.terminate()
+            here.send(self._mesh)
+            here.recv()
+        except (EOFError, OSError, RuntimeError) as problem:  # the last: in a script's import
+            exit_code = self._discard(process)
+            with self._lock:
+                self._failed_starts += 1
+                self.exit_codes.append(exit_code)
+            raise EOFError(str(problem)) from problem
+        self._failed_starts = 0
+        return process, here
+
+    def _discard(self, process: SpawnProcess) -> int:
+        """Wait for the end of a process, and return its exit code; 0 if it was never started."""
+        if process.pid is None:
+            return 0
+        process.join()
+        self._processes.pop(process.pid, None)
+        return process.exitcode or 0
+
+
+@contextmanager
+def _settings_of_workers() -> Iterator[None]:
+    """Context in which processes are started with one thread, and without a reaction to Ctrl+C.
+
+    A process inherits the signal mask, so that no signal reaches it before it can set its own.
+    """
+    with starting:
+        before = {name: os.environ.get(name) for name in _THREADS}
+        os.environ.update(dict.fromkeys(_THREADS, "1"))
+        resource_tracker.ensure_running()  # which would unblock the signal where it starts later
+        masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+
+def _serve_calls(connection: Connection, begin: Callable[[], None]) -> None:
+    """Do the calls that come through a pipe, and send back each result or exception."""
+    begin()
+    try:
+        cache_mesh(connection.recv())
+        connection.send(None)
+    except (EOFError, OSError):  # the parent has ended meanwhile
+        return
+    while True:
+        try:
+            function, arguments, named = connection.recv()
+        except (EOFError, OSError):
+            return
+        answer: tuple[Any, BaseException | None]
+        try:
+            answer = function(*arguments, **named), None
+        except BaseException as problem:
+            answer = None, problem
+        try:
+            connection.send(answer)
+        except (pickle.PicklingError, TypeError, AttributeError) as problem:
+            connection.send((None, RuntimeError(f"cannot be sent back: {problem}")))
+        except OSError:
+            return
+
+
+def _begin() -> None:
+    """Prepare a worker: at SIGTERM or at its parent's end it removes its drafts and ends.
+
+    Threads wait for both, for Python's signal handlers run only after a compiled loop.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    for ending in (lambda: signal.sigwait({signal.SIGTERM}), _wait_for_parent):
+        threading.Thread(target=lambda ending=ending: (ending(), _leave()), daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+
+
+def _leave() -> NoReturn:
+    """Remove drafts and end this process at once."""
+    clean_up()
+    os._exit(128 + signal.SIGTERM)
+
 
 LOST = 3  # number of lost workers at which a design is given up, and its row says so
 _EVERY = 0.2  # seconds between two calls of ``going_on``

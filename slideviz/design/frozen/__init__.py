@@ -1,1 +1,0 @@
-"""A step with everything discrete kept, and its derivatives on a tape."""
