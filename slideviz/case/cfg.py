@@ -13,10 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.check import contradictions
-from slideviz.case.key import GROUPS, REDUCTION, Key
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import GROUPS, KEYS, REDUCTION, REDUCTION_ROWS, Key
 from slideviz.case.lines import Entry, entries_of, listed, read_text, require_no_mesh
-from slideviz.case.method_keys import REDUCTION_ROWS
 from slideviz.errors import (
     CaseError,
     Message,

@@ -6,11 +6,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from slideviz.case.ffd_keys import ffd_contradictions
-from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import (
+    BOUNDARIES,
+    FACTORS,
+    FILES,
+    KEYS,
+    MOTION,
+    Key,
+    ffd_contradictions,
+)
 from slideviz.case.limits import not_walls
-from slideviz.case.method_keys import FACTORS
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import box_motions

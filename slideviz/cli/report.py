@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import orjson
 
+from slideviz.case.keys import automatic_radius, get_reduction
 from slideviz.case.limits import NUMBERS, LimitResult, check_case_limits, value_words
-from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.motions.onto import Remaining
 from slideviz.case.words import counted, first_of

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz import sweep
-from slideviz.case.key import FILES, VIEW
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import FILES, KEYS, VIEW
 from slideviz.case.limits import MET
 from slideviz.case.words import counted, first_of
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file

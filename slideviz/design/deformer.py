@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.case.displacement import Displacements
-from slideviz.case.method_keys import automatic_radius
+from slideviz.case.keys import automatic_radius
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Translate
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.model import Case
-from slideviz.case.motions.box import box_changes, box_motions
+from slideviz.case.motions.box import box_changes, box_definition, box_motions, boxes_for
 from slideviz.color_scheme import INTERSECTION_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.ffd.box import Box

@@ -11,8 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from slideviz.case.key import FILES, MOTION, VIEW
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import FILES, KEYS, MOTION, VIEW
 from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number

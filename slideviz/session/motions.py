@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
+from slideviz.case.motions.box import box_definition, boxes_for
 from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
 from slideviz.case.motions.onto import is_laid

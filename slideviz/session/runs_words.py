@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
-from slideviz.case.keys import BY_WEIGHT
+from slideviz.case.keys import BY_WEIGHT, METHOD, PERIODICITY, QUALITY, REDUCTION, Key
 from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.case.motion_words import deformation, describe, motion_labels

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from slideviz.case.keys import SectionText, hyphened
 from slideviz.case.model import Case
-from slideviz.case.view_keys import SectionText, hyphened
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair

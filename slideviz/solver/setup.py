@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 EXACT_NODES = 2000
 """Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
-`slideviz.case.method_keys` has this number and the next in words."""
+`slideviz.case.keys` has this number and the next in words."""
 
 AUTO_TOLERANCE = 1e-3
 """The tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement."""

@@ -4,8 +4,7 @@ import pytest
 
 from slideviz.case.cfg import describe_keys, set_key
 from slideviz.case.check import idle_settings
-from slideviz.case.key import GROUPS
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import GROUPS, KEYS
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Translate

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.key import METHOD, REDUCTION, VIEW
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import KEYS, METHOD, REDUCTION, VIEW
 from slideviz.case.limits import read_limits
 from slideviz.case.model import Case
 from slideviz.case.motion_text import read_motions

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.boxes import defined_boxes
+from slideviz.case.motions.box import defined_boxes
 from slideviz.cli import run
 from slideviz.design.su2.config import read_config
 from slideviz.design.su2.surface import held_planes, make_surface

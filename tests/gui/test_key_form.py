@@ -3,8 +3,7 @@
 import pytest
 from qtpy.QtTest import QTest
 
-from slideviz.case.key import REDUCTION
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import KEYS, REDUCTION
 from slideviz.gui.panels.method import Switch
 from slideviz.gui.widgets.build import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.view_keys import write_sections
+from slideviz.case.keys import write_sections
 from slideviz.cli import run
 from slideviz.errors import CaseError
 from slideviz.mesh.quality import quality

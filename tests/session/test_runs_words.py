@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import KEYS, METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.model import Case
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.motions.file import FromFile

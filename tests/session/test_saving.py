@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slideviz.case.keys import read_sections, write_sections
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
 from slideviz.session import changes

@@ -19,8 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from slideviz.case.check import unknown_markers
-from slideviz.case.key import MOTION, Key
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import KEYS, MOTION, Key
 from slideviz.case.lines import (
     Entry,
     entries_of,

@@ -17,16 +17,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from slideviz.case.boxes import (
-    boxes_for,
-    defined_boxes,
-    embedding,
-    missing_box,
-    off_points,
-    system_of,
-)
 from slideviz.case.displacement import Columns, in_zones, parse_rows
-from slideviz.case.ffd_keys import ffd_contradictions
+from slideviz.case.keys import ffd_contradictions
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motions.airfoil import (
@@ -40,6 +32,14 @@ from slideviz.case.motions.airfoil import (
     side_of,
     surface_bump,
     term_of,
+)
+from slideviz.case.motions.box import (
+    boxes_for,
+    defined_boxes,
+    embedding,
+    missing_box,
+    off_points,
+    system_of,
 )
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.zone_cases import each_zone

@@ -32,14 +32,12 @@ from typing import Annotated, Any
 from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
 from slideviz import __version__
-from slideviz.case.boxes import system_of
 from slideviz.case.cfg import set_key
 from slideviz.case.check import effective
-from slideviz.case.key import FILES, VIEW
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import FILES, KEYS, VIEW
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
-from slideviz.case.motions.box import box_motions
+from slideviz.case.motions.box import box_motions, system_of
 from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.motion import Motion
 from slideviz.case.words import number

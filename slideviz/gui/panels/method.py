@@ -9,9 +9,16 @@ from typing import Any, cast
 from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QWidget
 
-from slideviz.case.key import Form, Key
-from slideviz.case.keys import BY_WEIGHT, KEYS, no_pair
-from slideviz.case.method_keys import get_reduction, nothing_slides, put_reduction
+from slideviz.case.keys import (
+    BY_WEIGHT,
+    KEYS,
+    Form,
+    Key,
+    get_reduction,
+    no_pair,
+    nothing_slides,
+    put_reduction,
+)
 from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import (
