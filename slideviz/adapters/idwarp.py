@@ -12,9 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from slideviz.case.model import Case
@@ -23,10 +24,6 @@ from slideviz.errors import CaseError
 from slideviz.formats.cgns.read import CgnsForm
 from slideviz.formats.files import read, write
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""

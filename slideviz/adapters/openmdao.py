@@ -8,7 +8,7 @@ tags of MPhys 2.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +25,10 @@ except ImportError as problem:
         f"({problem}); install them with: pip install 'slideviz[openmdao]'"
     ) from problem
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from collections.abc import Sequence
 
-    from slideviz.design.deformer import Deformer
-    from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.design.deformer import Deformer
+from slideviz.mesh.model import FloatArray, IntArray
 
 Slope = tuple[float, "FloatArray"]  # a number, and its derivative by the points (n, d)
 SURFACE = MPhysVariables.Aerodynamics.Surface.COORDINATES

@@ -106,7 +106,7 @@ def _called(arguments: argparse.Namespace) -> int:
     except SlidevizError as problem:
         if any(message.keys and not message.line for message in problem.messages):
             # Late: NumPy takes 0.1 s.
-            from slideviz.cli.inputs import with_lines
+            from slideviz.cli.mesh_source import with_lines
 
             problem.args = with_lines(problem.messages, arguments)
         raise

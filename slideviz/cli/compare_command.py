@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from slideviz.case.keys import KEYS
+from slideviz.case.model import Case
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
+from slideviz.mesh.model import Mesh
 from slideviz.study.combinations import (
     COMPARED_METHODS,
     MODES,
     STEPS,
+    Combination,
+    CombinationRow,
     announcement,
     bounded,
     combinations,
@@ -32,13 +36,6 @@ from slideviz.study.combinations import (
     warm,
 )
 from slideviz.terms import PERIODIC_MODES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
-    from slideviz.study.combinations import Combination, CombinationRow
 
 TABLE = "compare.csv"
 HISTORY = "convergence.csv"

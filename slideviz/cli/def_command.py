@@ -7,9 +7,10 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from slideviz import write
+from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.cli.mesh_source import changed
 from slideviz.cli.output_paths import (
@@ -28,17 +29,12 @@ from slideviz.cli.report import (
 )
 from slideviz.cli.run_command import measured, run_steps, silent_timer
 from slideviz.cli.terminal import DONE, say
-from slideviz.design.su2.config import on_mesh, own_changes, read_config, read_mesh
-from slideviz.design.su2.surface import at_rest, convex_part, make_surface, set_boxes
+from slideviz.design.su2.config import Su2Config, on_mesh, own_changes, read_config, read_mesh
+from slideviz.design.su2.surface import MovingSurface, at_rest, convex_part, make_surface, set_boxes
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.formats.losses import warning_of_losses
-
-if TYPE_CHECKING:
-    from slideviz.case.model import Case
-    from slideviz.design.su2.config import Su2Config
-    from slideviz.design.su2.surface import MovingSurface
-    from slideviz.mesh.model import Mesh
-    from slideviz.solver.steps import Step
+from slideviz.mesh.model import Mesh
+from slideviz.solver.steps import Step
 
 
 def read_configuration(arguments: Namespace) -> tuple[Su2Config, Mesh]:

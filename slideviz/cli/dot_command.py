@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
@@ -13,15 +13,10 @@ from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json
 from slideviz.cli.terminal import DONE
-from slideviz.design.su2.gradients import design_gradients, sensitivity_files
+from slideviz.design.su2.config import Su2Config
+from slideviz.design.su2.gradients import Gradients, design_gradients, sensitivity_files
 from slideviz.errors import CaseError
 from slideviz.system.atomic import atomic_write
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from slideviz.design.su2.config import Su2Config
-    from slideviz.design.su2.gradients import Gradients
 
 
 def main(arguments: Namespace) -> int:

@@ -7,10 +7,10 @@ from argparse import Namespace
 from contextlib import closing
 from dataclasses import replace
 from textwrap import shorten
-from typing import TYPE_CHECKING
 
 from slideviz import deform, quality
 from slideviz.case.keys import KEYS
+from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.cli.mesh_source import changed, read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, require_output_paths
@@ -22,13 +22,10 @@ from slideviz.errors import CaseError, Remark
 from slideviz.export.encode import film_kind
 from slideviz.export.film import FilmOptions, check_film, require_pair_width
 from slideviz.export.film import film as draw
+from slideviz.mesh.model import Mesh
 from slideviz.scene.overview import require_detail
 from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
-
-if TYPE_CHECKING:
-    from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
 
 SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 

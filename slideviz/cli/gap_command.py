@@ -6,18 +6,14 @@ from argparse import Namespace
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from slideviz import deform, gaps, quality
 from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
 from slideviz.cli.terminal import DONE, INVERTED
-from slideviz.design.blade_gaps import TOUCHING
+from slideviz.design.blade_gaps import TOUCHING, Gap
 from slideviz.errors import CaseError, Remark
-
-if TYPE_CHECKING:
-    from slideviz.design.blade_gaps import Gap
 
 LISTED = (0.1, 0.3, 0.5, 0.7, 0.9)  # the places that the summary has
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from slideviz.cli.mesh_source import open_mesh
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.report import info_report, save_json, table, zone_words
 from slideviz.cli.terminal import DONE
 from slideviz.errors import MeshError
+from slideviz.ffd.box import Box
 from slideviz.ffd.section import boxes_of
+from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import marker_zones
 from slideviz.streaming.quality import CellCounts
-
-if TYPE_CHECKING:
-    from slideviz.ffd.box import Box
-    from slideviz.mesh.model import Mesh
-    from slideviz.mesh.quality import Quality
 
 
 def main(arguments: Namespace) -> int:

@@ -9,33 +9,26 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from slideviz import Case, read
+from slideviz import read
 from slideviz.case.cfg import set_key
 from slideviz.case.check import idle_roles
 from slideviz.case.lines import entries_of, read_text
+from slideviz.case.model import Case
 from slideviz.case.motions.motion import named
 from slideviz.case.zone_cases import with_marker_names
 from slideviz.cli.output_paths import OutputPath, add_case_inputs, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.errors import CaseError, MeshError, Message, raise_all
+from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import Quality
 from slideviz.solver.steps import Progress
-from slideviz.streaming.quality import measure_mesh
-from slideviz.streaming.source import FileSource, MemorySource, has_cells_of
-from slideviz.streaming.stream_input import open_read_only
-from slideviz.terms import ROLES, Role
-
-if TYPE_CHECKING:
-    from slideviz.case.model import Case
-    from slideviz.mesh.metrics import MetricValues
-    from slideviz.mesh.quality import Quality
-    from slideviz.streaming.quality import CellCounts
-    from slideviz.streaming.source import MeshSource
-    from slideviz.streaming.stream_input import StreamInput
-    from slideviz.terms import FileFormat, Metric
+from slideviz.streaming.quality import CellCounts, measure_mesh
+from slideviz.streaming.source import FileSource, MemorySource, MeshSource, has_cells_of
+from slideviz.streaming.stream_input import StreamInput, open_read_only
+from slideviz.terms import ROLES, FileFormat, Metric, Role
 
 
 def read_case(arguments: Namespace) -> Case:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from slideviz import walls, write
-from slideviz.case.limits import MeasuredMesh, check_limits, require_streamed
-from slideviz.cli.mesh_source import open_mesh, optional_case
+from slideviz.case.limits import LimitResult, MeasuredMesh, check_limits, require_streamed
+from slideviz.cli.mesh_source import OpenMesh, open_mesh, optional_case
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.report import (
     WORST,
@@ -29,21 +29,14 @@ from slideviz.cli.terminal import INVERTED
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.table import holds_quality, own_endings
+from slideviz.mesh.metrics import MetricValues
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.quality import Quality
+from slideviz.mesh.walls import Walls
 from slideviz.session.opening import guess_by_name
 from slideviz.system.atomic import atomic_write
-from slideviz.terms import CELL_STATES, METRICS, RATED, WALL_VALUES, field_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from slideviz.case.limits import LimitResult
-    from slideviz.cli.mesh_source import OpenMesh
-    from slideviz.mesh.metrics import MetricValues
-    from slideviz.mesh.model import FloatArray, Mesh
-    from slideviz.mesh.quality import Quality
-    from slideviz.mesh.walls import Walls
-    from slideviz.terms import Metric
+from slideviz.terms import CELL_STATES, METRICS, RATED, WALL_VALUES, Metric, field_of
 
 
 def main(arguments: Namespace) -> int:

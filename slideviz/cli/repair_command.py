@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from slideviz import quality, read, repair, write
 from slideviz.cli.output_paths import OutputPath, require_output_paths
@@ -14,9 +14,7 @@ from slideviz.cli.report import print_remarks, quality_lines, save_json
 from slideviz.cli.terminal import DONE, INVERTED, say
 from slideviz.formats.files import quality_data
 from slideviz.formats.losses import warning_of_losses
-
-if TYPE_CHECKING:
-    from slideviz.mesh.quality import Quality
+from slideviz.mesh.quality import Quality
 
 
 def main(arguments: Namespace) -> int:

@@ -10,9 +10,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
 
 from slideviz import deform, quality, walls, write
+from slideviz.case.model import Case
 from slideviz.case.zone_cases import with_marker_names
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
@@ -32,24 +34,17 @@ from slideviz.errors import CaseError
 from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
-from slideviz.mesh.metrics import rated_metric
+from slideviz.mesh.metrics import MetricValues, rated_metric
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import Quality
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.scene.overview import require_detail
+from slideviz.solver.deform import Step
 from slideviz.solver.steps import RunResult
 from slideviz.streaming.stream_input import missing_memory
 from slideviz.system.file_checks import same_file
 from slideviz.system.ranks import SERIAL
-from slideviz.terms import METRICS, WALL_VALUES
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from slideviz.case.model import Case
-    from slideviz.mesh.metrics import MetricValues
-    from slideviz.mesh.model import Mesh
-    from slideviz.mesh.quality import Quality
-    from slideviz.solver.deform import Step
-    from slideviz.terms import FileFormat, Metric
+from slideviz.terms import METRICS, WALL_VALUES, FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
 """Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli.mesh_source import open_mesh, optional_case, progress_of
 from slideviz.cli.output_paths import OutputPath, require_output_paths
@@ -16,26 +18,18 @@ from slideviz.cli.report import reference_words, save_json
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.errors import CaseError
 from slideviz.export.flat_section import section as draw
-from slideviz.mesh.model import Skin
+from slideviz.mesh.model import FloatArray, Mesh, Skin
+from slideviz.mesh.periodic import Pair
+from slideviz.mesh.quality import Quality
 from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, require_picture_name
-from slideviz.sections.span import find_walls
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, require_picture_name
+from slideviz.sections.model import Section
+from slideviz.sections.span import SpanWalls, find_walls
 from slideviz.session.passages import find_period, find_periods, keeps, passages
 from slideviz.streaming.quality import quality_blocks
 from slideviz.streaming.source import cut_cells, join_blocks
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from slideviz.case.model import Case
-    from slideviz.mesh.model import FloatArray, Mesh
-    from slideviz.mesh.periodic import Pair
-    from slideviz.mesh.quality import Quality
-    from slideviz.plots.section_picture import SectionInRun
-    from slideviz.sections.model import Section
-    from slideviz.sections.span import SpanWalls
 
 WALLS_OPTION = "--between HUB,SHROUD"
 

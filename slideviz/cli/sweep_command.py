@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from slideviz import sweep
 from slideviz.case.keys import FILES, KEYS, VIEW
@@ -19,15 +20,9 @@ from slideviz.cli.output_paths import OutputPath, make_folder, require_output_pa
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
 from slideviz.cli.terminal import DONE
-from slideviz.design.sweeps.table import RESULTS, numbers_of, read_designs
+from slideviz.design.sweeps.table import RESULTS, DesignRow, Designs, numbers_of, read_designs
 from slideviz.errors import CaseError, Remark
 from slideviz.system.cleanup import keep_partial
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from concurrent.futures import Executor
-
-    from slideviz.design.sweeps.table import DesignRow, Designs
 
 _LISTED = 5
 """Most designs that are listed in one line, and most reasons of failed designs that are printed."""

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from slideviz import wheel
 from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import limit_lines, limits_report, print_remarks, report_limits, save_json
 from slideviz.cli.terminal import INVERTED
-
-if TYPE_CHECKING:
-    from slideviz.design.deformed_wheel import WheelQuality
+from slideviz.design.deformed_wheel import WheelQuality
 
 MOST_NAMES = 20  # boundaries whose names are all printed
 
