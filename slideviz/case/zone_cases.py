@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -31,53 +31,52 @@ def _of_zone(case: Case, mesh: Mesh) -> Case:
     if mesh.zone is None or mesh.zones == 1:
         return case
     numbers = {str(number) for number in range(1, mesh.zones + 1)} - {str(mesh.zone)}
-    moved = [name for motion in case.motions for name in named(motion.marker)]
-    limited = [limit.marker for limit in case.limits]
-    names = {*case.roles, *moved, *limited, *case.interfaces, *(case.span or ())}
+    moved = {name for motion in case.motions for name in named(motion.marker)}
+    names = (moved | _names(case)) - {*mesh.marker_names}
     others = {name for name in names if ":" in name and name.partition(":")[0] in numbers}
-    others -= set(mesh.marker_names)
     if not others:
         return case
-    motions = []
-    for motion in case.motions:
-        kept = tuple(name for name in named(motion.marker) if name not in others)
-        if kept or not motion.marker:
-            one = kept[0] if len(kept) == 1 else kept
-            motions.append(replace(motion, marker=one) if motion.marker else motion)
-    roles = {name: role for name, role in case.roles.items() if name not in others}
-    idle = "periodic" in case.roles.values() and "periodic" not in roles.values()
+    left = renamed(case, dict.fromkeys(others))
+    idle = "periodic" in case.roles.values() and "periodic" not in left.roles.values()
     plural = "boundaries" if len(others) > 1 else "boundary"
     listed = f"{len(others)} {plural} of other zones left out ({first_of(sorted(others))})"
-    text = f"zone {mesh.zone} alone: {listed}"
-    return case.change(
-        roles=roles,
-        motions=tuple(motions),
-        limits=tuple(limit for limit in case.limits if limit.marker not in others),
-        interfaces=() if others & set(case.interfaces) else case.interfaces,
-        span=None if others & set(case.span or ()) else case.span,
+    return left.change(
         periodic="none" if idle else case.periodic,
-        warnings=(*case.warnings, note(text)),
+        warnings=(*case.warnings, note(f"zone {mesh.zone} alone: {listed}")),
     )
 
 
-def renamed(case: Case, names: Mapping[str, str]) -> Case:
-    """Return a case with other names of boundaries: ``names`` by those that it has."""
-    known = *case.roles, *case.interfaces, *(limit.marker for limit in case.limits)
-    if not any(name in names for name in (*known, *(case.span or ()))):
+def _names(case: Case) -> set[str]:
+    """Return the names of boundaries in a case, except those of its motions."""
+    limited = (limit.marker for limit in case.limits)
+    return {*case.roles, *case.interfaces, *limited, *(case.span or ())}
+
+
+def renamed(case: Case, names: Mapping[str, str | None]) -> Case:
+    """Return a case with other names of boundaries: ``names`` by those that it has.
+
+    What is for boundaries whose new name is None is left out; of interfaces and SPAN all.
+    """
+
+    def new(several: Iterable[str]) -> tuple[str, ...]:
+        both = ((name, names.get(name, name)) for name in several)
+        return tuple(after for _, after in both if after is not None)
+
+    if not names.keys() & (_names(case) | {n for m in case.motions for n in named(m.marker)}):
         return case
     motions = []
     for motion in case.motions:
-        several = tuple(names.get(name, name) for name in named(motion.marker))
-        one = isinstance(motion.marker, str)
-        motions.append(replace(motion, marker=several[0] if one and several else several or ""))
+        kept = new(named(motion.marker))
+        if kept or not motion.marker:
+            motions.append(motion.with_marker(kept[0] if len(kept) == 1 else kept or ""))
+    limits = ((limit, new([limit.marker])) for limit in case.limits)
+    interfaces = new(case.interfaces)
     return case.change(
         span=_renamed_span(case, names),
-        interfaces=tuple(names.get(name, name) for name in case.interfaces),
-        roles={names.get(name, name): role for name, role in case.roles.items()},
+        interfaces=interfaces if len(interfaces) == len(case.interfaces) else (),
+        roles={name: role for old, role in case.roles.items() for name in new([old])},
         motions=tuple(motions),
-        limits=tuple(
-            replace(limit, marker=names.get(limit.marker, limit.marker)) for limit in case.limits
-        ),
+        limits=tuple(replace(limit, marker=name) for limit, each in limits for name in each),
     )
 
 
@@ -142,14 +141,14 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
     return zone.change(motions=tuple(motion for motion in moved if motion is not None))
 
 
-def _renamed_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
+def _renamed_span(case: Case, names: Mapping[str, str | None]) -> tuple[str, str] | None:
     if case.span is None:
         return None
-    hub, shroud = case.span
-    return names.get(hub, hub), names.get(shroud, shroud)
+    hub, shroud = (names.get(name, name) for name in case.span)
+    return None if hub is None or shroud is None else (hub, shroud)
 
 
-def _zone_span(case: Case, names: Mapping[str, str]) -> tuple[str, str] | None:
+def _zone_span(case: Case, names: Mapping[str, str | None]) -> tuple[str, str] | None:
     """Return the walls of SPAN with their names in the file of a zone, if it has both.
 
     A name that several zones have is that of each.

@@ -963,21 +963,14 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
     return joined(replace(config, case=with_marker_names(config.case, mesh)), still)
 
 
-def _renamed(
-    config: Su2Config, names: Mapping[str, str], without: frozenset[str] = frozenset()
-) -> Su2Config:
-    """Return a configuration with other names of boundaries, and without some."""
-    case = config.case.change(
-        roles={name: role for name, role in config.case.roles.items() if name not in without},
-        limits=tuple(
-            zone_config for zone_config in config.case.limits if zone_config.marker not in without
-        ),
-    )
+def _renamed(config: Su2Config, names: Mapping[str, str | None]) -> Su2Config:
+    """Return a configuration with other names of boundaries, and without those that have none."""
+    new = {name: after for name in config.named if (after := names.get(name, name)) is not None}
     return replace(
         config,
-        case=renamed(case, names),
-        markers=tuple(names.get(name, name) for name in config.markers if name not in without),
-        named={names.get(n, n): key for n, key in config.named.items() if n not in without},
+        case=renamed(config.case, names),
+        markers=tuple(new[name] for name in config.markers if name in new),
+        named={after: config.named[name] for name, after in new.items()},
     )
 
 
@@ -988,7 +981,7 @@ def _in_zone(config: Su2Config, mesh: Mesh) -> Su2Config:
     ours = {file: name for name, file in names_in(mesh, part).items()}
     ours |= {numbered(config.zone, file): name for file, name in ours.items()}
     files = {name for other in mesh.parts for name in other.mesh.marker_names}
-    return _renamed(config, ours, frozenset({*files, *spellings(mesh)} - ours.keys()))
+    return _renamed(config, dict.fromkeys((*files, *spellings(mesh))) | ours)
 
 
 def _as_still(config: Su2Config) -> Su2Config:
