@@ -61,9 +61,9 @@ def value(flags: str, read: Callable[[str], Any], metavar: str, words: str, **ke
     return argument(flags, words, type=_checked(read), metavar=metavar, **keywords)
 
 
-def several(flags: str, metavar: str, words: str, **keywords: Any) -> Add:
-    """Return an option that may be repeated; its value is the list of all."""
-    return argument(flags, words, action="append", default=[], metavar=metavar, **keywords)
+def several(flags: str, metavar: str, words: str, read: Callable[[str], Any] = str) -> Add:
+    """Return an option that may be repeated; its value is the list of all, as of `value`."""
+    return value(flags, read, metavar, words, action="append", default=[])
 
 
 def choice(flags: str, values: Iterable[str], words: str, default: str | None = None) -> Add:
@@ -395,7 +395,7 @@ COMMANDS = {
                 "--between",
                 "A,B",
                 "measure between these two boundaries, too; may be repeated",
-                type=pair_of_names,
+                pair_of_names,
             ),
             file("-o --output", "FILE", "the curves as .png, .svg or .pdf"),
             *CHANGES,

@@ -537,7 +537,7 @@ def test_symmetry_planes_are_not_held(system, here):
     box = defined_boxes(config.case, mesh)["BOX"]
     i, j, k = held_planes(config, mesh, box, "NO_DERIVATIVE")
     assert (i, sorted(j), k) == (set(), [] if system == "CARTESIAN" else [2], set())
-    free = replace(config, words={**config.words, "FFD_SYMMETRY_PLANE": "NO"})
+    free = replace(config, values={**config.values, "FFD_SYMMETRY_PLANE": False})
     assert held_planes(free, mesh, box, "NO_DERIVATIVE") == (set(), {0, 2}, set())
 
 
