@@ -189,7 +189,7 @@ def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
         raise AssertionError("too late")
 
     monkeypatch.chdir(square)
-    for module in ("inputs", "mesh_source", "repair_command"):
+    for module in ("mesh_source", "repair_command"):
         monkeypatch.setattr(f"slideviz.cli.{module}.read", never)
     assert run(words) == 1
     assert "the folder" in (err := capsys.readouterr().err)
