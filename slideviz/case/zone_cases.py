@@ -144,7 +144,8 @@ def _zone_case(case: Case, settings: Case, mesh: Mesh, part: ZonePart) -> Case:
 def _renamed_span(case: Case, names: Mapping[str, str | None]) -> tuple[str, str] | None:
     if case.span is None:
         return None
-    hub, shroud = (names.get(name, name) for name in case.span)
+    hub = names.get(case.span[0], case.span[0])
+    shroud = names.get(case.span[1], case.span[1])
     return None if hub is None or shroud is None else (hub, shroud)
 
 

@@ -445,10 +445,8 @@ def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Pla
     """Return the planes of control points that FFD_CONTINUITY= ``continuity`` holds, by axis."""
     depth = CONTINUITIES[continuity]
     if not depth:
-        i, j, k = (
-            _planes(box, axis) & config.values[f"FFD_FIX_{'IJK'[axis]}"] for axis in range(3)
-        )
-        return i, j, k
+        fixed = [config.values[f"FFD_FIX_{letter}"] for letter in "IJK"]
+        return _planes(box, 0) & fixed[0], _planes(box, 1) & fixed[1], _planes(box, 2) & fixed[2]
     ends = _edges(mesh, config.markers, box)
     symmetric = config.values["FFD_SYMMETRY_PLANE"] and mesh.dim == 3
     cartesian = box.system.kind == "CARTESIAN"
