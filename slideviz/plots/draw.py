@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +29,7 @@ class StepRun:
     steps: IntArray  # (k,): numbers of the steps; 0 is the undeformed mesh
     minimum: FloatArray  # (k,)
     mean: FloatArray  # (k,)
-    series: int | None = None
-    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+    series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +42,7 @@ class GreedyRun:
     """(c,): largest error of the boundary after each cycle, in the mesh's length unit."""
     level: IntArray  # (c,): number of the level of each cycle
     tolerance: float | None = None
-    series: int | None = None
-    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+    series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
 @dataclass(frozen=True)
@@ -57,8 +55,7 @@ class Outcome:
     mean: float
     inverted: int = 0  # inverted cells
     seconds: float = float("nan")  # processor time of the deformation
-    series: int | None = None
-    """Series number of its label; by default the index of the label among all labels."""
+    series: int = 0  # series number of its label
 
 
 What = Literal["minimum", "mean", "seconds"]
@@ -76,7 +73,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
     """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
     style_axes(axes, style, "step [-]", "quality [-]")
     for index, run in enumerate(runs):
-        look = _line(style, series_number(run.series, index))
+        look = _line(style, run.series)
         # Some markers are enough for many steps; those of each run are at other steps.
         every = max(1, len(run.steps) // 6)
         last = len(run.steps) - 1
@@ -105,10 +102,10 @@ def convergence(axes: Axes, runs: Sequence[GreedyRun], style: Style = PRINT) -> 
     style_axes(axes, style, "control nodes [-]", "largest error [mesh units]")
     axes.set_yscale("log")
     tolerances: set[float] = set()
-    for index, run in enumerate(runs):
+    for run in runs:
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
-        line = _line(style, series_number(run.series, index))
+        line = _line(style, run.series)
         begins = np.flatnonzero(first[shown])
         line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()
         line["markersize"] = 3.5
@@ -146,13 +143,12 @@ def against_steps(
     line.
     """
     style_axes(axes, style, "deformation steps [-]", LABELS[what])
-    labels = list(dict.fromkeys(row.label for row in rows))
-    for index, label in enumerate(labels):
+    for label in dict.fromkeys(row.label for row in rows):
         mine = sorted((row for row in rows if row.label == label), key=lambda row: row.steps)
         steps = np.array([row.steps for row in mine])
         values = np.array([float(getattr(row, what)) for row in mine])
         bad = np.array([row.inverted > 0 for row in mine]) & (what in ("minimum", "mean"))
-        line = _line(style, series_number(mine[0].series, index))
+        line = _line(style, mine[0].series)
         axes.plot(steps, np.where(bad, np.nan, values), label=label, **line)
         if bad.any():  # an empty line that is not clipped would spoil the layout
             cross = {"color": line["color"], "linestyle": "", "marker": "x", "markersize": 6}

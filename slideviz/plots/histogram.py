@@ -17,7 +17,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import NullLocator
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,8 +37,7 @@ class QualityRun:
     label: str
     values: FloatArray  # (m,): 0 to 1
     inverted: np.ndarray | None = None  # (m,): cells to count apart, whatever their value
-    series: int | None = None
-    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+    series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +96,13 @@ def histogram(
     """
     edges = np.linspace(0.0, 1.0, 26) if edges is None else edges
     outlines = []
-    for index, run in enumerate(runs):
+    for run in runs:
         values = run.values if run.inverted is None else np.where(run.inverted, np.nan, run.values)
         counts = Distribution.of(values, edges)
         # A legend outside the axes is common to several, with other numbers of inverted cells.
         counted = counts.inverted > 0 and style.legend
         label = f"{run.label} ({counts.inverted} inverted)" if counted else run.label
-        outlines.append(Outline(label, counts, series_number(run.series, index)))
+        outlines.append(Outline(label, counts, run.series))
     draw_distribution(axes, None, outlines, "size-skew quality [-]", log, style)
 
 

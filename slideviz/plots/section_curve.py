@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.section_paint import Paint
-from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -65,11 +65,11 @@ def labels_of(section: Section, paint: Paint) -> tuple[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class CurveRow:
-    """A curve of a plot with its name and series number (None: its index in the plot)."""
+    """A curve of a plot with its name and series number."""
 
     label: str
     curve: Curve
-    series: int | None = None
+    series: int = 0
 
 
 def draw_curves(
@@ -100,7 +100,7 @@ def draw_curves(
     if last.inverted.any():
         _folded(axes, last, style)
     for index, row in enumerate(rows):
-        look = style.series(series_number(row.series, index))
+        look = style.series(row.series)
         axes.plot(
             *steps(row.curve),
             color=look.color,

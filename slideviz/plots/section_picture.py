@@ -312,12 +312,12 @@ def _head(figure: Any, name: str, words: str, *, lines: Sequence[str]) -> None:
 
 
 def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> None:
-    rows = []
+    rows: list[CurveRow] = []
     for one in reversed(shown):
         if one.drawn:
             lines = joined(list(one.drawn.values()))
             curve = curve_of(lines, section, one.paint)
-            rows.append(CurveRow(one.name if len(shown) > 1 else "", curve))
+            rows.append(CurveRow(one.name if len(shown) > 1 else "", curve, len(rows)))
     paint = shown[0].paint
     style = replace(PRINT, size=LETTERS)
     draw_curves(figure.add_subplot(), rows, labels_of(section, paint), style, paint)

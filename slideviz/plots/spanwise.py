@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,8 +34,7 @@ class Profile:
     mean: FloatArray
     """`minimum`, `mean` (k,): minimum and mean in each layer; NaN in a layer without cells."""
     count: IntArray  # (k,): cells in each layer
-    series: int | None = None
-    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
+    series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
     @property
     def position(self) -> FloatArray:
@@ -131,7 +130,7 @@ def spanwise(
     style_axes(axes, style, f"{what} quality [-]", f"{coordinate} [mesh units]")
     ends = []
     for index, profile in enumerate(profiles):
-        look = style.series(series_number(profile.series, index))
+        look = style.series(profile.series)
         values: FloatArray = getattr(profile, what)
         there = np.isfinite(values)
         axes.plot(

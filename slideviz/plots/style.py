@@ -78,11 +78,6 @@ class Style:
         return "#ff5d6c" if self.dark else INVERTED_COLOR
 
 
-def series_number(series: int | None, index: int) -> int:
-    """Return the number of a series: ``series``, or if None its index in the plot."""
-    return index if series is None else series
-
-
 def _brightness(color: str) -> int:
     return sum(bytes.fromhex(color[1:]))
 

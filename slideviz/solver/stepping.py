@@ -33,8 +33,7 @@ from slideviz.solver.growth import (
     unsoundness,
     wall_warnings,
 )
-from slideviz.solver.normals import sliding_normals
-from slideviz.solver.setup import Setup
+from slideviz.solver.setup import Setup, sliding_normals
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
 

@@ -21,6 +21,7 @@ from slideviz.formats.meshio.bridge import MESHIO_TYPES, formats_of, load, meshi
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.surfaces import padded
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import draft
 
@@ -178,8 +179,6 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
     Blocks of cells come first, then those of boundary elements, whose cell data are NaN.
     """
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.dim] = mesh.points
     blocks = []
     tags = []
     values: dict[str, list[NDArray]] = {key: [] for key in cell_data}
@@ -195,7 +194,8 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
             values[key].append(np.full((len(nodes), *array.shape[1:]), np.nan))
     names = dict(enumerate(mesh.marker_names, 1))
     # Only MED keeps two coordinates.
-    data = meshio.Mesh(points if name != "med" else mesh.points, blocks, cell_data=values)
+    points = mesh.points if name == "med" else padded(mesh.points)
+    data = meshio.Mesh(points, blocks, cell_data=values)
     if name == "abaqus":
         data.cell_sets = {
             marker: [np.flatnonzero(t == number) for t in tags] for number, marker in names.items()
@@ -242,8 +242,6 @@ def vtu_blocks(
     groups = [mesh.cells, *(marker.cells for marker in mesh.markers)]
     every = Cells.joined(groups)
     types = every.types
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.dim] = mesh.points
 
     yield (
         b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" '
@@ -256,10 +254,10 @@ def vtu_blocks(
             f'format="ascii">{number} {mesh.dim - 1}</DataArray>\n'
         ).encode()
     yield (
-        f'</FieldData>\n<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(types)}">\n'
+        f'</FieldData>\n<Piece NumberOfPoints="{len(mesh.points)}" NumberOfCells="{len(types)}">\n'
         "<Points>\n"
     ).encode()
-    yield from _array("Points", points)
+    yield from _array("Points", padded(mesh.points))
     yield b"</Points>\n<Cells>\n"
     yield from _array("connectivity", _in_vtk_order(every))
     yield from _array("offsets", every.offsets[1:])
@@ -267,9 +265,9 @@ def vtu_blocks(
     yield b"</Cells>\n<CellData>\n"
     yield from _array("marker", np.repeat(np.arange(len(groups)), list(map(len, groups))))
     for name, values in cell_data.items():
-        padded = np.full((len(types), *values.shape[1:]), np.nan)
-        padded[: len(values)] = values
-        yield from _array(name, padded)
+        filled = np.full((len(types), *values.shape[1:]), np.nan)
+        filled[: len(values)] = values
+        yield from _array(name, filled)
     yield b"</CellData>\n<PointData>\n"
     for name, values in (point_data or {}).items():
         vectors = values.ndim == 2 and values.shape[1] == 2

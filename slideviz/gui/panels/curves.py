@@ -23,7 +23,7 @@ from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
 from slideviz.plots.gap_curves import draw_gaps
 from slideviz.plots.spanwise import Profile, spanwise
-from slideviz.plots.style import Style, add_legend, series_number, style_axes
+from slideviz.plots.style import Style, add_legend, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
 from slideviz.session.reach import can_scale, factor_of, reach_of, reach_run
@@ -271,7 +271,7 @@ def draw_reach(session: Session, whole: bool, figure: Figure, style: Style) -> N
     run = reach_run(session)
     assert run is not None
     style_axes(axes, style, "fraction of the motion [%]", "lowest quality [-]")
-    look = style.series(series_number(curves.series_of(run), 0))
+    look = style.series(curves.series_of(run))
     axes.plot(100 * found.fractions, found.lowest, color=look.color, linewidth=style.width, gid="q")
     axes.axvline(100.0, color=style.scheme.edge, linewidth=1.0, zorder=0.5)
     factor = factor_of(session.case.motions, run.case.motions)
