@@ -117,7 +117,7 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
     """Return Numba's decorator ``njit`` with ``options``, and always with this module's cache."""
 
     def compiled(function: Callable) -> Any:
-        dispatcher = numba.njit(**options)(function)
+        dispatcher = numba.njit(**options | {"cache": False, "no_cfunc_wrapper": True})(function)
         dispatcher._cache = _Cache(function)
         return dispatcher
 
