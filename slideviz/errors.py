@@ -88,6 +88,9 @@ class SlidevizError(Exception):
         )
 
 
+OUT_OF_MEMORY = "out of memory; use a coarser mesh or close other programs"
+
+
 class MeshError(SlidevizError):
     """The mesh file, or the mesh, cannot be used."""
 

@@ -23,7 +23,7 @@ from slideviz.cli.parser import parse
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
 from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
-from slideviz.samples.table import write_sample
+from slideviz.samples.table import SAMPLES, write_sample
 from slideviz.solver.steps import Trial
 from tests.builders import grid, layered, stage
 from tests.processes import wait_until
@@ -474,6 +474,34 @@ def test_a_package_that_is_missing_is_named_before_anything_is_computed(
     needed = f"this needs {package}, which is not installed; use `pip install {package}"
     assert needed in capsys.readouterr().err
     assert not (tmp_path / "compared").exists()
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_sample_too_large_for_memory_ends_with_the_remedy(name, tmp_path, capsys):
+    for size in ("1e12", "1e17"):
+        assert run(["sample", name, "--size", size, "-o", str(tmp_path)]) == 1
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "internal error" not in said
+        assert "size" in said or "use 5000 or 20000" in said
+        assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "option", [("-o", "/proc/s.su2"), ("--steps-dir", "/proc/s"), ("--steps-dir", "/proc/s/t")]
+)
+def test_where_no_folder_can_be_made_none_is_asked_for(square, capsys, option, tmp_path):
+    output = ["-o", str(tmp_path / "o.su2")] if option[0] != "-o" else []
+    assert run(["run", str(square / "square.cfg"), *output, *option]) == 1
+    assert capsys.readouterr().err.endswith("nothing can be made there; choose another folder\n")
+
+
+def test_a_configuration_and_a_case_file_are_told_apart(square, capsys):
+    path = str(square / "square.cfg")
+    for command in ("def", "dot"):
+        assert run([command, path]) == 1
+        told = f"{path}: is a case file, not a configuration of SU2; use `slideviz run {path}`"
+        assert capsys.readouterr().err == f"slideviz: {told}\n"
 
 
 def test_out_of_memory_is_one_sentence(square, monkeypatch, capsys):

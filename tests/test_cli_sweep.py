@@ -11,8 +11,10 @@ import sys
 
 import pytest
 
+import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.sweeps import sweep as sweeping
+from slideviz.samples.table import write_sample
 from tests.processes import wait_until
 
 
@@ -93,6 +95,21 @@ def test_columns_are_listed(folder, capsys):
     assert code == 0
     assert "airfoil.rotate.angle_deg" in out
     assert "SLIDING_MODE" in out
+
+
+@pytest.mark.parametrize(("name", "dim"), [("square", 2), ("hexahedron", 3)])
+def test_a_plane_mesh_has_no_column_for_an_axis(tmp_path, name, dim, capsys):
+    write_sample(name, tmp_path, 5)
+    path = tmp_path / f"{name}.cfg"
+    case = sv.Case.read(path)
+    moving = case.markers_with("moving")[0]
+    case.change(motions=(sv.Rotate(moving, 1.0),)).write(path)
+    code, out, _ = said(capsys, "sweep", str(path), "--columns")
+    assert code == 0
+    assert f"{moving}.rotate.angle_deg" in out
+    assert ("axis_" in out) == (dim == 3)
+    case.mesh_file.unlink()
+    assert "axis_" in said(capsys, "sweep", str(path), "--columns")[1]
 
 
 def test_designs_that_fail(folder, in_threads, capsys):

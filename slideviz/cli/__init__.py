@@ -22,7 +22,7 @@ from slideviz.cli.output_paths import input_paths
 from slideviz.cli.parser import parse
 from slideviz.cli.progress import note_compilation
 from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, holding, terminal_streams
-from slideviz.errors import Cancelled, SlidevizError
+from slideviz.errors import OUT_OF_MEMORY, Cancelled, SlidevizError
 from slideviz.system.cleanup import leftover_message
 from slideviz.system.file_checks import protected
 
@@ -72,7 +72,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except SlidevizError as problem:
         return _fail(str(problem), WRONG_INPUT)
     except MemoryError:
-        return _fail("out of memory; use a coarser mesh or close other programs", WRONG_INPUT)
+        return _fail(OUT_OF_MEMORY, WRONG_INPUT)
     except BrokenPipeError:
         # The reader of the output has ended (`slideviz info MESH | head`): that is not an error.
         return DONE

@@ -10,7 +10,7 @@ from pathlib import Path
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
-from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
+from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
@@ -35,6 +35,7 @@ from slideviz.study.combinations import (
     wanted_modes,
     warm,
 )
+from slideviz.system.atomic import make_folder
 from slideviz.terms import PERIODIC_MODES
 
 TABLE = "compare.csv"

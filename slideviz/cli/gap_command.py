@@ -29,12 +29,13 @@ def main(arguments: Namespace) -> int:
     mesh_file = case.mesh_file
     before = gaps(case, mesh, arguments.between)
     if not before:
+        names = dict.fromkeys((*case.markers_with("moving"), *mesh.marker_names))
         none = "there is no gap at hub or shroud"
         if mesh.dim == 2:
             none = "tip gaps by span are for 3D meshes"
         raise CaseError(
             f"{mesh_file}: there is one blade, which does not repeat, and {none}, so there is "
-            "nothing to measure; name boundaries, e.g. --between SHROUD,BLADE"
+            f"nothing to measure; name boundaries, e.g. --between {','.join([*names][:2])}"
         )
     after: tuple[Gap, ...] = ()
     warnings: tuple[Remark, ...] = ()

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
 from slideviz.formats.table import MESHIO, format_for
-from slideviz.system.atomic import reason_of, require_writable
+from slideviz.system.atomic import make_folder, require_writable
 from slideviz.system.file_checks import require_no_input, same_file
 
 if TYPE_CHECKING:
@@ -139,13 +139,3 @@ def _require_mesh_ending(file: Path) -> None:
         from slideviz.formats.meshio.bridge import formats_of
 
         formats_of(file)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and its parents where they are missing, or raise CaseError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise CaseError(f"{folder}: cannot create this folder: it is a file") from None
-    except OSError as problem:
-        raise CaseError(f"{folder}: cannot create this folder: {reason_of(problem)}") from None

@@ -16,12 +16,13 @@ from slideviz.case.keys import FILES, KEYS, VIEW
 from slideviz.case.limits import MET
 from slideviz.case.words import counted, first_of
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
-from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
+from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_json, table
 from slideviz.cli.terminal import DONE
 from slideviz.design.sweeps.table import RESULTS, DesignRow, Designs, numbers_of, read_designs
 from slideviz.errors import CaseError, Remark
+from slideviz.system.atomic import make_folder
 from slideviz.system.cleanup import keep_partial
 
 _LISTED = 5
@@ -79,6 +80,9 @@ def main(arguments: Namespace) -> int:
 
 def _print_columns(case: Any) -> int:
     numbers = numbers_of(case)
+    file = case.mesh_file
+    if file is not None and file.exists() and read_mesh(case, file)[1].dim == 2:
+        numbers = {name: place for name, place in numbers.items() if place.field != "axis"}
     if numbers:
         print("numbers of the motions, and their values in the case:")
         print(table([(name, place.of(case)) for name, place in numbers.items()]))

@@ -19,7 +19,7 @@ from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
 from slideviz.samples.turbine_row import extruded_case, extruded_row, row_case, row_mesh
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import atomic_write, make_folder
 from slideviz.terms import FileFormat
 
 
@@ -156,7 +156,13 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     ``variant``: one of ``SAMPLES[name].variants``; the first when left out.
     """
     row, kind = _row(name, variant)
-    return row.make(name, row.size if size is None else size, kind)
+    try:
+        return row.make(name, row.size if size is None else size, kind)
+    except (MemoryError, OverflowError, ValueError) as problem:
+        raise CaseError(
+            f"{name}: size {size:,} needs more memory than there is; choose a smaller one (usual: "
+            f"{row.size:,})"
+        ) from problem
 
 
 def _row(name: str, variant: str | None) -> tuple[SampleKind, str]:
@@ -207,11 +213,7 @@ def write_sample(
         raise CaseError(
             f"{there[0]}: exists already; choose another folder, or replace it with --force"
         )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
+    make_folder(folder)
     if isinstance(made, StreamedSample):
         write_content(mesh, [made.zone], mesh if overwrite else None)
     else:

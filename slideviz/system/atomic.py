@@ -14,12 +14,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from slideviz.errors import MeshError, SlidevizError
+from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.system.cleanup import draft
 from slideviz.system.file_checks import require_no_input
 
 _REMEDIES = {  # reason and remedy by errno
     errno.ENOENT: "the folder does not exist; create it first",
+    errno.EEXIST: "it is a file; choose another name",
     errno.ENOTDIR: "a part of the path is a file, not a folder; choose another folder",
     errno.EACCES: "no permission to write there; choose another folder or change its permissions",
     errno.EPERM: "no permission to write there; choose another folder or change its permissions",
@@ -49,8 +50,8 @@ def atomic_write(
     target = Path(path)
     require_no_input(target, error, replaces)
     temporary: Path | None = None
+    real = Path(os.path.realpath(target))
     try:
-        real = Path(os.path.realpath(target))
         mode = mode_of(real)
         with draft(real.parent) as temporary:
             with temporary.open("xb") as file:
@@ -66,7 +67,8 @@ def atomic_write(
         # The block may have failed to read some other file, which is not ours to explain.
         if problem.filename is not None and not _is_ours(problem.filename, target, temporary):
             raise
-        raise error(f"{target}: cannot be written: {reason_of(problem)}") from problem
+        reason = reason_of(problem, real.parent)
+        raise error(f"{target}: cannot be written: {reason}") from problem
 
 
 def require_writable(
@@ -84,7 +86,18 @@ def require_writable(
         with draft(real.parent) as temporary:
             temporary.touch(exist_ok=False)
     except OSError as problem:
-        raise error(f"{path}: cannot be written: {reason_of(problem)}") from problem
+        reason = reason_of(problem, real.parent)
+        raise error(f"{path}: cannot be written: {reason}") from problem
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents where they are missing, or raise CaseError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        there = next(parent for parent in folder.absolute().parents if parent.exists())
+        reason = reason_of(problem, there)
+        raise CaseError(f"{folder}: cannot create this folder: {reason}") from problem
 
 
 def mode_of(path: Path) -> int | None:
@@ -109,7 +122,12 @@ def _is_ours(name: object, target: Path, temporary: Path | None) -> bool:
     return str(name) in {str(target), str(temporary), os.path.realpath(target)}
 
 
-def reason_of(problem: OSError) -> str:
-    """Return in words why a file cannot be written, with the remedy for the usual reasons."""
+def reason_of(problem: OSError, folder: Path | None = None) -> str:
+    """Return in words why a file cannot be written, with the remedy for the usual reasons.
+
+    ``folder``: where it was to be.
+    """
+    if problem.errno == errno.ENOENT and folder is not None and folder.is_dir():
+        return "nothing can be made there; choose another folder"
     text = problem.strerror or str(problem)
     return _REMEDIES.get(problem.errno or 0, text)

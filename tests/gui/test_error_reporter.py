@@ -99,6 +99,9 @@ def test_errors_in_slots_and_threads_are_told_expected_ones_in_their_own_words_o
     qtbot.waitUntil(lambda: caught.error_reporter.count == 1)
     assert text(caught).startswith("case.cfg:3: STEPS= -1 is negative")
     assert not caught.banner.copy.isVisible()
+    caught.banner.show_error(MemoryError("Unable to allocate 3 GiB"))
+    assert text(caught).startswith("out of memory; use a coarser mesh")
+    assert not caught.banner.copy.isVisible()
     caught.error_reporter.count = 0
     thread = threading.Thread(target=lambda: int("word"))
     thread.start()

@@ -253,7 +253,7 @@ def test_sample_does_not_replace_files_unasked(tmp_path):
 
 def test_folder_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(CaseError, match=r"file/x: cannot make the folder: .*; choose another"):
+    with pytest.raises(CaseError, match=r"file/x: cannot create this folder: .*; choose another"):
         write_sample("square", tmp_path / "file" / "x", 5)
 
 

@@ -736,6 +736,10 @@ def _config(
     values = {key: reader.value(key, *how) for key, how in VALUES.items()}
     reader.check()
     if zone is None and "DV_KIND" not in rows:
+        if rows.keys() & {*ELSEWHERE}:
+            raise CaseError(
+                f"{path}: is a case file, not a configuration of SU2; use `slideviz run {path}`"
+            )
         sentence = (
             f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
         )

@@ -44,7 +44,7 @@ from slideviz.case.words import number
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import Mesh
-from slideviz.system.atomic import atomic_write, reason_of
+from slideviz.system.atomic import atomic_write, make_folder, reason_of
 from slideviz.system.csv_table import csv_rows, csv_text, write_csv
 from slideviz.system.file_checks import read_json, require_regular_file
 
@@ -613,12 +613,7 @@ class SweepResults:
         resumed, they are of another case, mesh or table; or the table cannot be written; or another
         sweep writes it.
         """
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise CaseError(
-                f"{self._folder}: cannot create this folder: {reason_of(problem)}"
-            ) from problem
+        make_folder(self._folder)
         self._lock = lock_folder(self._folder)
         try:
             return self._started(resume, force, meshes)

@@ -20,7 +20,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.errors import SlidevizError
+from slideviz.errors import OUT_OF_MEMORY, SlidevizError
 from slideviz.gui.widgets.build import (
     dialog_buttons,
     in_column,
@@ -104,8 +104,9 @@ class Banner(QFrame):
 
     def show_error(self, error: BaseException) -> None:
         """Show the message of an error; of an unexpected one, the trace is behind “Details”."""
-        if isinstance(error, SlidevizError):
-            self.show_message(str(error), calm=False)
+        if isinstance(error, SlidevizError | MemoryError):
+            text = OUT_OF_MEMORY if isinstance(error, MemoryError) else str(error)
+            self.show_message(text, calm=False)
         else:
             kind = type(error).__name__
             text = f"Something unexpected went wrong ({kind}): {error}"
