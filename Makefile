@@ -65,8 +65,8 @@ smoke: setup ## build the wheel and try it outside of the clone, also without Qt
 mutants: setup ## faults that the tests of a package do not notice (ROOM=rbf ARGS="--sample 50")
 	$(BIN)/python -m tools.mutants $(ROOM) $(ARGS)
 
-bench: setup ## measure the speed (needs a quiet machine)
-	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)
+bench: setup ## measure the speed (needs a quiet machine); all of it with ARGS='-m ""'
+	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only -m "not slow" $(ARGS)
 
 laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=0)
 	$(BIN)/python -m tools.laws --runs $(RUNS) --seed $(SEED) $(ARGS)

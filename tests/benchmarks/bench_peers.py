@@ -22,7 +22,7 @@ from tests.benchmarks.rbf_slide import asked as asked_of
 from tests.benchmarks.rbf_slide import greedy_rows
 
 GROUP = "peers"
-pytestmark = pytest.mark.benchmark(group=GROUP)
+pytestmark = [pytest.mark.slow, pytest.mark.benchmark(group=GROUP)]
 SIZES = [20_000, 240_000]
 THESIS = next((row for row in greedy_rows() if row.case == "stator"), None)
 """The stator that RBF-SliDe was timed on, if it is at hand; its times are those of its table."""

@@ -75,6 +75,7 @@ def test_two_thousand_control_nodes_of_the_whole_boundary(benchmark, tmp_path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", greedy_rows(), ids=str)
 def test_greedy_row(benchmark, row):
     """One row of the table; where ours is lower, the exact method is run too."""

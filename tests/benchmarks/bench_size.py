@@ -32,9 +32,12 @@ def stator(tmp_path_factory):
 
 DISK_GB = 5e-7
 """What a streamed cell takes on the disk, three times: the sample, the copy, and kept numbers."""
+LARGE = [10_000_000, 100_000_000]
 
 
-@pytest.mark.parametrize("cells", [240_000, 2_000_000, 10_000_000, 100_000_000])
+@pytest.mark.parametrize(
+    "cells", [240_000, 2_000_000, *(pytest.param(n, marks=pytest.mark.slow) for n in LARGE)]
+)
 def test_stream(benchmark, tmp_path, cells):
     """Whole command on an SU2 binary mesh that is never in memory as a whole."""
     free = shutil.disk_usage(tmp_path).free / 1e9
@@ -72,6 +75,7 @@ def test_run_of_the_command(benchmark, stator, cells):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sliding", ["ps", "ds"])
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
 def test_selection(benchmark, stator, sliding, tolerance):

@@ -22,6 +22,7 @@ from qtpy.QtCore import QPoint, Qt  # isort: skip
 from qtpy.QtTest import QTest  # isort: skip
 
 STEPS = 5
+pytestmark = pytest.mark.slow
 
 
 class Meter(Beat):
