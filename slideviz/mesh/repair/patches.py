@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, LANES
-from slideviz.mesh.margin import margins
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.mesh.repair.energy import Targets, write_curvatures, write_energy
 from slideviz.mesh.repair.freedom import Freedom
@@ -22,9 +21,6 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import cores
 
 CHUNK = 4 * LANES  # least number of cells that a thread works on at a time
-
-SAFE = 4.0  # longest step that is looked at
-NEAR = 0.9  # part of the safe step that is taken
 
 FLAT = 1e-12  # curvature of a block, over its largest one, below which a direction counts as held
 
@@ -170,43 +166,28 @@ class Patch:
         self.of_cells(work)
         return float(self.values.sum()), self.gathered()
 
-    def margin(self, unknowns: FloatArray, direction: FloatArray, signs: NDArray[np.int8]) -> float:
-        """Return a step along a direction (b, d) before which no cell folds.
-
-        ``signs`` (m,) are those of the cells, in the order of the parts.
-        """
-        points = self.points(unknowns)
-        first = 0
-        least = SAFE
-        way = np.zeros_like(points)
-        _move(self.freedom.place, self.row, self.maps, direction, way)
-        for part in self.parts:
-            cells = Cells.from_blocks([(part.vtk, part.nodes)])
-            turn = signs[first : first + len(part.nodes)]
-            first += len(part.nodes)
-            least = min(least, float(margins(points, way, cells, SAFE, turn).min()))
-        return NEAR * least
-
     def curvature(self, epsilon: float) -> FloatArray:
         """Return the inverse (b, d, d) of each block of the positive Hessian, where it can move."""
         points = self.start
         d = self.start.shape[1]
-        total = np.zeros((self.blocks, d, d))
-        blocks = {part.vtk: np.empty((*part.nodes.shape, d, d)) for part in self.parts}
+        blocks = np.empty((len(self._flat), d, d))
+        ends = np.cumsum([part.nodes.size for part in self.parts])
+        each = dict(zip((part.vtk for part in self.parts), np.split(blocks, ends), strict=False))
 
         def work(part: Targets, here: slice, _whole: slice, _slopes: FloatArray) -> None:
             cells = part.nodes, CORNERS[part.vtk], CORNER_AT[part.vtk], part.scale, part.shape
-            out = epsilon, here.start, here.stop, blocks[part.vtk]
-            write_curvatures(part.vtk, points, *cells, *out)
+            out = each[part.vtk].reshape(*part.nodes.shape, d, d)
+            write_curvatures(part.vtk, points, *cells, epsilon, here.start, here.stop, out)
 
         self.of_cells(work)
-        for part in self.parts:
-            out = blocks[part.vtk]
-            place = self.freedom.place[part.nodes]
-            bound = self.row[part.nodes] >= 0
-            maps = self.maps[self.row[part.nodes[bound]]]
-            out[bound] = np.swapaxes(maps, 1, 2) @ out[bound] @ maps
-            np.add.at(total, place[place >= 0], out[place >= 0])
+        row = self.row[self._flat]
+        bound = row >= 0
+        maps = self.maps[row[bound]]
+        blocks[bound] = np.swapaxes(maps, 1, 2) @ blocks[bound] @ maps
+        total = np.empty((self.blocks, d, d))
+        free = np.full_like(self.row, -1)
+        by_node = self._begins, self._order, self._flat, free, self.maps
+        _gather_blocks(*by_node, blocks.reshape(-1, d * d), total.reshape(-1, d * d))
         total[~np.isfinite(total).all(axis=(1, 2))] = 0.0  # beside cells without a size
         value, vector = np.linalg.eigh(total)
         keep = value > FLAT * value[:, -1:]

@@ -37,7 +37,10 @@ FEW = 5000  # most cells of a patch that grows to the last two
 POOR = 2  # number of sizes that are tried for patches whose cells are all proved, but some too low
 
 ROUNDS = 40  # most outer rounds of a patch
-VAIN = 10  # rounds in a row that may mend nothing
+SHALLOWER = 0.9
+STUCK = 3
+"""Factor by which the deepest fold must become shallower, and how many rounds in a row may fail to
+make it so, before a patch grows."""
 
 ITERATIONS = 200
 DECREASE = 5e-3
@@ -64,9 +67,9 @@ that folds on itself the Jacobian vanishes, wherever the other nodes are."""
 
 BELOW = 0.1  # cells of a lower quality are mended, too
 
-LIMITS = tuple(k / 20 for k in range(2, 20))
-"""Limits of the rounds that come before the last one: not below the default, so that its repairs
-take a single round."""
+LIMITS = tuple(k / 20 for k in range(20))
+"""Limits of the rounds that come before the last one: first cells are unfolded, then poor cells
+lifted in smaller patches, whose energy they determine more."""
 
 Report = Callable[[float], object]
 """Called with the fraction that is done; what it raises ends the repair."""
@@ -221,17 +224,11 @@ def mend_cells(
     The other arguments are as of `repair`.
     """
     report(0.0)
-    first, *others = [*(limit for limit in LIMITS if limit < below), below]
-    begin, smaller, unfold, lift, *ticks = equal_shares(report, len(others) + 4)
+    limits = [*(limit for limit in LIMITS if limit < below), below]
+    unfold, lift, *ticks = equal_shares(report, len(limits) + 2)
     with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
         mending = _Rounds(regions, bad, ratings, below, metric, pool)
-        mending.mend(first, begin)
-        if not mending.reached and first > 0.0:
-            # The worst cells alone have smaller patches, whose energy they determine more.
-            again = equal_shares(smaller, 3)
-            for limit, tick in zip((0.0, 0.5 * first, first), again, strict=True):
-                mending.mend(limit, tick)
-        for limit, tick in zip(others, ticks, strict=True):
+        for limit, tick in zip(limits, ticks, strict=True):
             if limit == below or mending.reached:
                 mending.mend(limit, tick)
         if mending.layered and (mending.ratings < 0.0).any():
@@ -510,26 +507,23 @@ class _Mending:
         return self.best_points
 
     def _unfold(self) -> None:
-        """Unfold cells in rounds in which epsilon falls."""
+        """Unfold cells in rounds in which epsilon falls with the depth of the deepest fold.
+
+        It ends where this no longer gets shallower: then the patch is too small.
+        """
         patch = self.patch
         epsilon = 1.0
-        vain = 0
+        deepest = np.inf
+        stuck = 0
         for _ in range(ROUNDS):
-            before = patch.energy(patch.still, epsilon)[0]
             patch.start = self._settled(self._descended(patch, epsilon), epsilon)
-            after = patch.energy(patch.still, epsilon)[0]
-            proved = self.best.proved
             self._keep(patch.start)
-            vain = 0 if self.best.proved > proved else vain + 1
-            if self.best.proved == 0 or vain >= VAIN:
+            depth = max(-float(patch.least.min()), 0.0)
+            stuck = stuck + 1 if depth > SHALLOWER * deepest else 0
+            deepest = min(deepest, depth)
+            if self.best.proved == 0 or stuck >= STUCK:
                 break
-            depth = float(patch.least.min())
-            if vain < 3:
-                epsilon = float(np.hypot(1e-6, 0.2 * min(depth, 0.0)))
-            else:  # the paper's rule, which ends after a finite number of rounds
-                chi = 0.5 * (depth + np.hypot(epsilon, depth))
-                bound = (1 - max(1 - after / before, 0.1)) * chi
-                epsilon = float(2 * np.sqrt(bound * (bound - depth))) if depth < bound else 1e-10
+            epsilon = float(np.hypot(1e-6, 0.2 * depth))
 
     def _descended(self, patch: Patch, epsilon: float, least: float | None = None) -> FloatArray:
         """Return points (k, d) of lower energy; ``least`` is the decrease that ends it."""
@@ -597,10 +591,9 @@ class _Mending:
             inverse = patch.curvature(LIFTED)
             edges = self._edges(patch)
 
-            def longest(unknowns: FloatArray, direction: FloatArray) -> float:
+            def longest(_unknowns: FloatArray, direction: FloatArray) -> float:
                 self._progress()
-                bound = self._longest(patch, edges, direction)  # noqa: B023
-                return min(bound, patch.margin(unknowns, direction, self.signs))
+                return self._longest(patch, edges, direction)  # noqa: B023
 
             def raised(unknowns: FloatArray) -> tuple[float, FloatArray]:
                 """Return what falls where the worst cells rise, and no edge gets short."""
