@@ -18,14 +18,13 @@ import numpy as np
 from numba import prange
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.compiled import OPTIONS, squared_distance
+from slideviz.rbf.compiled import fast, squared_distance
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis, Tick, no_tick, padded_rows, summed
 from slideviz.rbf.methods import largest_norm, within
 from slideviz.rbf.operations import columns
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.tape import Array, join, put, take, value
-from slideviz.system.jit_cache import njit
 
 TINY = 1e-24
 """Smallest square of a distance over the radius: the weight of a coinciding node is then so large
@@ -146,7 +145,7 @@ class WeightedField:
         )
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def _weight(squared, power):  # type: ignore[no-untyped-def]
     """Return distance^-power for the square of a distance."""
     if power == 2.0:
@@ -156,7 +155,7 @@ def _weight(squared, power):  # type: ignore[no-untyped-def]
     return squared ** (-0.5 * power)
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def _mean(x, c, w, g, power, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
     """Write the weighted mean at one target x (4,) to out (3,); parameters as of ``weigh``."""
     c0 = c[0]
@@ -186,7 +185,7 @@ def _mean(x, c, w, g, power, period_over_pi, scale, out):  # type: ignore[no-unt
     out[2] = s2 / total
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def weigh(x, c, w, g, power, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
     """Write the weighted means at targets x (4, N) to out (3, N).
 

@@ -47,7 +47,7 @@ CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
 OMEGA = 4.0 / 3.0  # damping of the Jacobi step that smooths prolongations, by row sums
 
-PARALLEL: dict[str, Any] = {"parallel": True, "nogil": True, "cache": True}
+PARALLEL: dict[str, Any] = {"parallel": True, "error_model": "python"}
 
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 """indptr, indices and data (k, w) of a sparse matrix; w = 1, or a number for each group of

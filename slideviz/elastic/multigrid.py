@@ -55,7 +55,7 @@ MAKING = 0.3  # the part of the progress at which the hierarchy is made
 
 Made = TypeVar("Made")
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
+_OPTIONS: dict[str, Any] = {"fastmath": True, "error_model": "python"}
 
 
 @dataclass(frozen=True, eq=False)

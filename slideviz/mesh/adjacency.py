@@ -75,7 +75,7 @@ def cells_around(cells: Cells, n_points: int) -> CellsAround:
     return CellsAround(sealed(offsets), sealed(owner), sealed(local))
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _count(keys, ends):  # type: ignore[no-untyped-def]
     """Write where each of the integers ``keys`` (k,) begins in their order, to ``ends`` (n + 1,).
 
@@ -88,7 +88,7 @@ def _count(keys, ends):  # type: ignore[no-untyped-def]
         ends[key] += ends[key - 1]
 
 
-@njit(inline="always", nogil=True, cache=True)
+@njit(inline="always")
 def _place(key, ends):  # type: ignore[no-untyped-def]
     """Return the next place of a key in the order."""
     at = ends[key + 1]
@@ -96,7 +96,7 @@ def _place(key, ends):  # type: ignore[no-untyped-def]
     return at
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _sort(keys, begins, order):  # type: ignore[no-untyped-def]
     """Write the stable order (k,) of integers ``keys`` (k,), and where each begins, (n + 1,)."""
     _count(keys, begins)
@@ -104,7 +104,7 @@ def _sort(keys, begins, order):  # type: ignore[no-untyped-def]
         order[_place(keys[k], begins)] = k
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _write_around(connectivity, offsets, begins, owner, local):  # type: ignore[no-untyped-def]
     """Write the arrays of `CellsAround`; ``begins`` are its offsets."""
     _count(connectivity, begins)
@@ -115,7 +115,7 @@ def _write_around(connectivity, offsets, begins, owner, local):  # type: ignore[
             local[at] = k - offsets[cell]
 
 
-@njit(inline="always", nogil=True, cache=True)
+@njit(inline="always")
 def _nodes_of(types, offsets, connectivity, locals_, first, owner, side):  # type: ignore[no-untyped-def]
     """Return the nodes of a side, ascending; before those of a line or a triangle are -1."""
     cell = owner[side]
@@ -132,7 +132,7 @@ def _nodes_of(types, offsets, connectivity, locals_, first, owner, side):  # typ
     return a, min(b, c), max(b, c), d
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _write_least(types, offsets, connectivity, locals_, first, owner, begin, end, least):  # type: ignore[no-untyped-def]
     """Write the least node of each side from ``begin`` to ``end`` into ``least`` (s,)."""
     for side in range(begin, end):
@@ -142,7 +142,7 @@ def _write_least(types, offsets, connectivity, locals_, first, owner, begin, end
         least[side] = a
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _match(types, offsets, connectivity, locals_, first, owner, begins, order, begin, end, found):  # type: ignore[no-untyped-def]
     """Write the neighbours ``found`` (s,) of all sides whose least node is in a range."""
     most = 0

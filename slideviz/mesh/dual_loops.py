@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import add3, cross3, dot3, minus3
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 
 def _around_nodes(vtk: int) -> list[list[tuple[int, int, int]]]:
@@ -44,7 +44,7 @@ for _vtk, _row in ELEMENTS.items():
         AROUND[_vtk, _k, : len(_ring)] = _ring
 
 
-@njit(**OPTIONS)
+@njit
 def write_middles(points, offsets, connectivity, begin, middles):  # type: ignore[no-untyped-def]
     """Write the means (m, 3) of the nodes of cells, from number ``begin`` on."""
     for i in range(len(middles)):
@@ -57,13 +57,13 @@ def write_middles(points, offsets, connectivity, begin, middles):  # type: ignor
             middles[i, axis] = total / (last - first)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _point(points, k):  # type: ignore[no-untyped-def]
     """Return a point, a triple."""
     return points[k, 0], points[k, 1], points[k, 2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _middle_of(points, connectivity, begin, side_nodes, vtk, side):  # type: ignore[no-untyped-def]
     """Return the mean, a triple, of the nodes of a side of the cell that begins at ``begin``."""
     a = _point(points, connectivity[begin + side_nodes[vtk, side, 0]])
@@ -76,7 +76,7 @@ def _middle_of(points, connectivity, begin, side_nodes, vtk, side):  # type: ign
     return 0.25 * total[0], 0.25 * total[1], 0.25 * total[2]
 
 
-@njit(**OPTIONS)
+@njit
 def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ignore[no-untyped-def]
     """Write SU2's three metrics of nodes from number ``begin`` on into ``found`` (3, k).
 
@@ -157,7 +157,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
         found[2, i] = large / small if count else np.nan
 
 
-@njit(**OPTIONS)
+@njit
 def _of_edges(points, x, others, normals, limits):  # type: ignore[no-untyped-def]
     """Return orthogonality and area ratio of a node at ``x`` with edges to ``others``."""
     total = 0.0

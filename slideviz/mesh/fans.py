@@ -122,7 +122,7 @@ def fan_normals(
     return unit(total)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
     """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``.
 
@@ -163,7 +163,7 @@ def components(count: int, a: IntArray, b: IntArray) -> IntArray:
     return label
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _unite(a, b, label):  # type: ignore[no-untyped-def]
     """Replace ``label`` (count,), given as 0, 1, 2, ..., by the part that each vertex is in.
 
@@ -183,7 +183,7 @@ def _unite(a, b, label):  # type: ignore[no-untyped-def]
             label[i] = label[label[i]]  # of a vertex before it, which has its number already
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _root(label, i):  # type: ignore[no-untyped-def]
     """Return the root of the tree that ``i`` is in; shorten the path there (path halving)."""
     while label[i] != i:

@@ -240,7 +240,7 @@ def _worst_of_nodes(mesh: Mesh, values: FloatArray, best: str) -> FloatArray:
     return found
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no-untyped-def]
     """Write the smallest (``least``) or largest value of the nodes of cells into ``found``."""
     for i in range(len(found)):

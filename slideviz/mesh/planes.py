@@ -17,7 +17,7 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import column_bounds
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -157,7 +157,7 @@ class BoxTree:
         return i[order], j[order]
 
 
-@njit(**OPTIONS)
+@njit
 def partition(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
     """Reorder keys and items ``start`` to ``stop``, so that the lowest keys are before ``half``.
 
@@ -187,7 +187,7 @@ def partition(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
             return
 
 
-@njit(**OPTIONS)
+@njit
 def _halve(centre, order, depth):  # type: ignore[no-untyped-def]
     """Reorder items ``order``, with centres (n, d), for a tree of a depth.
 
@@ -214,7 +214,7 @@ def _halve(centre, order, depth):  # type: ignore[no-untyped-def]
             partition(along, order, start, start + size // 2, stop)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _meets(query, q, below, above, box, margin):  # type: ignore[no-untyped-def]
     """Return whether a box touches that of a query, and its planes; one with a NaN touches all."""
     low, high, start, axes = query
@@ -232,7 +232,7 @@ def _meets(query, q, below, above, box, margin):  # type: ignore[no-untyped-def]
     return meets
 
 
-@njit(**OPTIONS)
+@njit
 def _find_near(tree, query, margin, nodes, nodes_of_items, pairs):  # type: ignore[no-untyped-def]
     """Write the first pairs of `BoxTree.near` into ``pairs`` (2, p), sorted by query only.
 

@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather
 from slideviz.mesh.model import IntArray
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.terms import Metric
 
 SHAPES: tuple[Metric, ...] = (
@@ -40,7 +40,7 @@ POLYGONS = {
 """(f, 4): the local nodes of the faces of a cell, in 2D of the cell itself, by VTK identifier."""
 
 
-@njit(**OPTIONS)
+@njit
 def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  # type: ignore[no-untyped-def]
     """Write the metrics of `SHAPES` of cells of one type into ``found`` (5, m).
 
@@ -66,7 +66,7 @@ def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  #
             found[4, start + c] = ends[1, c] / ends[0, c] if ends[0, c] > 0.0 else np.inf
 
 
-@njit(**OPTIONS)
+@njit
 def _lengths(at, edges, count, lengths, ends):  # type: ignore[no-untyped-def]
     """Write the lengths of edges, between any two nodes, and their ``ends`` (min, max)."""
     ends[0] = np.inf
@@ -79,7 +79,7 @@ def _lengths(at, edges, count, lengths, ends):  # type: ignore[no-untyped-def]
             ends[0, c], ends[1, c] = min(ends[0, c], length), max(ends[1, c], length)
 
 
-@njit(**OPTIONS)
+@njit
 def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[no-untyped-def]
     """Write Verdict's scaled Jacobians (count,); 0 where an edge has no length.
 
@@ -125,7 +125,7 @@ def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[
         found[c] = min(found[c] / ideal, 1.0)
 
 
-@njit(**OPTIONS)
+@njit
 def _scaled_in_the_middle(at, count, found):  # type: ignore[no-untyped-def]
     """Lower ``found`` (count,) to the scaled Jacobian in the middle of hexahedra, if smaller."""
     for c in range(count):
@@ -143,7 +143,7 @@ def _scaled_in_the_middle(at, count, found):  # type: ignore[no-untyped-def]
         found[c] = min(found[c], dot3(cross3(x, y), z) / scale if scale > 0.0 else 0.0)
 
 
-@njit(**OPTIONS)
+@njit
 def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-def]
     """Write least and largest angle of triangles, then of quadrilaterals, into ``angles`` (4, …).
 
@@ -181,14 +181,14 @@ def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-de
                 largest[c] = max(largest[c], angle)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _degrees(angle):  # type: ignore[no-untyped-def]
     """Return the angle in degrees that a number of `_angles` stands for."""
     half = np.degrees(np.arccos(1.0 - (angle if angle <= 2.0 else 4.0 - angle)))
     return half if angle <= 2.0 else 360.0 - half
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _equiangle_skew(angles, c):  # type: ignore[no-untyped-def]
     """Return the equiangle skew, at most 1, of cell ``c`` with angles as of `_angles`."""
     worst = 0.0

@@ -157,7 +157,7 @@ def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np
     return mask
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _mark(nodes, chosen, least, found):  # type: ignore[no-untyped-def]
     """Write into ``found`` (m,) which of ``nodes`` (m, n) have ``least`` or more in ``chosen``."""
     for row in range(len(nodes)):
@@ -195,7 +195,7 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
     return turned
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type: ignore[no-untyped-def]
     """Write into ``inward`` (f,) whether the normal of a facet, as ordered, points into its cell.
 

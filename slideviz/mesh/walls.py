@@ -159,7 +159,7 @@ def find_columns(
     return Columns(boundary, markers or boundary.names, *parts)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _has(nodes, node):  # type: ignore[no-untyped-def]
     """Return 1 if ``node`` is one of ``nodes`` (w,), else 0."""
     for other in nodes:
@@ -168,7 +168,7 @@ def _has(nodes, node):  # type: ignore[no-untyped-def]
     return 0
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type: ignore[no-untyped-def]
     """Write the nodes of the columns at the corners (f, w, k + 1) of facets, and the depths (f,).
 
@@ -204,7 +204,7 @@ def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type
                     count += 1
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
     """Write the side opposite to ``chain[:width, layer]`` of a cell; return whether it has one."""
     if len(nodes) != 2 * width:
@@ -230,7 +230,7 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type: ignore[no-untyped-def]
     """Return the cell of ``use`` beyond a side (w,) of ``cell``, -1 if there is none."""
     for at in range(begin[side[0]], begin[side[0] + 1]):
@@ -239,7 +239,7 @@ def _neighbour(side, cell, offsets, connectivity, begin, cells_at, use):  # type
     return np.int64(-1)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _is_beyond(side, cell, other, offsets, connectivity, use):  # type: ignore[no-untyped-def]
     """Return whether ``other`` is a cell of ``use`` that has a side (w,) of ``cell``, too."""
     if other == cell or not 0 <= other < len(use) or not use[other]:

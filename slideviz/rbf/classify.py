@@ -133,7 +133,7 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     return label
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
     """Write what `_clusters` returns to ``label`` (m,); ``role`` (m,) are numbers."""
     start = 0
@@ -155,7 +155,7 @@ def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-un
         start = stop
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _cosines(normals):  # type: ignore[no-untyped-def]
     count = len(normals)
     alike = np.zeros((count, count))
@@ -166,7 +166,7 @@ def _cosines(normals):  # type: ignore[no-untyped-def]
     return alike
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
     """Return a mask (c, c): whether the surface of fan i continues in fan j of an image.
 
@@ -185,14 +185,14 @@ def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
     return goes_on
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _replace(labels, old, new):  # type: ignore[no-untyped-def]
     for k in range(len(labels)):
         if labels[k] == old:
             labels[k] = new
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _close_gaps(labels):  # type: ignore[no-untyped-def]
     """Renumber labels 0, 1, ... in place, in order; `np.unique` would take long to compile."""
     number = np.zeros(len(labels), np.int64)

@@ -13,7 +13,7 @@ from numba import prange
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.planes import partition
 from slideviz.rbf.compiled import one_at_a_time
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 LEAF = 4  # triangles in a leaf of the tree, at most
 TIE = 1e-12  # squared distances with a smaller relative difference are equal but for rounding
@@ -29,7 +29,7 @@ it."""
 NO_SYMMETRY = (1.0, 0.6180339887, 0.4142135624)  # a direction in which points of a mesh differ
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _image(item, count):  # type: ignore[no-untyped-def]
     """Return ``item // count``: 0 for a triangle, 1 or 2 for an image; faster than dividing."""
     if item < count:
@@ -37,7 +37,7 @@ def _image(item, count):  # type: ignore[no-untyped-def]
     return 1 if item < 2 * count else 2
 
 
-@njit(**OPTIONS)
+@njit
 def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
     """Build a balanced tree of boxes: reorder ``order`` (q,) and fill ``bounds`` (m, 6).
 
@@ -99,7 +99,7 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
         stops[2 * k + 2] = b
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
     """Return the squared distance from x (3,) to box k; 0 inside."""
     total = 0.0
@@ -109,7 +109,7 @@ def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(**OPTIONS)
+@njit
 def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
     """Write the point of segment a, b closest to x to ``out``; return the squared distance."""
     length = 0.0
@@ -125,14 +125,14 @@ def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _copy(point, out):  # type: ignore[no-untyped-def]
     """Write a point to ``out``, number by number: whole rows take long to compile."""
     for i in range(3):
         out[i] = point[i]
 
 
-@njit(**OPTIONS)
+@njit
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance."""
     uu = 0.0
@@ -168,13 +168,13 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _before(a, b):  # type: ignore[no-untyped-def]
     """Return whether point a comes before b along a direction that no symmetry of a mesh has."""
     return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     """Return whether a and b, both at squared distance ``gap`` from a node, are one place.
 
@@ -185,7 +185,7 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     return apart <= 4.0 * TIE * gap
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
     """Write the corners of an item, numbered as for ``_build``, to ``out`` (3, 3)."""
     image = _image(item, len(corners))
@@ -197,7 +197,7 @@ def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
                 out[corner, axis] += shifts[image, axis]
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignore[no-untyped-def]
     """Write the points of the triangles ``corners`` (n, 3, 3) closest to x (m, 3) into out (m, 3).
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from math import factorial
-from typing import Any
 
 import numpy as np
 from numba import get_num_threads, prange, set_num_threads
@@ -40,7 +40,8 @@ def one_at_a_time(pairs: int) -> Iterator[None]:
             set_num_threads(threads)
 
 
-OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": True, "cache": True, "error_model": "numpy"}
+fast = partial(njit, fastmath=True)
+"""Decorator `njit` for loops whose sums the compiler may reorder."""
 
 # (1 - cos g) / g^2 as a polynomial in t = g^2. The arguments of Eq. 2.15 stay below 2 (a full
 # turn), where nine terms are right to 4e-13; below 1 (half a turn) to the last bit.
@@ -48,7 +49,7 @@ _K = tuple((-1.0) ** k / float(factorial(2 * k + 2)) for k in range(9))
 _K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = _K
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def _wendland_c2(squared, scale):  # type: ignore[no-untyped-def]
     """Return (1 - q)^4 (4 q + 1) with q = sqrt(squared) * scale, and 0 from q = 1 on."""
     q = np.sqrt(squared) * scale
@@ -57,7 +58,7 @@ def _wendland_c2(squared, scale):  # type: ignore[no-untyped-def]
     return u * u * (4.0 * q + 1.0)
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def one_minus_cos(g):  # type: ignore[no-untyped-def]
     """Return 1 - cos g without cancellation, for |g| <= 2."""
     t = g * g
@@ -66,7 +67,7 @@ def one_minus_cos(g):  # type: ignore[no-untyped-def]
     return t * p
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def squared_distance(x0, x1, x2, x3, c0, c1, c2, c3, period_over_pi, fourth):  # type: ignore[no-untyped-def]
     """Return the squared distance of features x and c; without ``fourth`` they are three.
 
@@ -90,7 +91,7 @@ def squared_distance(x0, x1, x2, x3, c0, c1, c2, c3, period_over_pi, fourth):  #
     return total
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def sum_plain(x, c, w, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
     """Write s at targets x (k, N) to out (3, N), for Wendland C2 and three or four features.
 
@@ -129,7 +130,7 @@ def sum_plain(x, c, w, period_over_pi, scale, out):  # type: ignore[no-untyped-d
         out[2, i] = s2
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def near_boxes(x, low, high, reach, out):  # type: ignore[no-untyped-def]
     """Write to out (N,) whether targets x (k, N) are at most ``reach`` from a box.
 
@@ -152,7 +153,7 @@ BLOCK = 256  # control nodes in a block of sum_any, whose distances stay in the 
 TARGETS_PER_TASK = 64
 
 
-@njit(**OPTIONS)
+@fast()
 def _apply(kind, q, count):  # type: ignore[no-untyped-def]
     """Replace xi by phi(xi) in the first ``count`` entries of q; ``kind`` is the kernel's code."""
     if kind == 0:
@@ -210,7 +211,7 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
             q[j] = np.exp(-q[j] * q[j])
 
 
-@njit(**OPTIONS)
+@fast()
 def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-untyped-def]
     """Write xi, distance over R, from one target x (4,) to ``count`` controls from ``start`` on."""
     c0 = c[0, start : start + count]
@@ -226,7 +227,7 @@ def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-
         q[j] = np.sqrt(squared) * scale
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write s at targets x (4, N) to out (3, N), for any kernel and four features.
 
@@ -258,7 +259,7 @@ def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyp
             out[2, i] = s2
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def fill_matrix(x, c, across, along, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write G_ab = phi(|x_a - c_b|) (m_a . n_b) to out (N, n).
 

@@ -18,7 +18,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import _K, one_at_a_time
 from slideviz.rbf.evaluate import Basis, Tick, no_tick
 from slideviz.rbf.kernels import KERNELS
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 # Without "fastmath", which takes a + b - a for b.
 
@@ -40,7 +40,7 @@ STRIP = 256  # columns of it
 KEPT = 2000  # rows of the largest system whose matrix is kept for further residuals: 64 MB
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _sum(a, b):  # type: ignore[no-untyped-def]
     """Return a + b, rounded, and its rounding error."""
     s = a + b
@@ -48,7 +48,7 @@ def _sum(a, b):  # type: ignore[no-untyped-def]
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _product(a, b):  # type: ignore[no-untyped-def]
     """Return a b, rounded, and its rounding error."""
     t = 134217729.0 * a
@@ -61,14 +61,14 @@ def _product(a, b):  # type: ignore[no-untyped-def]
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _joined(a, b):  # type: ignore[no-untyped-def]
     """Return a + b, rounded, and its rounding error, for |a| >= |b|."""
     s = a + b
     return s, b - (s - a)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
     s, e = _sum(a, b)
     t, f = _sum(al, bl)
@@ -76,13 +76,13 @@ def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
     return _joined(s, e + f)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _times(a, al, b, bl):  # type: ignore[no-untyped-def]
     p, e = _product(a, b)
     return _joined(p, e + (a * bl + al * b))
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _root(a, al):  # type: ignore[no-untyped-def]
     first = np.sqrt(max(a, 1e-300))
     p, e = _product(first, first)
@@ -90,7 +90,7 @@ def _root(a, al):  # type: ignore[no-untyped-def]
     return _joined(first, (rest + lost) * (0.5 / first))
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _one_minus_cos(g, gl):  # type: ignore[no-untyped-def]
     """Return 1 - cos g by the terms of ``compiled.one_minus_cos``."""
     t, tl = _times(g, gl, g, gl)
@@ -102,14 +102,14 @@ def _one_minus_cos(g, gl):  # type: ignore[no-untyped-def]
     return _times(p, pl, t, tl)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
     d, dl = _sum(a, -b)
     p, pl = _times(d, dl, d, dl)
     return _plus(s, sl, p, pl)
 
 
-@njit(**OPTIONS)
+@njit
 def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-def]
     """Write xi from node i to all nodes x (4, n) to q + ql, by ``compiled.squared_distance``."""
     c0 = x[0]
@@ -139,7 +139,7 @@ def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-d
         q[j], ql[j] = _times(r, rl, scale, 0.0)
 
 
-@njit(**OPTIONS)
+@njit
 def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
     """Write the radial function of xi = q + ql (n,) to v + vl (n,); overwrites q and ql."""
     n = len(q)
@@ -159,7 +159,7 @@ def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
             v[j], vl[j] = _times(v[j], vl[j], q[j], ql[j])
 
 
-@njit(**OPTIONS)
+@njit
 def _turn(across, i, v, vl):  # type: ignore[no-untyped-def]
     """Multiply v + vl with the scalar products of direction i and all directions (d, n)."""
     for j in range(len(v)):
@@ -171,7 +171,7 @@ def _turn(across, i, v, vl):  # type: ignore[no-untyped-def]
         v[j], vl[j] = _times(v[j], vl[j], dot, lost)
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _fill(x, across, first, period_over_pi, scale, power, terms, v, vl):  # type: ignore[no-untyped-def]
     """Write rows of G from row ``first`` on to v + vl (p, n), of features x and directions."""
     n = x.shape[1]
@@ -184,7 +184,7 @@ def _fill(x, across, first, period_over_pi, scale, power, terms, v, vl):  # type
             _turn(across, first + row, v[row], vl[row])
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
     """Write ``right - (v + vl) (weights + low)`` to out (p, m); weights and low are (m, n)."""
     for i in prange(len(v)):
@@ -198,7 +198,7 @@ def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
             out[i, k] = total + lost
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _over(a, al, b, bl):  # type: ignore[no-untyped-def]
     q = a / b
     p, pl = _times(b, bl, q, 0.0)
@@ -206,7 +206,7 @@ def _over(a, al, b, bl):  # type: ignore[no-untyped-def]
     return _joined(q, (r + rl) / b)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _less_product(u, ul, k, j, first, last):  # type: ignore[no-untyped-def]
     """Subtract from row j of u + ul what row k makes of it, from column ``first`` to ``last``."""
     a = u[k, j]
@@ -221,7 +221,7 @@ def _less_product(u, ul, k, j, first, last):  # type: ignore[no-untyped-def]
         lost[i] += e + f - (a * bl[i] + al * b[i])
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
     """Overwrite `ROWS` rows of u + ul (n, n) from ``top`` on by those of U with U^T U = u + ul.
 
@@ -252,7 +252,7 @@ def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
     """Overwrite each row of x + xl (m, n) by its solution, with the factor from `_factorise`."""
     n = len(u)

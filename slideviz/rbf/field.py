@@ -15,7 +15,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray, column_bounds
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Vicinity:
         return np.flatnonzero(found)
 
 
-@njit(**OPTIONS)
+@njit
 def _look_up(places, low, size, counts, marked, found):  # type: ignore[no-untyped-def]
     """Write which places (m, d) are in marked boxes of a `Vicinity` into ``found`` (m,)."""
     for i in range(len(places)):

@@ -51,7 +51,7 @@ from slideviz.rbf.tape import (
     unit,
     value,
 )
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
@@ -312,7 +312,7 @@ class WallNodes:
         return smooth((cosine + GRAZING) / (2.0 * GRAZING))
 
 
-@njit(**OPTIONS)
+@njit
 def _largest_cosines(targets, places, source, begin, end, normals, out):  # type: ignore[no-untyped-def]
     """Write the cosines (m, c) of the angle from sources (m, c) to points (m, d), and a normal.
 

@@ -12,7 +12,7 @@ from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 BLOCK = 256  # nodes of a task; it does all designs, so that what they share stays in the cache
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _shift(start, by):  # type: ignore[no-untyped-def]
     n = by.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
@@ -34,7 +34,7 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
                     by[k, i, j] = x if u == 0.0 else x + u
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
     n = at.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
@@ -48,7 +48,7 @@ def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
                         at[k, i, j] = before[i, j]
 
 
-@njit(**OPTIONS)
+@njit
 def place(found, nodes, out):  # type: ignore[no-untyped-def]
     """Write values (b, k d) at ``nodes`` (b,) of k designs to ``out`` (k, n, d), in one thread."""
     d = out.shape[2]
@@ -58,7 +58,7 @@ def place(found, nodes, out):  # type: ignore[no-untyped-def]
                 out[k, nodes[i], j] = found[i, k * d + j]
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _add_correction(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
     """Do what ``add_correction`` does, with the rows of the sparse matrix."""
     for k in prange(out.shape[0]):
@@ -71,7 +71,7 @@ def _add_correction(out, targets, starts, source, weight, part, lacking):  # typ
                 out[k, i, j] += part[row] * total
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
     """Write the largest squared distance in each of p parts of the nodes to ``squares`` (p, k)."""
     for part in prange(squares.shape[0]):
@@ -94,7 +94,7 @@ _S = tuple((-1.0) ** k / float(factorial(2 * k + 1)) for k in range(1, 7))
 _C = tuple((-1.0) ** k / float(factorial(2 * k)) for k in range(1, 8))
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _sine(x):  # type: ignore[no-untyped-def]
     """Return sin x for |x| <= NEAR, to the last bits."""
     t = x * x
@@ -102,7 +102,7 @@ def _sine(x):  # type: ignore[no-untyped-def]
     return x + x * (t * (_S[0] + t * (_S[1] + p)))
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _cosine(x):  # type: ignore[no-untyped-def]
     t = x * x
     p = t * (_C[2] + t * (_C[3] + t * (_C[4] + t * (_C[5] + t * _C[6]))))
@@ -112,7 +112,7 @@ def _cosine(x):  # type: ignore[no-untyped-def]
 NEAR = 0.25  # largest angle, in radians, for which _sine and _cosine are exact but for rounding
 
 
-@njit(parallel=True, **OPTIONS)
+@njit(parallel=True)
 def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[no-untyped-def]
     """Do what ``to_points`` does, for k designs; ``rate`` is 1 / ``frame.radius``."""
     n, d = coords.shape[1:]

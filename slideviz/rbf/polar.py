@@ -19,7 +19,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, sealed
 from slideviz.rbf.operations import each_of
 from slideviz.rbf.tape import Array, recorded, value
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 SWEEPS = 12  # most sweeps of Jacobi's eigenvalue algorithm; it needs up to six
@@ -61,7 +61,7 @@ def rotation_slopes(matrices: FloatArray, turned: FloatArray, directions: FloatA
     return out
 
 
-@njit(**OPTIONS)
+@njit
 def _rotate_all(m, out):  # type: ignore[no-untyped-def]
     work = np.empty((4, 4))
     vectors = np.empty((4, 4))
@@ -69,7 +69,7 @@ def _rotate_all(m, out):  # type: ignore[no-untyped-def]
         rotation(m[e], out[e], work, vectors)
 
 
-@njit(**OPTIONS)
+@njit
 def _change_all(m, r, t, out):  # type: ignore[no-untyped-def]
     d = m.shape[1]
     s = np.empty((d, d))
@@ -97,7 +97,7 @@ def _change_all(m, r, t, out):  # type: ignore[no-untyped-def]
                 out[e, i, 2] = r[e, i, 0] * omega[1] - r[e, i, 1] * omega[0]
 
 
-@njit(**OPTIONS)
+@njit
 def stretch(m, r, s):  # type: ignore[no-untyped-def]
     """Write S = R^T M (d, d) to s."""
     d = len(m)
@@ -108,7 +108,7 @@ def stretch(m, r, s):  # type: ignore[no-untyped-def]
                 s[i, j] += r[k, i] * m[k, j]
 
 
-@njit(**OPTIONS)
+@njit
 def spin(s, a, omega):  # type: ignore[no-untyped-def]
     """Write the solution of (tr(S) I - S) omega = a to omega (3,); 2D: of tr(S) omega_2 = a_2."""
     omega[0] = omega[1] = omega[2] = 0.0
@@ -137,7 +137,7 @@ def spin(s, a, omega):  # type: ignore[no-untyped-def]
         omega[2] = (c02 * a[0] + c12 * a[1] + c22 * a[2]) / det
 
 
-@njit(**OPTIONS)
+@njit
 def rotation(m, r, work, vectors):  # type: ignore[no-untyped-def]
     """Write the rotation nearest to m (d, d) to r; ``work`` and ``vectors`` (4, 4) are scratch."""
     if len(m) == 2:
@@ -185,7 +185,7 @@ def rotation(m, r, work, vectors):  # type: ignore[no-untyped-def]
     r[2, 1] = 2.0 * (y * z + w * x)
 
 
-@njit(**OPTIONS)
+@njit
 def _eigenvectors(a, v):  # type: ignore[no-untyped-def]
     """Diagonalise a (4, 4), of which the upper triangle is used, by Jacobi; columns of v."""
     size = 0.0

@@ -18,15 +18,14 @@ from numba import prange
 
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
-from slideviz.rbf.compiled import A2, BLOCK, OPTIONS, TARGETS_PER_TASK, distances, one_minus_cos
+from slideviz.rbf.compiled import A2, BLOCK, TARGETS_PER_TASK, distances, fast, one_minus_cos
 from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
-from slideviz.system.jit_cache import njit
 
 NEAR = 1e-12  # nodes coincide when their distance over R is at most this
 
 
-@njit(**OPTIONS)
+@fast()
 def _slope(kind, q, count):  # type: ignore[no-untyped-def]
     """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q; ``kind`` is a code."""
     for j in range(count):
@@ -66,7 +65,7 @@ def _slope(kind, q, count):  # type: ignore[no-untyped-def]
             q[j] = np.nan
 
 
-@njit(inline="always", **OPTIONS)
+@fast(inline="always")
 def _sine(g):  # type: ignore[no-untyped-def]
     """Return sin g for |g| <= 2, to 1e-15."""
     t = g * g
@@ -78,7 +77,7 @@ def _sine(g):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def _reverse(x, c, wx, wc, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N).
 
@@ -124,7 +123,7 @@ def _reverse(x, c, wx, wc, period_over_pi, scale, kind, out):  # type: ignore[no
             out[3, i] = twice * s3
 
 
-@njit(parallel=True, **OPTIONS)
+@fast(parallel=True)
 def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write the derivative of s as x (4, N) and c (4, n) change by dx and dc, to out (3, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK

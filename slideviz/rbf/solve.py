@@ -314,7 +314,7 @@ def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
     return guarded
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _guarded_cholesky(a, guard, dropped):  # type: ignore[no-untyped-def]
     """Factorise in place; pivots below ``guard`` give identity rows, and set ``dropped``."""
     n = len(a)

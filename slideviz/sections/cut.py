@@ -209,7 +209,7 @@ def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
     return patterns
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _write_patterns(nodes, negative, found):  # type: ignore[no-untyped-def]
     whole = 2 ** nodes.shape[1] - 1
     for cell in range(len(nodes)):

@@ -192,7 +192,7 @@ class Section:
         return self.describe(dim) if dim == 2 else self.shape.brief(self)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _project(points, direction, start, found):  # type: ignore[no-untyped-def]
     """Write coordinates of points (n, d) along a direction, less ``start``, to ``found`` (n,)."""
     for i in range(len(points)):

@@ -328,12 +328,12 @@ def winding_number(points: FloatArray, facets: IntArray, p: FloatArray) -> float
     return float(sums.sum() / (4.0 * np.pi))
 
 
-@njit(inline="always", nogil=True, cache=True)
+@njit(inline="always")
 def _arm(points, node, p):  # type: ignore[no-untyped-def]
     return points[node, 0] - p[0], points[node, 1] - p[1], points[node, 2] - p[2]
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _solid_angles(points, facets, p):  # type: ignore[no-untyped-def]
     """Return the sum of the solid angles of facets (f, 4), each two triangles, seen from ``p``."""
     total = 0.0

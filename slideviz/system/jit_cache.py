@@ -14,6 +14,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -109,19 +110,20 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
 
 
-OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
-"""Options of `njit` for loops over arrays; division by zero gives inf or NaN."""
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""Options of all compiled loops; division by zero gives inf or NaN."""
 
 
-def njit(**options: Any) -> Callable[[Callable], Any]:
-    """Return Numba's decorator ``njit`` with ``options``, and always with this module's cache."""
+def njit(function: Callable | None = None, **options: Any) -> Any:
+    """Decorate a function as Numba's ``njit`` with `OPTIONS`, and always with this module's cache.
 
-    def compiled(function: Callable) -> Any:
-        dispatcher = numba.njit(**options | {"cache": False, "no_cfunc_wrapper": True})(function)
-        dispatcher._cache = _Cache(function)
-        return dispatcher
-
-    return compiled
+    ``options``: others, in place of these or besides: ``@njit(parallel=True)``.
+    """
+    if function is None:
+        return partial(njit, **options)
+    dispatcher = numba.njit(**OPTIONS | options | {"cache": False})(function)
+    dispatcher._cache = _Cache(function)
+    return dispatcher
 
 
 @contextmanager

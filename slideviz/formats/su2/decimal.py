@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 _LEAST = -342  # power of ten below which a number of 19 digits is zero
 _MOST = 308  # and above which it is infinite
@@ -52,7 +52,7 @@ _SPARE = np.uint64(0x1FF)
 _HIDDEN = np.uint64(1 << 52)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _product(a, b):  # type: ignore[no-untyped-def]
     """Return the high and the low 64 bits of the product of two uint64."""
     a0 = a & _LOW
@@ -66,7 +66,7 @@ def _product(a, b):  # type: ignore[no-untyped-def]
     return a1 * b1 + (middle >> _U32) + (cross >> _U32), a * b
 
 
-@njit(**OPTIONS)
+@njit
 def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
     """Return the bits (uint64) of the float64 nearest to digits x 10^q, or all ones if undecided.
 
@@ -109,13 +109,13 @@ def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
     return (mantissa & ~_HIDDEN) | (np.uint64(power) << np.uint64(52))
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def ends(code):  # type: ignore[no-untyped-def]
     """Return whether a byte ends a word: a blank, a line break or ``%`` (begin of a comment)."""
     return code == 32 or 9 <= code <= 13 or code == 37
 
 
-@njit(**OPTIONS)
+@njit
 def decimal(text, offset, bits, k):  # type: ignore[no-untyped-def]
     """Write the bits of the number that begins at ``text[at]`` to ``bits[k]``; return its end.
 
@@ -160,7 +160,7 @@ def decimal(text, offset, bits, k):  # type: ignore[no-untyped-def]
     return offset
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _digits(text, offset, value):  # type: ignore[no-untyped-def]
     """Append the digits from ``text[at]`` on to ``value``, modulo 2^64; return it and the end."""
     digit = np.uint64(text[offset]) - U48
@@ -171,7 +171,7 @@ def _digits(text, offset, value):  # type: ignore[no-untyped-def]
     return value, offset
 
 
-@njit(**OPTIONS)
+@njit
 def _first_digits(text, offset):  # type: ignore[no-untyped-def]
     """Return the first 19 digits of a long number, its power of ten, and whether more follow.
 
@@ -198,7 +198,7 @@ def _first_digits(text, offset):  # type: ignore[no-untyped-def]
         offset += 1
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _exponent(text, offset):  # type: ignore[no-untyped-def]
     """Return the end of the exponent at ``text[at]`` (-1: not 1 to 5 digits), and its value."""
     down = text[offset] == 45

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.formats.su2 import KEYWORD, ROWS, TEXT
 from slideviz.formats.su2.decimal import U10, U48, decimal, ends
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 SIZES = np.zeros(257, np.int64)
 """Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
@@ -25,7 +25,7 @@ for _row in ELEMENTS.values():
     DIMS[_row.vtk] = _row.dim
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _print_whole(value, out, offset):  # type: ignore[no-untyped-def]
     stop = offset + 1
     quotient = value
@@ -39,7 +39,7 @@ def _print_whole(value, out, offset):  # type: ignore[no-untyped-def]
     return stop
 
 
-@njit(**OPTIONS)
+@njit
 def print_cells(types, nodes, first, out):  # type: ignore[no-untyped-def]
     """Write a row for each element, type, nodes and index, into ``out``; return its length.
 
@@ -63,7 +63,7 @@ def print_cells(types, nodes, first, out):  # type: ignore[no-untyped-def]
     return offset
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _copy_number(numbers, j, out, offset):  # type: ignore[no-untyped-def]
     """Copy orjson's number at ``numbers[j]`` to ``out[at]``; return where each goes on."""
     while numbers[j] != 44 and numbers[j] != 93:
@@ -75,7 +75,7 @@ def _copy_number(numbers, j, out, offset):  # type: ignore[no-untyped-def]
     return j, offset
 
 
-@njit(**OPTIONS)
+@njit
 def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
     """Write a row for each point, coordinates and index, into ``out``; return its length.
 
@@ -98,7 +98,7 @@ def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
     return offset
 
 
-@njit(**OPTIONS)
+@njit
 def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
     """Copy ``text`` to ``out`` with the coordinates that changed replaced.
 
@@ -149,25 +149,25 @@ RUN_COLUMNS = 5
 """Columns of a table of runs: first byte, first line, kind, rows, nodes (see `Lines`)."""
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _is_blank(code):  # type: ignore[no-untyped-def]
     return code == 32 or code == 9 or 11 <= code <= 13
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def is_numeric(code):  # type: ignore[no-untyped-def]
     """Return whether a number may begin with this byte: a digit, a sign or a point."""
     return 48 <= code <= 57 or code == 43 or code == 45 or code == 46
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _next_line(text, offset):  # type: ignore[no-untyped-def]
     while text[offset] != 10:
         offset += 1
     return offset + 1
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _first_word(text, offset):  # type: ignore[no-untyped-def]
     """Return where the first word, or comment, of the line from ``offset`` begins, or its end."""
     # Control characters stand before words like blanks, but not between numbers.
@@ -176,7 +176,7 @@ def _first_word(text, offset):  # type: ignore[no-untyped-def]
     return offset
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _next_word(text, offset):  # type: ignore[no-untyped-def]
     """Return where the next word begins: ``offset``, or behind the blanks there."""
     while _is_blank(text[offset]):
@@ -184,7 +184,7 @@ def _next_word(text, offset):  # type: ignore[no-untyped-def]
     return offset
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _type_of(text, offset):  # type: ignore[no-untyped-def]
     """Return the number that a row begins with: 0 without digits, 256 if it is not a type."""
     offset += text[offset] == 43
@@ -196,7 +196,7 @@ def _type_of(text, offset):  # type: ignore[no-untyped-def]
     return value
 
 
-@njit(**OPTIONS)
+@njit
 def scan_block(text, runs):  # type: ignore[no-untyped-def]
     """Write the runs (see `Lines`) of a block into ``runs``; return the numbers of runs and lines.
 
@@ -239,7 +239,7 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
     return n, line
 
 
-@njit(**OPTIONS)
+@njit
 def count_types(text, counts):  # type: ignore[no-untyped-def]
     """Add to ``counts`` (257,) the number of rows of each element type; the last is for others."""
     offset = 0
@@ -250,7 +250,7 @@ def count_types(text, counts):  # type: ignore[no-untyped-def]
         offset = _next_line(text, offset)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _whole_number(text, offset):  # type: ignore[no-untyped-def]
     """Return the whole number from ``offset`` on, of plain digits, and where it ends.
 
@@ -266,7 +266,7 @@ def _whole_number(text, offset):  # type: ignore[no-untyped-def]
     return -1 if offset == first or offset > first + 18 else value, offset
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _nodes(text, offset, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
     """Write the ``size`` nodes of an element to ``nodes[k:]``; return where they end in the text.
 
@@ -283,7 +283,7 @@ def _nodes(text, offset, size, n_points, nodes, k):  # type: ignore[no-untyped-d
     return offset
 
 
-@njit(**OPTIONS)
+@njit
 def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyped-def]
     """Read the rows of elements (type, nodes, perhaps an index, ignored) into types and nodes.
 
@@ -322,7 +322,7 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     return row, n
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _ends_row(text, offset):  # type: ignore[no-untyped-def]
     """Return whether a row of whole numbers ends at ``offset``, or after one more number."""
     offset = _next_word(text, offset)
@@ -333,7 +333,7 @@ def _ends_row(text, offset):  # type: ignore[no-untyped-def]
     return index >= 0 and (text[offset] == 10 or text[offset] == 37)
 
 
-@njit(**OPTIONS)
+@njit
 def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def]
     """Read the rows of points (coordinates, perhaps one or two indices) into ``points``.
 
