@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
 from slideviz.rbf.compiled import fast, squared_distance
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis, Tick, no_tick, padded_rows, summed
@@ -94,7 +94,7 @@ def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solutio
         put(displacement, nodes, values, overwrite=True),
         len(field.values),
         errors,
-        np.empty(0, np.int64),
+        NO_NODES,
         float("nan"),
         field=field,
     )

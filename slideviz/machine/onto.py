@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots, row_norms
 from slideviz.mesh.topology import facet_vectors, find_joints, unit
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def find_edges(points: FloatArray, facets: IntArray) -> tuple[IntArray, IntArray
     dim = points.shape[1]
     pairs, sharp = find_joints(facets, dim)
     normals = unit(facet_vectors(points, facets))
-    sharp = sharp[_dots(normals[pairs[:, 0]], normals[pairs[:, 1]]) < SHARP]
+    sharp = sharp[row_dots(normals[pairs[:, 0]], normals[pairs[:, 1]]) < SHARP]
     sides = facets.reshape(-1, 1)
     if dim == 3:
         sides = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -114,7 +114,7 @@ def lay_onto(
     moved = fitted = _fit(points, guide)
     if target.edges is not None:
         edge = np.unique(find_edges(points, facets)[0])
-        near = np.linalg.norm(target.edges(moved[edge])[0] - moved[edge], axis=1)
+        near = row_norms(target.edges(moved[edge])[0] - moved[edge])
         guide.edge = edge[near <= NEAR_EDGE * size]
     for weight in SMOOTHNESS:
         moved = moved + guide.change(moved, weight * bending, fitted - moved)
@@ -124,7 +124,7 @@ def lay_onto(
         moved = moved + np.linalg.solve(blocks, right[..., None])[..., 0]
         for wall in walls:
             moved[wall.rows] = wall.nearest(moved[wall.rows])[0]
-    distances = np.linalg.norm(target.surface(moved)[0] - moved, axis=1)
+    distances = row_norms(target.surface(moved)[0] - moved)
     return Laid(moved - points, distances, guide.facing(moved))
 
 
@@ -135,7 +135,7 @@ class _Guide:
     facets: IntArray
     target: Target
     walls: Sequence[Wall]
-    edge: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    edge: IntArray = field(default_factory=lambda: NO_NODES)
     """(e,): the nodes of sharp edges that have a counterpart."""
     sign: float = 1.0
     """-1 where normals of the target have the other direction than the boundary's, else 1."""
@@ -146,7 +146,7 @@ class _Guide:
         normals = np.zeros_like(points)
         for column in self.facets.T:
             np.add.at(normals, column, vectors)
-        return self.sign * _dots(unit(normals), self.target.surface(points)[1])
+        return self.sign * row_dots(unit(normals), self.target.surface(points)[1])
 
     def conditions(self, moved: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
         """Return conditions that draw nodes at ``moved`` to where they belong.
@@ -165,7 +165,7 @@ class _Guide:
                 across = along - tangents[:, axis, None] * tangents
                 found.append((self.edge, across, at - moved[self.edge], np.ones(len(self.edge))))
         rows, directions, ways, weights = map(np.concatenate, zip(*found, strict=True))
-        return rows, directions, _dots(ways, directions), weights
+        return rows, directions, row_dots(ways, directions), weights
 
     def equations(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return matrices (k, d, d) and right sides (k, d) of the least squares of each node."""
@@ -244,13 +244,8 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
     edges = np.sort(np.stack([one, two], axis=1)[one != two], axis=1)
     one, two = np.unique(edges, axis=0).T
     k = len(points)
-    weights = 1.0 / np.linalg.norm(points[one] - points[two], axis=1)
+    weights = 1.0 / row_norms(points[one] - points[two])
     links = coo_array((weights, (one, two)), (k, k)).tocsr()
     links = links + links.T
     laplacian = diags_array(np.ones(k)) - diags_array(1.0 / links.sum(axis=1)) @ links
     return (laplacian.T @ laplacian).tocsr()
-
-
-def _dots(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the scalar products (m,) of vectors (m, d)."""
-    return np.einsum("md,md->m", one, other)

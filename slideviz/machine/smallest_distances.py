@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slideviz.errors import MeshError
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, row_norms
 from slideviz.rbf.closest import ClosestPoints
 
 RELATIVE = 1e-7  # a distance is found up to this part of it
@@ -45,7 +45,7 @@ def nearest_on_segments(segments: FloatArray, surface: ClosestPoints) -> Nearest
     def measured(at: FloatArray) -> FloatArray:
         nonlocal best
         near = surface.query(at)
-        distance = np.asarray(np.linalg.norm(at - near, axis=1))
+        distance = row_norms(at - near)
         k = int(np.argmin(distance))
         if distance[k] < best.distance:
             best = Nearest(float(distance[k]), at[k], near[k])
@@ -55,7 +55,7 @@ def nearest_on_segments(segments: FloatArray, surface: ClosestPoints) -> Nearest
         return best
     ends = measured(segments.reshape(-1, dim)).reshape(-1, 2)
     for _ in range(MOST_ROUNDS):
-        length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+        length = row_norms(segments[:, 1] - segments[:, 0])
         bound = np.maximum((ends.sum(axis=1) - length) / 2.0, 0.0)
         keep = np.flatnonzero(bound < best.distance * (1.0 - RELATIVE))
         if not len(keep):

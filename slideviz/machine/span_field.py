@@ -35,7 +35,7 @@ from slideviz.errors import MeshError
 from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.system.weak_cache import weak_cache
@@ -157,9 +157,9 @@ def _signed(x: FloatArray, place: FloatArray, corners: FloatArray, into: FloatAr
         normal = unit(np.cross(edges[:, 0], edges[:, 1]))
     normal[np.sum(normal * into, axis=1) < 0.0] *= -1.0
     gap = x - place
-    size = np.linalg.norm(gap, axis=1)
+    size = row_norms(gap)
     inside = np.where(np.sum(gap * into, axis=1) < 0.0, -1.0, 1.0)
-    near = size <= NEAR * np.linalg.norm(into, axis=1)
+    near = size <= NEAR * row_norms(into)
     way = gap * (inside / np.where(size > 0.0, size, 1.0))[:, None]
     cosine = np.abs(np.sum(way * normal, axis=1))
     oblique = np.where(near, 0.0, np.sqrt(np.maximum(1.0 - cosine**2, 0.0)))
@@ -194,7 +194,7 @@ def find_span(
     coords = field.meridional(mesh.points[mesh.cells.nodes[:: 1 + len(mesh.points) // 20_000]])
     amid = coords[np.abs(field.span(coords)[0] - 0.5) <= AMID]
     coords = amid if len(amid) else coords
-    off = np.linalg.norm(coords[:, :2] - np.median(coords[:, :2], axis=0), axis=1)
+    off = row_norms(coords[:, :2] - np.median(coords[:, :2], axis=0))
     z, r, _ = coords[int(np.argmin(off))].tolist()
     return replace(field, start=(z, r))
 
@@ -356,7 +356,7 @@ class SpanCurves:
         place = self._at(span, m_prime, 0)
         speed = self._at(span, m_prime, 1)
         bend = self._at(span, m_prime, 2)
-        size = np.linalg.norm(speed, axis=1)
+        size = row_norms(speed)
         normal = np.stack([-speed[:, 1], speed[:, 0]], axis=1) / size[:, None]
         out = np.column_stack([place, theta])
         off = np.zeros(len(plane))
@@ -430,7 +430,7 @@ class SpanCurves:
             at[:, :2] -= factor[:, None] * slope[:, :2]
         return at[:, :2]
 
-    def _direction(self, places: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    def _direction(self, places: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the unit tangents (n, 2) of the curves, and where a wall has ended, (n,) bool."""
         at = np.column_stack([places, np.full(len(places), self._theta)])
         ends = self.field.distances(at)
@@ -455,8 +455,8 @@ class SpanCurves:
                 rates.append(np.column_stack([x[:, 1:2] * tangent, x[:, 1]]))
             new = at + step / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
             back = np.where(straight[:, None], new[:, :2], self._onto(new[:, :2], spans))
-            moved = np.linalg.norm(new[:, :2] - at[:, :2], axis=1)
-            straight = straight | (np.linalg.norm(back - new[:, :2], axis=1) > 0.2 * moved)
+            moved = row_norms(new[:, :2] - at[:, :2])
+            straight = straight | (row_norms(back - new[:, :2]) > 0.2 * moved)
             new[:, :2] = np.where(straight[:, None], new[:, :2], back)
             ahead = np.where(straight[:, None], ahead, self._direction(new[:, :2])[0])
             table.append(new)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_norms
 from slideviz.mesh.topology import facet_vectors, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
@@ -40,7 +39,7 @@ def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
     for facets in walls:
         vectors = facet_vectors(local, facets)
         middles = local[facets].mean(axis=1)
-        size = np.linalg.norm(vectors, axis=1)
+        size = row_norms(vectors)
         flat.append(np.linalg.norm(vectors.sum(axis=0)) >= (1.0 - PLANE) * size.sum())
         across = vectors[:, 1] * middles[:, 0] - vectors[:, 0] * middles[:, 1]
         normal = size * np.hypot(middles[:, 0], middles[:, 1])
@@ -67,7 +66,7 @@ def wall_profile(coords: FloatArray, facets: IntArray) -> FloatArray | None:
     other, in the order in which Prim's algorithm joins them to an end: each time the nearest one.
     """
     nodes, normals = vertex_normals(coords, facets)
-    size = np.linalg.norm(normals, axis=1)
+    size = row_norms(normals)
     along_theta = normals[:, 2] / np.where(size > 0.0, size, 1.0)
     if np.sqrt(np.average(along_theta**2, weights=size)) > REVOLUTION:
         return None
@@ -164,7 +163,7 @@ def _order(places: FloatArray, length: float) -> IntArray:
     return np.lexsort([*places.T[::-1], *rough.T[::-1]])
 
 
-def _inside(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+def _inside(polygon: FloatArray, points: FloatArray) -> BoolArray:
     """Return which points (n, 2) are inside of a polygon (k, 2), by the crossings of a ray."""
     x, y = points.T[:, :, None]
     x0, y0 = polygon.T

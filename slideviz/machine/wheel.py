@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.formats.table import ZoneContent
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import NO_NODES, Cells, FloatArray, IntArray, Marker, Mesh, row_norms
 from slideviz.mesh.periodic import TOLERANCE, Pair
 
 
@@ -132,7 +132,7 @@ class Wheel:
         Cells of one type follow each other, copy after copy.
         """
         types = [np.empty(0, np.uint8)]
-        flats = [np.empty(0, np.int64)]
+        flats = [NO_NODES]
         for vtk, copy, nodes in self._rows(i, j):
             types.append(np.full(len(nodes), vtk, np.uint8))
             flats.append(self.nodes(copy, nodes.ravel()))
@@ -215,7 +215,7 @@ class Wheel:
             # Turned back by one period, so that both are as in one copy.
             one = Wheel([self.passages[following]] * 2, self.pairs)
             gap = one.turned(1, first) - self.passages[copy].points[second]
-            worst = max(worst, float(np.linalg.norm(gap, axis=1).max()))
+            worst = max(worst, float(row_norms(gap).max()))
             if worst > allowed:
                 raise MeshError(
                     f"{self.passages[0].name}: passages {copy + 1} and {following + 1} do not "

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, Message
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Mesh
+from slideviz.mesh.model import BoolArray, Cells, FloatArray, Index, IntArray, Mesh
 
 LARGEST = 1e50
 """Largest absolute coordinate that is computed with, so that products of several are finite."""
@@ -49,7 +48,7 @@ def _first_repeated(cells: Cells) -> tuple[int, int] | None:
 
     def look(_vtk: int, rows: Index, nodes: IntArray) -> None:
         ordered = np.sort(nodes, axis=1)
-        same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
+        same: BoolArray = ordered[:, 1:] == ordered[:, :-1]
         if same.any():
             k = int(np.argmax(same.any(axis=1)))
             cell = int(np.arange(len(cells))[rows][k])

@@ -14,13 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.mesh.model import (
     DEFAULT_FEATURE_ANGLE_DEG,
+    BoolArray,
     FloatArray,
     IntArray,
     frozen_array,
+    row_dots,
     sealed,
 )
 from slideviz.mesh.topology import TINY, Boundary, corner_vectors, facet_vectors, unit
@@ -42,14 +43,14 @@ class Fans:
 
 def smooth_joints(
     boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Return a mask (j,) of the joints of facets of one marker at less than the feature angle.
 
     ``points`` (n, d) are the Cartesian coordinates of the undeformed mesh.
     """
     normal = unit(facet_vectors(points, boundary.facets))
     a, b = boundary.joints.T
-    along = np.einsum("jd,jd->j", normal[a], normal[b])
+    along = row_dots(normal[a], normal[b])
     return (along > np.cos(np.radians(feature_angle_deg))) & (
         boundary.marker[a] == boundary.marker[b]
     )

@@ -12,9 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.mesh.model import (
+    NO_NODES,
+    BoolArray,
+    Cells,
+    FloatArray,
+    IntArray,
+    Marker,
+    Mesh,
+    frozen_array,
+    row_norms,
+)
 from slideviz.system.weak_cache import weak_cache
 
 FITS = 1e-5
@@ -44,7 +53,7 @@ class Halo:
     rotations: FloatArray
     """(h, d, d): matrices that turn the displacement of a donor into that of its receiver."""
     outer: IntArray  # (o,): the receivers that belong to no cell of the domain, sorted
-    cells: NDArray[np.bool_]  # (m,): the cells of the halo: those with an outer receiver
+    cells: BoolArray  # (m,): the cells of the halo: those with an outer receiver
     sides: tuple[tuple[str, str], ...]
     """tuple of (str, str): pairs of boundaries of the domain: the first is a copy of the second."""
     mismatch: FloatArray
@@ -63,7 +72,7 @@ class Halo:
         out[self.receivers[rows]] = np.where(moved == 0, start, start + moved)
         return out
 
-    def outer_mask(self, count: int) -> NDArray[np.bool_]:
+    def outer_mask(self, count: int) -> BoolArray:
         """Return a mask (count,) of the outer receivers; ``count`` is the number of nodes."""
         mask = np.zeros(count, bool)
         mask[self.outer] = True
@@ -96,14 +105,14 @@ def make_halo(
     rotations = np.stack([motion.rotation for motion in motions])[which]
     sides = _sides(mesh, receivers, donors)
     inner = [mesh.marker(copy).nodes for copy, _ in sides]
-    outer = np.setdiff1d(receivers, np.concatenate([*inner, np.empty(0, np.int64)]))
+    outer = np.setdiff1d(receivers, np.concatenate([*inner, NO_NODES]))
     beyond = np.zeros(len(mesh.points), bool)
     beyond[outer] = True
     mismatch = np.empty(len(receivers))
     for index, motion in enumerate(motions):
         some = which == index
         image = motion.at(mesh.points[donors[some]])
-        mismatch[some] = np.linalg.norm(mesh.points[receivers[some]] - image, axis=1)
+        mismatch[some] = row_norms(mesh.points[receivers[some]] - image)
     donors, rotations = _rooted(len(mesh.points), receivers, donors, rotations, mismatch)
     return Halo(
         frozen_array(receivers, np.int64),
@@ -160,7 +169,7 @@ def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str
     return tuple(dict.fromkeys(pair for pair in pairs if pair[0] != pair[1]))
 
 
-def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _touching(cells: Cells, nodes: BoolArray) -> BoolArray:
     """Return a mask (m,) of the cells that have any node of the mask ``nodes`` (n,)."""
     mask = np.zeros(len(cells), bool)
     for ids, table in cells.by_type.values():

@@ -6,7 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterface, frozen_array
+from slideviz.mesh.model import (
+    Assembly,
+    FloatArray,
+    IntArray,
+    Mesh,
+    ZoneInterface,
+    frozen_array,
+    row_norms,
+)
 from slideviz.mesh.nearest import nearest
 
 COINCIDENT = 1e-6  # nodes of two zones nearer than this part of the mesh's extent are in one place
@@ -96,7 +104,7 @@ def torn_interfaces(mesh: Mesh, points: FloatArray, names: Sequence[str] = ()) -
         apart = points[each.nodes] - mesh.points[each.nodes]
         if both:
             apart -= points[each.partners] - mesh.points[each.partners]
-        gap = np.linalg.norm(apart, axis=1).max(initial=0.0)
+        gap = row_norms(apart).max(initial=0.0)
         if gap > ROUNDING * mesh.extent:
             said = f"{each.marker}, which is an interface with its {each.other}, has moved by up to"
             remedy = "move both alike, or make one of them fixed, so that it follows the other"

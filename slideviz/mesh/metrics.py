@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -22,7 +21,17 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import path_margins
-from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, Skin, sealed
+from slideviz.mesh.model import (
+    BoolArray,
+    FloatArray,
+    Index,
+    IntArray,
+    Mesh,
+    Signs,
+    Skin,
+    row_norms,
+    sealed,
+)
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, checked_reference, quality
 from slideviz.mesh.topology import vertex_normals
@@ -30,9 +39,6 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm, field_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _CACHE: WeakKeyDictionary[Mesh, dict[object, FloatArray]] = WeakKeyDictionary()
 """Values of metrics computed last, by mesh, metric and signs."""
@@ -51,7 +57,7 @@ class MetricValues:
     nodes of no cell."""
     of_cells: FloatArray
     """(m,): of the cells: the same, or the worst of each cell's nodes."""
-    counted: NDArray[np.bool_] | slice
+    counted: BoolArray | slice
     """An index (slice or mask) into ``values`` that leaves out the halo and unused nodes."""
 
     @property
@@ -256,7 +262,7 @@ def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no
 Made = Mapping[Metric, FloatArray]  # metrics that are computed together, with their values
 
 
-def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+def _shapes(mesh: Mesh, signs: Signs) -> Made:
     """Return the metrics of `shape_loops.SHAPES`, which need one cell only."""
     found = np.empty((len(shape_loops.SHAPES), len(mesh.cells)))
 
@@ -270,7 +276,7 @@ def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     return dict(zip(shape_loops.SHAPES, found, strict=True))
 
 
-def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+def _faces(mesh: Mesh, signs: Signs) -> Made:
     """Return the metrics that compare a cell with its neighbours."""
     cells = mesh.cells
     sides = sides_of(mesh.cells)
@@ -297,7 +303,7 @@ def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     return {"non-orthogonality": found[0], "skewness": found[1], "expansion": found[2]}
 
 
-def _nodes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+def _nodes(mesh: Mesh, signs: Signs) -> Made:
     """Return SU2's three metrics of the median dual mesh."""
     cells = mesh.cells
     found = np.empty((3, len(mesh.points)))
@@ -332,7 +338,7 @@ def _boundary_areas(mesh: Mesh) -> FloatArray:
     limits[:] = np.inf, 0.0
     for facets in _OUTER.of(mesh.cells, mesh.markers, lambda: _outer_facets(mesh)):
         nodes, normals = vertex_normals(mesh.points, facets)
-        areas = np.linalg.norm(normals, axis=1)
+        areas = row_norms(normals)
         limits[nodes, 0] = np.minimum(limits[nodes, 0], areas)
         limits[nodes, 1] = np.maximum(limits[nodes, 1], areas)
     return limits
@@ -356,7 +362,7 @@ def _outer_facets(mesh: Mesh) -> list[IntArray]:
     return [boundary.facets[(boundary.marker == at) & ~inner] for at in range(len(boundary.names))]
 
 
-_FAMILIES: dict[Metric, Callable[[Mesh, NDArray[np.int8]], Made]] = {
+_FAMILIES: dict[Metric, Callable[[Mesh, Signs], Made]] = {
     **dict.fromkeys(shape_loops.SHAPES, _shapes),
     "non-orthogonality": _faces,
     "skewness": _faces,

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+Signs = NDArray[np.int8]
+"""(m,): 1, or -1 for a cell that is numbered the other way round."""
 Index = slice | IntArray
 """Rows of an array: a slice where they follow one another, which selects without a copy."""
 
@@ -35,6 +38,17 @@ def sealed(values: NDArray) -> NDArray:
     return view
 
 
+def row_norms(vectors: FloatArray) -> FloatArray:
+    """Return the lengths (...,) of vectors (..., d)."""
+    lengths: FloatArray = np.linalg.norm(vectors, axis=-1)
+    return lengths
+
+
+def row_dots(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the scalar products (m,) of the rows of two arrays (m, d)."""
+    return np.einsum("md,md->m", one, other)
+
+
 def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     """Return ``values`` as a C-contiguous, read-only array; copies what is writable."""
     array: NDArray = np.ascontiguousarray(values, dtype=dtype)
@@ -42,6 +56,9 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
         array = array.copy() if array is values else array
         array.flags.writeable = False
     return array
+
+
+NO_NODES: IntArray = np.empty(0, np.int64)  # and no rows, no cells
 
 
 def offsets_of(sizes: ArrayLike) -> IntArray:
@@ -115,7 +132,7 @@ class Cells:
     def from_blocks(cls, blocks: Iterable[tuple[int, ArrayLike]]) -> Cells:
         """Return cells from ``(vtk, connectivity (m, n))`` blocks, in that order."""
         types = [np.empty(0, np.uint8)]
-        flats = [np.empty(0, np.int64)]
+        flats = [NO_NODES]
         for vtk, nodes in blocks:
             table = np.asarray(nodes, np.int64).reshape(-1, ELEMENTS[vtk].n_nodes)
             types.append(np.full(len(table), vtk, np.uint8))
@@ -126,7 +143,7 @@ class Cells:
     def joined(cls, parts: Sequence[Cells]) -> Cells:
         """Return the elements of some parts, one after the other."""
         types = np.concatenate([np.empty(0, np.uint8), *(part.types for part in parts)])
-        flat = np.concatenate([np.empty(0, np.int64), *(part.connectivity for part in parts)])
+        flat = np.concatenate([NO_NODES, *(part.connectivity for part in parts)])
         return cls.from_types(sealed(types), sealed(flat))
 
     def __len__(self) -> int:
@@ -180,7 +197,7 @@ class Cells:
         )
         return f"Cells({counts})"
 
-    def take(self, which: IntArray | NDArray[np.bool_]) -> Cells:
+    def take(self, which: IntArray | BoolArray) -> Cells:
         """Return elements by indices ``which`` (k,), in that order, or by a mask (m,)."""
         sizes = np.diff(self.offsets)
         if which.dtype == bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import column_bounds
+from slideviz.mesh.model import NO_NODES, BoolArray, column_bounds
 from slideviz.system.jit_cache import njit
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class FacetSimplices:
         Raises MeshError if an element has another dimension than a boundary.
         """
         parts = [np.empty((0, dim), np.int64)]
-        facets = [np.empty(0, np.int64)]
+        facets = [NO_NODES]
         for vtk, (ids, nodes) in cells.by_type.items():
             row = ELEMENTS[vtk]
             if row.dim != dim - 1:
@@ -65,7 +65,7 @@ class FacetSimplices:
     def __len__(self) -> int:
         return len(self.nodes)
 
-    def keep(self, wanted: NDArray[np.bool_]) -> FacetSimplices:
+    def keep(self, wanted: BoolArray) -> FacetSimplices:
         """Return the simplices where ``wanted`` (s,) is true."""
         return FacetSimplices(self.nodes[wanted], self.facet[wanted])
 

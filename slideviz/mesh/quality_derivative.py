@@ -23,14 +23,12 @@ import numpy as np
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, corners
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, Signs, frozen_array, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
 from slideviz.system.threads import PART, cores, in_parts, ordered_map
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from slideviz.mesh.quality import Quality
 
 FOLDED_AT_ONCE = 4096  # inverted cells whose coefficients (up to 27 each) are in memory at a time
@@ -142,9 +140,7 @@ def _flat_sentence(cell: int, mesh: Mesh) -> str:
     )
 
 
-def _smooth_minimum(
-    values: FloatArray, counted: NDArray[np.bool_], p: float
-) -> tuple[float, FloatArray]:
+def _smooth_minimum(values: FloatArray, counted: BoolArray, p: float) -> tuple[float, FloatArray]:
     """Return ``(Σ q^-p)^(-1/p)`` of the values q of ``counted`` cells, and its derivatives by ln q.
 
     The derivatives are (m,), 0 for cells that are not counted.
@@ -207,7 +203,7 @@ def _unfold(
     mesh: Mesh,
     found: Quality,
     sums: FloatArray | None,
-    folded: NDArray[np.bool_],
+    folded: BoolArray,
     p: float,
     gradient: FloatArray,
 ) -> float:
@@ -381,7 +377,7 @@ def _blocks(mesh: Mesh) -> list[Block]:
 
 
 def _ratios(
-    mesh: Mesh, reference: Mesh, signs: NDArray[np.int8], block: Block
+    mesh: Mesh, reference: Mesh, signs: Signs, block: Block
 ) -> tuple[FloatArray, FloatArray]:
     """Return for each coefficient (k, m) of a block of cells its factor, and the product.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.nearest import row_groups
 from slideviz.system.weak_cache import WeakCache
 
@@ -38,7 +38,7 @@ def coarse_surfaces(
     return tuple(map(_merge_nodes, surfaces, (representatives[each] for each in at)))
 
 
-def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntArray:
+def _representatives(points: FloatArray, first: BoolArray, cubes: int) -> IntArray:
     """Return for each of the points (n, 3) the index (n,) of the one that replaces it.
 
     It is the point nearest to the mean of those in the same cube, among those where the mask
@@ -50,7 +50,7 @@ def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntAr
     key = (at[:, 0] * (cubes + 1) + at[:, 1]) * (cubes + 1) + at[:, 2]
     _, cube, count = np.unique(key, return_inverse=True, return_counts=True)
     middle = np.column_stack([np.bincount(cube, column) / count for column in points.T])
-    away = np.linalg.norm(points - middle[cube], axis=1)
+    away = row_norms(points - middle[cube])
     order = np.lexsort((away, ~first, cube))
     chosen = order[np.concatenate([[0], np.cumsum(count)[:-1]])]
     return np.asarray(chosen[cube])

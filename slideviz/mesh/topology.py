@@ -10,12 +10,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
+from slideviz.mesh.model import (
+    NO_NODES,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    frozen_array,
+    sorted_nodes,
+)
 from slideviz.mesh.nearest import row_groups, sorted_in_rows
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -71,7 +78,7 @@ def find_boundary(mesh: Mesh) -> Boundary:
     mesh, ids = without_halo(mesh)
     width = 2 if mesh.dim == 2 else 4
     tables = [np.empty((0, width), np.int64)]
-    owners = [np.empty(0, np.int64)]
+    owners = [NO_NODES]
     for index, marker in enumerate(mesh.markers):
         for _, nodes in marker.cells.by_type.values():
             tables.append(_padded(nodes, width))
@@ -138,7 +145,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
         table = _canonical_triangles(table)
     group = row_groups(table)
     cell_of_group = np.full(group.max(initial=-1) + 1, -1, np.int64)
-    cell_of_group[group[len(facets) :]] = np.concatenate([np.empty(0, np.int64), *cells])
+    cell_of_group[group[len(facets) :]] = np.concatenate([NO_NODES, *cells])
     owner = cell_of_group[group[: len(facets)]]
     if np.any(owner < 0):
         lost = int(np.argmin(owner))
@@ -150,7 +157,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     return owner
 
 
-def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+def _touch(nodes: IntArray, chosen: BoolArray, least: int) -> BoolArray:
     """Return a mask (m,) of cells (m, n) with at least ``least`` nodes in the mask ``chosen``."""
     mask = np.empty(len(nodes), bool)
     in_parts(lambda part: _mark(nodes[part], chosen, least, mask[part]), len(nodes))
@@ -305,7 +312,7 @@ def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
     keys = keys[order]
     starts = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]])
     sizes = np.diff(np.r_[starts, len(keys)])
-    first = starts[sizes == 2] if len(keys) else np.empty(0, np.int64)
+    first = starts[sizes == 2] if len(keys) else NO_NODES
     joints = np.stack([facet[order[first]], facet[order[first + 1]]], axis=1)
     shared = keys[first]
     return joints, np.stack([shared] if dim == 2 else np.divmod(shared, above), axis=1)

@@ -40,7 +40,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, row_dots, row_norms, sealed
 from slideviz.mesh.quality import checked_reference
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
@@ -104,7 +104,7 @@ class Columns:
             if width == 4:  # of a triangle, which repeats its last corner, the first three
                 edges[below[:, 2] == below[:, 3], 3] = np.nan
             height = np.nanmean(edges, axis=1)
-            size = np.linalg.norm(facet_vectors(points, below), axis=1)
+            size = row_norms(facet_vectors(points, below))
             good = height < FLAT * (size if width == 2 else np.sqrt(size / 2))
             thickness[some[good]] += height[good]
             flat[some[~good]] = False
@@ -284,8 +284,8 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     edges = x[:, 1:] - x[:, :-1]
     edges[nodes[:, 1 : LAYERS + 1] < 0] = np.nan
     length = np.linalg.norm(edges, axis=2)
-    first = np.einsum("cd,cd->c", edges[:, 0], normal[: len(nodes)])
-    along = np.linalg.norm(edges[:, 0] - first[:, None] * normal[: len(nodes)], axis=1)
+    first = row_dots(edges[:, 0], normal[: len(nodes)])
+    along = row_norms(edges[:, 0] - first[:, None] * normal[: len(nodes)])
     angle = np.degrees(np.arctan2(first, along))
     with np.errstate(all="ignore"):
         steps = np.exp(np.abs(np.log(length[:, 1:] / length[:, :-1])))
@@ -293,7 +293,7 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
         alike = np.abs(length / length[:, :1] - 1) < EQUAL
     equal = np.cumprod(alike, axis=1).sum(axis=1).astype(float)
     away = points[columns.off].mean(axis=1) - _middles(points, facets[columns.bare])
-    height = np.einsum("gd,gd->g", away, normal[len(nodes) :])
+    height = row_dots(away, normal[len(nodes) :])
     none = np.full(len(columns.bare), np.nan)
     parts = np.r_[first, height], *(np.r_[value, none] for value in (growth, equal, angle))
     return {name: sealed(part) for name, part in zip(VALUES, parts, strict=True)}

@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.mesh import topology
 from slideviz.mesh.fans import Fans
-from slideviz.mesh.model import FloatArray, IntArray, ranges
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, ranges, row_dots
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.tape import (
     Array,
@@ -56,21 +56,21 @@ class FansAround:
     continue beyond the periodic boundary, ``merge`` for fans of one node."""
 
 
-def nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:
+def nodes_with(at: IntArray, chosen: BoolArray, total: int) -> BoolArray:
     """Return a mask (total,) of the nodes of the chosen fans."""
     mask = np.zeros(total, bool)
     mask[at[chosen]] = True
     return mask
 
 
-def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArray]:
+def slide_rows(around: FansAround, active: BoolArray) -> tuple[IntArray, IntArray]:
     """Return rows (r, 2) of a fan and its cluster within its node, and the nodes of full rank (f,).
 
     For the fans in the mask ``active`` (m,); nodes are representatives of periodic images.
     """
     chosen = np.flatnonzero(active)
     if not len(chosen):
-        return np.empty((0, 2), np.int64), np.empty(0, np.int64)
+        return np.empty((0, 2), np.int64), NO_NODES
     chosen = _one_sided(around, chosen)
     node = around.node[chosen]
     cluster = np.zeros(len(chosen), np.int64)
@@ -78,7 +78,7 @@ def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArr
     size = np.diff(np.r_[starts, len(node)])
     several = np.flatnonzero(np.repeat(size > 1, size))
     if not len(several):
-        return np.stack([chosen, cluster], axis=1), np.empty(0, np.int64)
+        return np.stack([chosen, cluster], axis=1), NO_NODES
     size = size[size > 1]
     group = np.repeat(np.arange(len(size)), size)
     local = chosen[several]
@@ -110,7 +110,7 @@ def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
         mine = first[rows] < rows
         rows = rows[mine]
         other = first[rows]
-        along = np.einsum("rd,rd->r", around.normals[chosen[rows]], around.normals[chosen[other]])
+        along = row_dots(around.normals[chosen[rows]], around.normals[chosen[other]])
         drop[rows] |= (along < -around.merge) & (own[rows] != own[other])
         first[rows] += 1
     return chosen[~drop]
@@ -342,8 +342,8 @@ def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) ->
 
 
 def _collect(
-    moving: np.ndarray,
-    fixed: np.ndarray,
+    moving: BoolArray,
+    fixed: BoolArray,
     rows: IntArray,
     at: IntArray,
     representative: IntArray,

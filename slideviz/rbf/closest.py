@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.mesh.planes import partition
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.system.jit_cache import njit
@@ -346,7 +346,7 @@ class ClosestPoints:
         ``guess`` (m,): numbers of simplices that are probably the closest, for speed. Where x is on
         its guessed simplex, that one is taken, even if x is on others too.
         """
-        begin = np.empty(0, np.int64) if guess is None else guess % len(self._order)
+        begin = NO_NODES if guess is None else guess % len(self._order)
         dim = x.shape[1]
         turns = self._periods(x)
         targets = np.zeros((len(x), 3))
@@ -391,7 +391,7 @@ class ClosestPoints:
         at[rows[beyond]] = foot[beyond]
 
 
-def _on_rim(corners: FloatArray, rim: FloatArray) -> np.ndarray:
+def _on_rim(corners: FloatArray, rim: FloatArray) -> BoolArray:
     """Return which corners of simplices (n, c, d) are on the rim, and which opposite sides.
 
     (n, c) bool for segments, (n, 2 c) for triangles.
@@ -400,7 +400,7 @@ def _on_rim(corners: FloatArray, rim: FloatArray) -> np.ndarray:
     def keys(points: FloatArray) -> FloatArray:
         return np.asarray(sum(points[..., k] * NO_SYMMETRY[k] for k in range(points.shape[-1])))
 
-    def among(points: FloatArray, others: FloatArray) -> np.ndarray:
+    def among(points: FloatArray, others: FloatArray) -> BoolArray:
         return np.isin(keys(points), keys(others))
 
     found = among(corners, rim)

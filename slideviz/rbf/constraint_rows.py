@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.errors import NodeError
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray
 from slideviz.rbf.problem import Problem
 from slideviz.rbf.tape import (
     Array,
@@ -130,7 +130,7 @@ def _orthonormalised(
     normals: Array,
     right: Array,
     rows: IntArray,
-    keep: np.ndarray,
+    keep: BoolArray,
 ) -> tuple[Array, Array]:
     """Return normals and right-hand sides with those of coinciding nodes orthonormalised.
 
@@ -163,7 +163,7 @@ def _orthonormalised(
     return normals, right
 
 
-def _above(size: FloatArray, least: float) -> np.ndarray:
+def _above(size: FloatArray, least: float) -> BoolArray:
     return np.asarray(size[:, 0] > least)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Tick, matrix
@@ -46,9 +46,9 @@ class ExactFit:
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
-        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        self.interpolant = Interpolant(NO_NODES, np.empty((0, d)))
         """Of all rows added so far."""
-        self.dropped: IntArray = np.empty(0, np.int64)
+        self.dropped: IntArray = NO_NODES
         """(m,): nodes of which the pivot guard left out a constraint."""
         self.stages: tuple[Levels, ...] = ()  # the rows in the system after each call of add
         self.error_estimate = self.refined = 0.0
@@ -63,7 +63,7 @@ class ExactFit:
         with self._timer.phase("solve") as tick:
             if problem.basis.saddle:
                 self.interpolant, deficient = saddle_fit(problem, rows)
-                self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
+                self.dropped = np.unique(rows.nodes) if deficient else NO_NODES
                 self.error_estimate = max(
                     self.error_estimate, saddle_error_estimate(problem, rows, self.interpolant)
                 )
@@ -121,7 +121,7 @@ class ExactFit:
         self, terms: FloatArray, right: FloatArray, solved: list[IntArray]
     ) -> FloatArray:
         """Return the polynomial's coefficients (q, m) for terms (r, q) and data (r, m) of rows."""
-        kept = [np.empty(0, np.int64)]
+        kept = [NO_NODES]
         forward = [np.empty((0, terms.shape[1] + right.shape[1]))]
         for part in solved:
             factor = self._factors[int(part[0])]
@@ -240,7 +240,7 @@ def saddle_error_estimate(problem: Problem, rows: ConstraintRows, found: Interpo
     largest = float(np.abs(rows.data).max(initial=0.0))
     met = value(found.at(problem, rows.nodes))
     if rows.directions is not None:
-        met = np.einsum("rd,rd->r", met, rows.directions)[:, None]
+        met = row_dots(met, rows.directions)[:, None]
     lacking = ConstraintRows(rows.nodes, rows.directions, rows.data - met)
     field = saddle_fit(problem, lacking)[0].field(problem)
     field_error = np.abs(field.interpolated(check_points(problem.place(rows.nodes)))).max(

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.mesh.periodic import Pair
 from slideviz.system.threads import PART, in_parts
 
@@ -34,14 +34,14 @@ TILT = 0.02
 """A surface whose unit normal has a larger component along the axis fixes its nodes on the axis."""
 
 
-def on_axis(frame: Frame, coords: FloatArray) -> np.ndarray:
+def on_axis(frame: Frame, coords: FloatArray) -> BoolArray:
     """Return a mask (n,) of the nodes on the axis; none in a Cartesian frame."""
     if not frame.cylindrical:
         return np.zeros(len(coords), bool)
     return coords[:, 0] <= ON_AXIS * frame.radius
 
 
-def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArray:
+def corners(coords: FloatArray, facets: IntArray, axis: BoolArray) -> FloatArray:
     """Return the corners (f, k, d) of facets or segments (f, k), with angles for those on the axis.
 
     In the coordinates a facet with a node on the axis has no corner there, but all angles of its
@@ -58,7 +58,7 @@ def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArra
     return x
 
 
-def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> FloatArray:
+def _corners_at_axis(x: FloatArray, touching: BoolArray, nodes: IntArray) -> FloatArray:
     """Return the corners (k, d) of one facet; those on the axis get the angle of their neighbours.
 
     A triangle with one corner on the axis becomes a quadrilateral, which begins at the corner
@@ -86,7 +86,7 @@ def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> Fl
 
 
 def hold_on_axis(
-    nodes: IntArray, normals: FloatArray, axis: np.ndarray
+    nodes: IntArray, normals: FloatArray, axis: BoolArray
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Return the constraints with those of nodes on the axis replaced, so that they move along it.
 
@@ -97,7 +97,7 @@ def hold_on_axis(
     """
     there = axis[nodes]
     if not there.any():
-        return nodes, normals, np.empty(0, np.int64)
+        return nodes, normals, NO_NODES
     d = normals.shape[1]
     found = np.unique(nodes[there])
     tilted = np.unique(nodes[there][np.abs(normals[there, -1]) > TILT]) if d == 3 else found

@@ -31,7 +31,7 @@ from time import perf_counter
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.exact import row_keys
 from slideviz.rbf.kernels import PLAIN
@@ -68,16 +68,16 @@ class GreedyFit:
         d = problem.dim
         self.history = history
         self.short = ""
-        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        self.interpolant = Interpolant(NO_NODES, np.empty((0, d)))
         """The chosen nodes, in the order of their choice, and their coefficients, summed over the
         levels (Eq. 2.38)."""
-        self.dropped: IntArray = np.empty(0, np.int64)
+        self.dropped: IntArray = NO_NODES
         """(m,): nodes left out by the pivot guard although their error is above the tolerance."""
         self.stages: tuple[Levels, ...] = ()  # the rows chosen after each call of add
         self.error_estimate = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._number = history[-1].level if history else 1
-        none = np.empty(0, np.int64)
+        none = NO_NODES
         rows = ConstraintRows(none, None, np.empty((0, d)))
         self._among = Candidates(rows, none, none, none, np.empty(0))
         self._level = GreedyLevel(problem, self._among, self.interpolant)

@@ -16,7 +16,14 @@ import numpy as np
 
 from slideviz.errors import NodeError
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    column_bounds,
+    largest_coordinate,
+    row_dots,
+    row_norms,
+)
 from slideviz.mesh.nearest import nearest
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.classify import Classes, directions
@@ -120,7 +127,7 @@ def require_free(
     held = classes.fixed[np.isin(classes.fixed, nodes)]
     off[held] = np.abs(spread.at(held)).max(axis=1, initial=0.0)
     rows, across = directions(classes, normals)
-    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", spread.at(rows), value(across))))
+    np.maximum.at(off, rows, np.abs(row_dots(spread.at(rows), value(across))))
     worst = int(nodes[np.argmax(off[nodes])])
     if off[worst] > allowed:
         refuse(worst, int(spread.source(np.array([worst]))[0]), float(off[worst]))
@@ -140,7 +147,7 @@ def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArr
         # Angles as lengths of arcs, whichever turn they are counted in.
         turn = 2 * np.pi * frame.radius
         gap[:, 1] = (gap[:, 1] - turn * np.round(gap[:, 1] / turn)) * one[:, 0] / frame.radius
-    return np.asarray(np.linalg.norm(gap, axis=1))
+    return row_norms(gap)
 
 
 def largest_misfit(

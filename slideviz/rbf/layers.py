@@ -29,7 +29,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.mesh.axis_frame import axis_basis
-from slideviz.mesh.model import FloatArray, IntArray, offsets_of, ranges
+from slideviz.mesh.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    offsets_of,
+    ranges,
+    row_dots,
+    row_norms,
+)
 from slideviz.mesh.topology import TINY, corner_vectors
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
@@ -179,7 +187,7 @@ class WallNodes:
         if dim == 3:
             one, two = self._edges
             along = start[two] - start[one]
-            along = along / np.einsum("ed,ed->e", along, along)[:, None]
+            along = along / row_dots(along, along)[:, None]
             spread = _outer(along, take(now, two) - take(now, one))
             ends = np.concatenate([one, two])
             each = EDGES / np.maximum(1, np.bincount(ends, minlength=count))[:, None]
@@ -239,7 +247,7 @@ class WallNodes:
         count = min(ALIKE, tree.n)
         heights = np.append(np.tile(wall.first, images), 0.0)
         height = np.full(len(targets), -1.0)
-        size = np.linalg.norm(np.ptp(closest.corners, axis=1), axis=1).max(initial=0.0)
+        size = row_norms(np.ptp(closest.corners, axis=1)).max(initial=0.0)
         reach = float(np.hypot(heights.max() + wall.thickness, CORNER * size))
 
         def find(part: slice) -> None:
@@ -252,7 +260,7 @@ class WallNodes:
 
         in_parts(find, len(targets))
         some = np.flatnonzero(height >= 0.0)
-        gap = np.linalg.norm(closest.query(targets[some]) - targets[some], axis=1)
+        gap = row_norms(closest.query(targets[some]) - targets[some])
         inside = gap < height[some] + wall.thickness
         some = some[inside]
         gap = gap[inside]
@@ -353,7 +361,7 @@ def _shared(parts: list[Reached]) -> list[Reached]:
     return list(zip(*split, strict=True))
 
 
-def _faded(gap: FloatArray, seen: np.ndarray, more: bool) -> FloatArray:
+def _faded(gap: FloatArray, seen: BoolArray, more: bool) -> FloatArray:
     """Return factors (m, c) that fall to 0 where the `NEAREST` nodes of those seen (m, c) end.
 
     So a node that enters or leaves them, or is one of several at one distance, changes nothing.
@@ -514,7 +522,7 @@ class LayerZone:
 
 
 def find_zone(
-    walls: WallNodes, nodes: IntArray, targets: FloatArray, slides: np.ndarray
+    walls: WallNodes, nodes: IntArray, targets: FloatArray, slides: BoolArray
 ) -> LayerZone:
     """Return the zone of walls among ``nodes`` (m,) at ``targets`` (m, d); ``slides`` (m,) bool."""
     hit, share, by_displacement, by_rotation = walls.near(targets)

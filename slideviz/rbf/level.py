@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, row_dots, row_norms
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import (
@@ -84,7 +84,7 @@ def newton(
     names, first, group = np.unique(nodes, return_index=True, return_inverse=True)
     favoured = factor[first]
     for turn in range(count):
-        squares = np.where(open_, np.einsum("pm,pm->p", rest, rest), 0.0)
+        squares = np.where(open_, row_dots(rest, rest), 0.0)
         error = np.sqrt(np.bincount(group, squares, len(names)))
         best = int(np.argmax(error * favoured))
         if error[best] <= 0 or (turn and error[best] < floor):
@@ -143,7 +143,7 @@ def pool(
     """
     eligible = np.count_nonzero(errors > settings.tolerance)
     if not eligible:
-        return 0, np.empty(0, np.int64)
+        return 0, NO_NODES
     worst = int(np.argmax(errors))
     if settings.selection == "one":
         return 1, np.array([worst])
@@ -166,7 +166,7 @@ def _double(
 
     An error is opposite when it is at more than 90° to that of ``worst``.
     """
-    lengths = np.linalg.norm(vectors, axis=1)
+    lengths = row_norms(vectors)
     cosine = vectors @ vectors[worst] / np.maximum(lengths * lengths[worst], 1e-300)
     # Errors along different axes are perpendicular but for rounding.
     opposite = np.where(cosine < -TIE, errors, -1.0)
@@ -233,14 +233,14 @@ class Candidates:
         """Return the left-hand side of each row, (r, m), for the interpolant ``sum_``."""
         rows = self.rows
         s = value(sum_.at(problem, rows.nodes[self.first]))[self.candidate]
-        return s if rows.directions is None else np.einsum("rd,rd->r", s, rows.directions)[:, None]
+        return s if rows.directions is None else row_dots(s, rows.directions)[:, None]
 
     def errors(self, residual: FloatArray) -> FloatArray:
         """Return the error of each candidate: the length of its residual (r, m), (c,)."""
-        squares = np.einsum("rm,rm->r", residual, residual)
+        squares = row_dots(residual, residual)
         return np.sqrt(np.add.reduceat(squares, self.first)) if len(squares) else squares
 
-    def has_row(self, which: np.ndarray) -> np.ndarray:
+    def has_row(self, which: BoolArray) -> BoolArray:
         """Return a mask (c,) of the candidates that have a row in the mask ``which`` (r,)."""
         found = np.zeros(len(self.first), bool)
         found[self.candidate[which]] = True
@@ -255,7 +255,7 @@ class GrowingFactor:
     """
 
     def __init__(self, width: int) -> None:
-        self.rows = self.turn = np.empty(0, np.int64)
+        self.rows = self.turn = NO_NODES
         self.lower = self._store = np.empty((0, 0))
         self.forward = np.empty((0, width))
         """(k, m): L^-1 b; shorter than L between `append` and `follow`."""
@@ -314,8 +314,8 @@ class GreedyLevel:
         self.singular = False
         self._basis = replace(problem.basis, kernel=PLAIN) if self._saddle else problem.basis
         self._terms = self._terms_of(candidates)
-        self.increment = Interpolant(np.empty(0, np.int64), np.empty((0, problem.dim)))
-        self.chosen: IntArray = np.empty(0, np.int64)
+        self.increment = Interpolant(NO_NODES, np.empty((0, problem.dim)))
+        self.chosen: IntArray = NO_NODES
         """(k,): the chosen rows, in the order of their choice."""
         self.excluded = np.zeros(len(candidates.rows.nodes), bool)
         """(r,): rows that cannot be chosen any more: they are, or would make the system

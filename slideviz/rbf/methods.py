@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, largest_coordinate, row_norms
 from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
@@ -189,7 +189,7 @@ def _slide(problem: Problem, timer: PhaseTimer, fit: Fit, level: IntArray) -> Ar
 
 def largest_norm(vectors: Array) -> Any:
     """Return the largest length of rows (..., n, d): a float, or (...,) of several designs."""
-    size = np.linalg.norm(value(vectors), axis=-1).max(axis=-1, initial=0.0)
+    size = row_norms(value(vectors)).max(axis=-1, initial=0.0)
     return float(size) if size.ndim == 0 else size
 
 
@@ -235,7 +235,7 @@ def _finish(
     if problem.frozen is not None:
         return solution
     # Without the nodes that the pivot guard left out.
-    kept = [np.empty(0, np.int64), *(level[:, 0] for level in fit.stages[-1])]
+    kept = [NO_NODES, *(level[:, 0] for level in fit.stages[-1])]
     control = fit.interpolant.nodes[np.isin(fit.interpolant.nodes, np.concatenate(kept))]
     return replace(
         solution,
@@ -253,7 +253,7 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     ``nodes`` and ``errors`` (b,), (b, d): boundary nodes with known displacement, and the errors
     there, in the frame.
     """
-    largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
+    largest = float(row_norms(errors).max(initial=0.0))
     if largest <= NEGLIGIBLE * problem.basis.radius:
         return None
     radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest

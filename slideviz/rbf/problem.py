@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
 from slideviz.rbf.operations import columns, radial_sum, terms
@@ -137,7 +137,7 @@ class Problem:
         return value(self.features)[:, nodes]
 
     @cached_property
-    def reach(self) -> tuple[IntArray, np.ndarray]:
+    def reach(self) -> tuple[IntArray, BoolArray]:
         """Return labels (n,) of boundary nodes that supports connect, and which labels move, (k,).
 
         All of them where no node is displaced, and where a polynomial moves every node.
@@ -165,7 +165,7 @@ class Problem:
         settings = self.reduction
         before = self.before
         if settings is None or before is None or settings.multilevel:
-            return np.empty(0, np.int64)
+            return NO_NODES
         full = settings.max_nodes is not None and len(before.control) >= settings.max_nodes
         return before.control[:0] if full else before.control
 
@@ -221,7 +221,7 @@ class Solution:
     condition: float  # estimated condition number of the final system
     history: tuple[Cycle, ...] = ()  # convergence of the selection; empty without data reduction
     warnings: tuple[str, ...] = ()  # what the user should know
-    control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
+    control: IntArray = made_by(default_factory=lambda: NO_NODES)
     """(c,): the nodes in the final system; empty where a method has no such system."""
     carried: CarriedError | None = None
     """The errors that the interpolants of all steps so far left at boundary nodes; None without

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.fans import Fans, components
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_dots, row_norms
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
@@ -47,7 +47,7 @@ def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray)
     """
     m, count, d = corners.shape
     size = np.ptp(corners, axis=1).max(axis=1)
-    near = CLOSE * np.linalg.norm(x - closest, axis=1) + ROUNDING * size
+    near = CLOSE * row_norms(x - closest) + ROUNDING * size
     out = np.zeros((m, d, d))
     done = np.zeros(m, bool)
     if count == 3:
@@ -55,12 +55,12 @@ def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray)
     sides = [(0, 1)] if count == 2 else [(0, 1), (1, 2), (2, 0)]
     for one, two in sides:
         along = corners[:, two] - corners[:, one]
-        length = np.linalg.norm(along, axis=1)
+        length = row_norms(along)
         use = ~done & (length > 0)
         t = along / np.where(length > 0, length, 1.0)[:, None]
-        reach = np.einsum("md,md->m", x - corners[:, one], t)
+        reach = row_dots(x - corners[:, one], t)
         foot = corners[:, one] + reach[:, None] * t
-        use &= np.linalg.norm(foot - closest, axis=1) <= near
+        use &= row_norms(foot - closest) <= near
         out[use] = t[use, :, None] * t[use, None, :]
         done |= use
     return out
@@ -68,7 +68,7 @@ def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray)
 
 def _facets(
     corners: FloatArray, x: FloatArray, closest: FloatArray, near: FloatArray
-) -> tuple[FloatArray, np.ndarray]:
+) -> tuple[FloatArray, BoolArray]:
     """Return projections on planes of triangles (m, 3, 3), and a mask (m,) where these apply.
 
     They apply where the foot on the plane is within ``near`` (m,) of the closest point; elsewhere
@@ -77,12 +77,12 @@ def _facets(
     one = corners[:, 1] - corners[:, 0]
     two = corners[:, 2] - corners[:, 0]
     normal = np.cross(one, two)
-    area = np.linalg.norm(normal, axis=1)
+    area = row_norms(normal)
     flat = area > 0
     normal /= np.where(flat, area, 1.0)[:, None]
-    height = np.einsum("md,md->m", x - corners[:, 0], normal)
+    height = row_dots(x - corners[:, 0], normal)
     foot = x - height[:, None] * normal
-    on = flat & (np.linalg.norm(foot - closest, axis=1) <= near)
+    on = flat & (row_norms(foot - closest) <= near)
     out = np.zeros((len(x), 3, 3))
     out[on] = np.eye(3) - normal[on, :, None] * normal[on, None, :]
     return out, on
@@ -93,7 +93,7 @@ Place = Callable[[IntArray], FloatArray]
 
 
 def surface_rim(
-    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place
+    boundary: Boundary, member: BoolArray, moving: BoolArray, place: Place
 ) -> FloatArray:
     """Return the ends (e, d - 1, d) of sides where moving boundaries end a surface, in 2D a curve.
 
@@ -228,7 +228,7 @@ def surface_labels(
     """
     normal = unit(vectors)
     a, b = boundary.joints.T
-    along = np.einsum("jd,jd->j", normal[a], normal[b])
+    along = row_dots(normal[a], normal[b])
     role = _role_numbers(boundary, roles)
     same = boundary.marker[a] == boundary.marker[b]
     smooth = np.where(
@@ -240,7 +240,7 @@ def surface_labels(
     b = b[smooth]
     if across is not None:
         one, two = across.T
-        along = np.einsum("jd,jd->j", normal[one], normal[two])
+        along = row_dots(normal[one], normal[two])
         smooth = (role[one] == role[two]) & (along > np.cos(np.radians(angle_deg)))
         a = np.concatenate([a, one[smooth]])
         b = np.concatenate([b, two[smooth]])

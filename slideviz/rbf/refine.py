@@ -20,7 +20,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import NO_NODES, FloatArray, row_dots
 from slideviz.rbf.double_double import DoubleFactor, Residuals, supports
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
@@ -106,7 +106,7 @@ class System:
         along = weights if normals is None else normals * weights
         met = evaluate(self.basis, features, features, along)
         if normals is not None:
-            met = np.einsum("rd,rd->r", met, normals)[:, None]
+            met = row_dots(met, normals)[:, None]
         with enough_threads(2.0 * len(right) ** 2):
             return self._field(self._full_factor.solve(right - met))
 
@@ -275,7 +275,7 @@ def with_dropped_rows(
             except np.linalg.LinAlgError:
                 shift *= 10.0
     lower[k:, k:] = corner
-    return Factor(lower, np.concatenate([kept, dropped]), np.empty(0, np.int64))
+    return Factor(lower, np.concatenate([kept, dropped]), NO_NODES)
 
 
 def check_points(features: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
+from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate, row_dots, row_norms
 from slideviz.mesh.topology import TINY, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
@@ -109,7 +109,7 @@ class CurvedWall:
         """Return the feet (k, d) of nodes at (k, d) on the planes of the facets closest to them."""
         closest, which = self._surface.nearest(positions)
         normals = unit(simplex_vectors(self._surface.simplices(which)))
-        return positions - np.einsum("kd,kd->k", positions - closest, normals)[:, None] * normals
+        return positions - row_dots(positions - closest, normals)[:, None] * normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +235,7 @@ class Rims:
         positions = self.frame.coords(points)
         corner = self.walls_of[wall.rows] > 1
         there = np.where(corner[:, None], wall.across(positions), wall.closest(positions)[0])
-        return np.asarray(np.linalg.norm(self.frame.points(there) - points, axis=1))
+        return row_norms(self.frame.points(there) - points)
 
     @property
     def least(self) -> float:
@@ -364,7 +364,7 @@ def bulge_of(coords: FloatArray, facets: IntArray) -> float:
     at_nodes = unit(normals)
     first = at_nodes[np.searchsorted(nodes, one)]
     second = at_nodes[np.searchsorted(nodes, two)]
-    off = np.einsum("ed,ed->e", coords[two] - coords[one], second - first)
+    off = row_dots(coords[two] - coords[one], second - first)
     return BULGE * float(np.abs(off).max(initial=0.0))
 
 
@@ -377,7 +377,7 @@ def side_weights(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatA
     the mean of both its divisions into triangles. Edges occur once for each triangle.
     """
     if facets.shape[1] == 2:
-        length = np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1)
+        length = row_norms(points[facets[:, 1]] - points[facets[:, 0]])
         return facets, 1.0 / np.maximum(length, TINY)
     quads = facets[:, 2] != facets[:, 3]
     halves = [np.roll(facets[quads], -k, axis=1)[:, :3] for k in range(4)]
@@ -389,8 +389,8 @@ def side_weights(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatA
         tip, one, two = np.roll(triangles, -k, axis=1).T
         a = points[one] - points[tip]
         b = points[two] - points[tip]
-        sine = np.maximum(np.linalg.norm(np.cross(a, b), axis=1), TINY)
-        cotangent = np.einsum("td,td->t", a, b) / sine
+        sine = np.maximum(row_norms(np.cross(a, b)), TINY)
+        cotangent = row_dots(a, b) / sine
         edges.append(np.stack([one, two], axis=1))
         weights.append(parts * np.clip(cotangent, 0.0, STEEPEST))
     return np.concatenate(edges), np.concatenate(weights)

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
 from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
 from slideviz.system.jit_cache import njit
 
@@ -110,7 +109,7 @@ def saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, In
 def independent(terms: FloatArray) -> IntArray:
     """Return the columns of the polynomial's terms (n, q) that do not depend on others, (k,)."""
     if not len(terms):
-        return np.empty(0, np.int64)
+        return NO_NODES
     scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
     r, order = qr(terms / scale, pivoting=True, mode="r")
     size = np.abs(np.diag(r))
@@ -178,7 +177,7 @@ class Factor:
         return out
 
 
-NOTHING = Factor(np.empty((0, 0)), np.empty(0, np.int64), np.empty(0, np.int64))
+NOTHING = Factor(np.empty((0, 0)), NO_NODES, NO_NODES)
 """The factor of a matrix without rows."""
 
 
@@ -301,7 +300,7 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
     return Factor(np.asfortranarray(lower[np.ix_(stay, stay)]), kept, left_out)
 
 
-def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
+def _cholesky(block: FloatArray, dropped: BoolArray) -> FloatArray:
     """Return a diagonal block's factor, rows of the identity where the guard sets ``dropped``."""
     try:
         head = np.asarray(np.linalg.cholesky(block), np.float64)

@@ -24,7 +24,7 @@ from scipy.sparse.linalg import splu
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import CaseError
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, row_dots
 
 NOSE = (0.05, 0.04)
 TAIL = (0.07, 0.012)
@@ -368,7 +368,7 @@ def _stretch(edges: FloatArray, ratio: FloatArray) -> FloatArray:
     """Return the functional's numerator (k,) for edges (k, 4): rho |a|^2 + |b|^2 / rho."""
     a = edges[:, :2]
     b = edges[:, 2:]
-    return ratio * np.einsum("ki,ki->k", a, a) + np.einsum("ki,ki->k", b, b) / ratio
+    return ratio * row_dots(a, a) + row_dots(b, b) / ratio
 
 
 def _newton_step(xyz: FloatArray, ratio: FloatArray, unknown: IntArray, n: int) -> FloatArray:
@@ -381,7 +381,7 @@ def _newton_step(xyz: FloatArray, ratio: FloatArray, unknown: IntArray, n: int) 
     num = _stretch(edges, ratio)
     num1 = 2 * scale * edges
     det1 = edges @ _CROSS
-    det = np.einsum("ki,ki->k", edges, det1) / 2
+    det = row_dots(edges, det1) / 2
     gradient = num1 / (2 * det)[:, None] - det1 * (num / (2 * det**2))[:, None]
     mixed = num1[:, :, None] * det1[:, None, :]
     hessian = (

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from slideviz.case.section_shapes import Size
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, row_norms
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Shape, round_middle
 
@@ -256,7 +256,7 @@ def patch_of(section: Section, points: FloatArray) -> Patch:
     places = np.column_stack([angle, along])
     middle = np.array([np.mean(low), np.mean(high)])
     flat = (places - middle) * (shape.girth(section, float(middle[1])), 1.0)
-    far = np.linalg.norm(flat, axis=1)
+    far = row_norms(flat)
     nearest = int(np.argmin(far))
     if far[nearest] > _HOLE * np.linalg.norm(np.ptp(flat, axis=0)):
         middle = places[nearest]

@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, offsets_of
+from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
@@ -109,7 +109,7 @@ class Cutter:
         The sides are oriented outwards of cells that are not inverted.
         """
         sides = [np.empty((0, 4), np.int64)]
-        owners = [np.empty(0, np.int64)]
+        owners = [NO_NODES]
         for block in self._blocks:
             mine = np.isin(block.ids, ids)
             row = ELEMENTS[block.vtk]
@@ -165,7 +165,7 @@ class Cutter:
         width = max((part[1].shape[1] for part in parts), default=0)
         none = np.empty((0, width), np.int64)
         return (
-            np.concatenate([np.empty(0, np.int64), *(part[0] for part in parts)]),
+            np.concatenate([NO_NODES, *(part[0] for part in parts)]),
             np.concatenate([none, *(_wide(part[1], width) for part in parts)]),
             np.concatenate([none, *(_wide(part[2], width) for part in parts)]),
         )
@@ -173,7 +173,7 @@ class Cutter:
 
 def crossed_cells(
     mesh: Mesh, section: Section, matrices: Iterable[FloatArray], near: float = 0.0
-) -> np.ndarray:
+) -> BoolArray:
     """Return a mask (m,) of the cells with nodes on both sides of a section, or on it.
 
     Cells near enough to touch it count, too, where it goes through nodes near it (`Shape.near`).
@@ -199,7 +199,7 @@ def transformed(points: FloatArray, matrix: FloatArray) -> FloatArray:
     return (padded(points) @ matrix[:3, :3].T + matrix[:3, 3])[:, : points.shape[1]]
 
 
-def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
+def _patterns(nodes: IntArray, negative: BoolArray) -> np.ndarray:
     """Return (m,) for cells (m, k) a number with bit k set where node k is negative; 0 if all are.
 
     ``negative`` is a mask (n,) of nodes.
@@ -227,7 +227,7 @@ def _wide(table: IntArray, width: int) -> IntArray:
     return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=-1)
 
 
-def _single(facets: IntArray, n_points: int) -> np.ndarray:
+def _single(facets: IntArray, n_points: int) -> BoolArray:
     """Return a mask (f,) of the facets (f, 4) whose nodes no other facet has."""
     nodes = np.sort(facets, axis=1)
     keys = nodes[:, 0] * n_points + nodes[:, 1], nodes[:, 2] * n_points + nodes[:, 3]
@@ -239,7 +239,7 @@ def _single(facets: IntArray, n_points: int) -> np.ndarray:
     return single
 
 
-def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
+def _distinct(low: IntArray, high: IntArray) -> BoolArray:
     """Return a mask (q, c) of the corners that differ from the one before in their polygon.
 
     ``low`` and ``high`` (q, c) are the ends of their edges, -1 where a polygon has no more corners.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, row_dots, row_norms
 
 if TYPE_CHECKING:
     from slideviz.sections.line import Box
@@ -46,7 +46,7 @@ def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) 
         if part == "line":
             if _distance(points, at) <= reach / 2.0:
                 return part
-        elif len(points) and np.linalg.norm(points - at, axis=1).min() <= reach:
+        elif len(points) and row_norms(points - at).min() <= reach:
             return part
     return None
 
@@ -80,6 +80,6 @@ def _distance(line: FloatArray, at: FloatArray) -> float:
     """Return the distance of a point (2,) from a polyline (k, 2)."""
     start = line[:-1]
     way = np.diff(line, axis=0)
-    length2 = np.maximum(np.einsum("ij,ij->i", way, way), 1e-30)
-    share = np.clip(np.einsum("ij,ij->i", at - start, way) / length2, 0.0, 1.0)
-    return float(np.linalg.norm(start + share[:, None] * way - at, axis=1).min())
+    length2 = np.maximum(row_dots(way, way), 1e-30)
+    share = np.clip(row_dots(at - start, way) / length2, 0.0, 1.0)
+    return float(row_norms(start + share[:, None] * way - at).min())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, offsets_of, ranges
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
 
 ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
@@ -18,7 +18,7 @@ class CellsInRange:
     """The cells of a mesh within a threshold; instances with the same cells are equal."""
 
     key: bytes  # the mask, packed to bits, for comparing and hashing
-    mask: np.ndarray = field(compare=False, repr=False)  # (m,): whether each cell is within
+    mask: BoolArray = field(compare=False, repr=False)  # (m,): whether each cell is within
     words: str = field(compare=False)  # the range in words
 
     @classmethod
@@ -99,7 +99,7 @@ class Polygons:
         cells = np.repeat(self.cells, self.sizes)[lines]
         return Polygons(self.points, offsets_of(np.full(len(lines), 2)), corners, cells)
 
-    def with_last(self, chosen: np.ndarray) -> Polygons:
+    def with_last(self, chosen: BoolArray) -> Polygons:
         """Return all polygons, those of the mask ``chosen`` (q,) last: they are drawn on top."""
         return self.take(np.argsort(chosen, kind="stable")) if chosen.any() else self
 

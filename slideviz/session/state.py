@@ -260,7 +260,7 @@ def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = Non
     return values
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit
 def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[no-untyped-def]
     """Write to ``found`` (k,) the mean distances of cells' nodes between two states (n, d)."""
     for i in range(len(cells)):

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import BoolArray, FloatArray, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.draw import (
@@ -198,12 +198,12 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
     return draw
 
 
-def _inverted(line: FacetLine) -> np.ndarray:
+def _inverted(line: FacetLine) -> BoolArray:
     measured = line.result.quality
     return np.asarray(measured.status[measured.counted] == INVERTED)
 
 
-def _values(line: FacetLine) -> np.ndarray:
+def _values(line: FacetLine) -> FloatArray:
     measured = line.result.quality
     return measured.values[measured.counted]
 
