@@ -94,7 +94,7 @@ def curve_at(
             strict=True,
         )
     )
-    return value, np.asarray(sum(weights))
+    return value, sum(weights)
 
 
 class BladeSections:

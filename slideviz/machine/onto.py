@@ -210,7 +210,7 @@ class _Guide:
             maxiter=MOST,
             M=LinearOperator(shape, lambda r: factor.solve(r.reshape(moved.shape)).ravel()),
         )
-        return np.asarray(change).reshape(moved.shape)
+        return change.reshape(moved.shape)
 
 
 def _fit(points: FloatArray, guide: _Guide) -> FloatArray:

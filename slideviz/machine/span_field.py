@@ -396,7 +396,7 @@ class SpanCurves:
         beyond = m_prime - inside
         if order == 0:
             value = value + beyond * spline.ev(s, inside, dy=1)
-        return np.asarray(np.where(beyond != 0.0, 0.0, value) if order > 1 else value)
+        return np.where(beyond != 0.0, 0.0, value) if order > 1 else value
 
     def _seeds(self, start: FloatArray, spans: FloatArray) -> FloatArray:
         """Return z and r (k, 2) at spans (k,), on a line through ``start`` normal to the curves."""

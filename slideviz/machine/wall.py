@@ -170,4 +170,4 @@ def _inside(polygon: FloatArray, points: FloatArray) -> BoolArray:
     x1, y1 = np.roll(polygon, -1, axis=0).T
     meets = (y0 > y) != (y1 > y)
     at = x0 + (y - y0) * (x1 - x0) / np.where(y1 != y0, y1 - y0, 1.0)
-    return np.asarray((meets & (x < at)).sum(axis=1) % 2 == 1)
+    return (meets & (x < at)).sum(axis=1) % 2 == 1

@@ -94,7 +94,7 @@ class Wheel:
         if copy + 1 == many and not self.is_closed:
             numbers[last] = many * count + np.arange(len(last))
         numbers[axis] = self.n_points - len(axis) + np.arange(len(axis))
-        return np.asarray(numbers[nodes])
+        return numbers[nodes]
 
     def turned(self, copy: int, nodes: IntArray) -> FloatArray:
         """Return the points (k, d) of the nodes (k,) of a copy."""
@@ -111,7 +111,7 @@ class Wheel:
         local[:, 0] = cos * x - sin * y
         local[:, 1] = sin * x + cos * y
         back = along(axis_basis(pair.axis).T, local) + np.asarray(pair.origin)
-        return np.asarray(back[:, : points.shape[1]])
+        return back[:, : points.shape[1]]
 
     def points(self, i: int, j: int) -> FloatArray:
         """Return the points i to j - 1 of the wheel, (j - i, d)."""

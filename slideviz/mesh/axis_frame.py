@@ -41,7 +41,7 @@ def _basis_of(*axis: float) -> FloatArray:
 
 def ordered_sum(values: NDArray) -> NDArray:
     """Return the sum (d,) of rows (n, d), the same bits in whatever order they are given."""
-    return np.asarray(np.sort(values, axis=0).sum(axis=0))
+    return np.sort(values, axis=0).sum(axis=0)
 
 
 def along(rows: FloatArray, points: FloatArray) -> FloatArray:

@@ -53,7 +53,7 @@ def _representatives(points: FloatArray, first: BoolArray, cubes: int) -> IntArr
     away = row_norms(points - middle[cube])
     order = np.lexsort((away, ~first, cube))
     chosen = order[np.concatenate([[0], np.cumsum(count)[:-1]])]
-    return np.asarray(chosen[cube])
+    return chosen[cube]
 
 
 def _merge_nodes(surface: Surface, representatives: IntArray) -> Surface:

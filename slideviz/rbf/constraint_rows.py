@@ -164,7 +164,7 @@ def _orthonormalised(
 
 
 def _above(size: FloatArray, least: float) -> BoolArray:
-    return np.asarray(size[:, 0] > least)
+    return size[:, 0] > least
 
 
 def merge(problem: Problem, nodes: IntArray, values: Array) -> tuple[IntArray, Array]:

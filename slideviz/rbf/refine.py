@@ -221,7 +221,7 @@ class System:
         normals = self.place[1]
         along = [weights] if normals is None else [weights * n[:, None] for n in normals.T]
         found = [np.abs(self._checks @ each).max(axis=0, initial=0.0) for each in along]
-        return np.asarray(np.max(found, axis=0))
+        return np.max(found, axis=0)
 
     @cached_property
     def _checks(self) -> FloatArray:

@@ -65,7 +65,7 @@ def _regular(system: FloatArray, right: FloatArray) -> FloatArray | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", LinAlgWarning)
         try:
-            return np.asarray(solve(system, right, assume_a="sym", check_finite=False))
+            return solve(system, right, assume_a="sym", check_finite=False)
         except (LinAlgError, LinAlgWarning):
             return None
 
@@ -113,7 +113,7 @@ def independent(terms: FloatArray) -> IntArray:
     scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
     r, order = qr(terms / scale, pivoting=True, mode="r")
     size = np.abs(np.diag(r))
-    return np.asarray(np.sort(order[: len(size)][size > RANK * size.max(initial=0.0)]))
+    return np.sort(order[: len(size)][size > RANK * size.max(initial=0.0)])
 
 
 def polynomial(terms: FloatArray, forward: FloatArray, right: FloatArray) -> FloatArray:

@@ -176,7 +176,7 @@ class AboutAxis(Shape):
         high = np.array([0.0, 0.0, 1.0])
         outwards = np.cos(lean) * side - np.sin(lean) * high
         along = np.sin(lean) * side + np.cos(lean) * high
-        return np.asarray(np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis)
+        return np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the camera's axes (3, 3) to look from outside at the middle of points (n, 3).
@@ -233,7 +233,7 @@ class Quadric(AboutAxis):
             roots = np.where(
                 stable, -constant / (slope + sign * root), (sign * root - slope) / square
             )
-        return np.asarray(np.clip(np.nan_to_num(roots), 0.0, 1.0))
+        return np.clip(np.nan_to_num(roots), 0.0, 1.0)
 
 
 def axis_shape(section: Section) -> AboutAxis:

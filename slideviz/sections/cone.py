@@ -68,7 +68,7 @@ class Cone(Quadric):
         """Return the half angles (n,) in degrees of the cones through points."""
         radius = np.hypot(section.along(points, 0), section.along(points, 1))
         angle = np.degrees(np.arctan2(radius, section.along(points, 2)))
-        return np.asarray(np.clip(angle, *_ENDS))
+        return np.clip(angle, *_ENDS)
 
     def first(self, section: Section, points: FloatArray) -> Section:
         """Return a cone through the middle of points.
@@ -159,7 +159,7 @@ class Cone(Quadric):
         lean = np.radians(size)
         radius = length * np.sin(lean)
         local = [radius * np.cos(turn), radius * np.sin(turn), length * np.cos(lean)]
-        return np.asarray(np.asarray(section.origin) + np.column_stack(local) @ section.basis)
+        return np.asarray(section.origin) + np.column_stack(local) @ section.basis
 
     def lean(self, section: Section) -> float:
         """Return the half angle, in radians."""

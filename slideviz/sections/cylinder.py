@@ -95,14 +95,14 @@ class Cylinder(Quadric):
     directed = False
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        return np.asarray(np.hypot(along(0), along(1)) - section.radius)
+        return np.hypot(along(0), along(1)) - section.radius
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
         """Return w = (1, 1, 0) and the squared radius."""
         return np.array([1.0, 1.0, 0.0]), section.radius**2
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        return np.asarray(np.hypot(section.along(points, 0), section.along(points, 1)))
+        return np.hypot(section.along(points, 0), section.along(points, 1))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
         """Return how far the axis moves perpendicular to itself; see `Shape.keeps`."""
@@ -160,7 +160,7 @@ class Cylinder(Quadric):
         angle = places[:, 0]
         along = places[:, 1]
         local = np.column_stack([size * np.cos(angle), size * np.sin(angle), along])
-        return np.asarray(np.asarray(section.origin) + local @ section.basis)
+        return np.asarray(section.origin) + local @ section.basis
 
     def lean(self, section: Section) -> float:
         return 0.0

@@ -93,7 +93,7 @@ class Line(InPlane):
         if not flat > 0:
             return origin[:2]
         # A plane oblique to z meets z = 0 beside the projection of its point.
-        return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
+        return origin[:2] + origin[2] * normal[2] / flat * normal[:2]
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
         """Return the handle of a line: its ends, the point about which it turns, and the line."""
@@ -117,7 +117,7 @@ class Line(InPlane):
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
         way = along(section)
         assert way is not None
-        return np.asarray(corners @ way)
+        return corners @ way
 
     def position_label(self, section: Section) -> Label:
         way = along(section)
@@ -131,9 +131,9 @@ class Line(InPlane):
         """
         middle = within(self.middle(section)[None], box)
         if len(middle):
-            return np.asarray(middle[0])
+            return middle[0]
         ends = line_ends(section, box)
-        return self.middle(section) if ends is None else np.asarray(ends.mean(axis=0))
+        return self.middle(section) if ends is None else ends.mean(axis=0)
 
 
 LINE = Line()

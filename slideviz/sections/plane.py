@@ -73,7 +73,7 @@ class Plane(Shape):
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
         before, after = level
-        return np.asarray(before / (before - after))
+        return before / (before - after)
 
     def position(self, section: Section) -> float:
         """Return the signed distance of the plane from the origin, along its normal."""

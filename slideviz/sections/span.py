@@ -58,7 +58,7 @@ class SpanChannel:
     def level(self, coords: FloatArray, span: float) -> FloatArray:
         """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
         (hub, _, _), (shroud, _, _) = self.field.distances(coords)
-        return np.asarray(((1.0 - span) * hub - span * shroud) * self.scale)
+        return ((1.0 - span) * hub - span * shroud) * self.scale
 
     def outside(self, coords: FloatArray) -> FloatArray:
         """Return numbers (n,): 0 between the walls, and more beyond them or their rims."""
@@ -139,7 +139,7 @@ class SpanWalls:
         """Return values (n, ...) of rows (n, 3), each of the zone ``which`` (n,)."""
         parts = [value(k, rows[which == k]) for k in range(len(self.channels))]
         order = np.argsort(np.argsort(which, kind="stable"), kind="stable")
-        return np.asarray(np.concatenate(parts)[order])
+        return np.concatenate(parts)[order]
 
     def _branch(self, k: int, coords: FloatArray) -> FloatArray:
         """Return meridional coordinates (n, 3), theta within half a turn of the walls' middle."""

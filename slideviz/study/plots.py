@@ -200,7 +200,7 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
 def _inverted(line: FacetLine) -> BoolArray:
     measured = line.result.quality
-    return np.asarray(measured.status[measured.counted] == INVERTED)
+    return measured.status[measured.counted] == INVERTED
 
 
 def _values(line: FacetLine) -> FloatArray:
