@@ -1,6 +1,6 @@
 """The table of the shapes that a section can have: names, numbers and words of each.
 
-Their geometry is in `slideviz.sections.model.SHAPES`, by the same names.
+Their geometry is in the classes of `slideviz.sections.model`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Words:
 class Size:
     """A number of a shape besides its point and direction, such as a radius; always above 0."""
 
-    field: str  # its name in `slideviz.sections.model.Section` and in reports
+    field: str  # its name in `slideviz.sections.shape.Section` and in reports
     label: str
     word: str  # `label`, `word`: what it is called in a form, and in a sentence
     unit: str  # its unit in words, for a tip

@@ -191,7 +191,7 @@ def _check_usage(arguments: Namespace) -> None:
                 name = "3d" if option == "in_space" else option
                 arguments.wrong_usage(f"--meridional shows no section, so leave out --{name}")
         return
-    if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":
+    if arguments.unrolled and arguments.asked.section.terms.flat != "unrolled":
         able = (f"--{name}" for name, row in SECTION_SHAPES.items() if row.flat == "unrolled")
         arguments.wrong_usage(f"--unrolled is for a {' or '.join(able)}; a plane is flat already")
     if arguments.between and arguments.asked.section.kind != "span":
@@ -247,7 +247,7 @@ def _between(walls: SpanWalls | None) -> dict[str, Any]:
 
 
 def _as_json(chosen: Section) -> dict[str, Any]:
-    size = chosen.shape.terms.size
+    size = chosen.terms.size
     sizes = {} if size is None else {size.field: chosen.size}
     return {
         "kind": chosen.kind,

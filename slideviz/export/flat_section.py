@@ -25,7 +25,7 @@ from slideviz.plots.section_picture import (
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange
-from slideviz.sections.span import find_walls
+from slideviz.sections.span import ConstantSpan, find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.passages import find_periods, matrices, period_of, show_passages
@@ -194,7 +194,7 @@ def section(
         base = reference or mesh
         walls = find_walls(base, case, find_periods(base, case), between)
         of = walls.field
-        at = Section("span", of.origin, of.axis, span=span or 0.0, walls=walls)
+        at = ConstantSpan("span", of.origin, of.axis, span=span or 0.0, walls=walls)
     if color_map not in COLOR_MAPS:
         raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")
     measured = quality(mesh, reference=reference) if rated is None else rated
@@ -208,7 +208,7 @@ def section(
     around = surroundings(cutter, mesh.points, matrices)
     shown = SectionInRun(pieces, painted, around, note=note)
     if not shown.drawn:
-        why = at.shape.miss(at, mesh.points[mesh.cells.nodes] if outer is None else outer)
+        why = at.miss(mesh.points[mesh.cells.nodes] if outer is None else outer)
         raise CaseError(f"{mesh.name}: the {at.describe(mesh.dim)} {why}")
     if color_range:
         shown = replace(shown, paint=painted.within(*color_range))

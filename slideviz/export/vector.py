@@ -27,7 +27,7 @@ from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
 from slideviz.scene.stage import STRIP
 from slideviz.sections.cut import Cutter
-from slideviz.sections.line import box_around, trace
+from slideviz.sections.line import box_around
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES, WALL_VALUES
@@ -175,7 +175,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
             "linewidths": _CUT * pixel_pt,
             "zorder": order,
         }
-        axes.add_collection(LineCollection(trace(section, box), **line), autolim=False)
+        axes.add_collection(LineCollection(section.in_plane.trace(box), **line), autolim=False)
     if "undeformed" in view.drawn:
         parts = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
         style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * pixel_pt}

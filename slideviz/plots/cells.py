@@ -18,7 +18,7 @@ from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
 from slideviz.sections.cut import Cutter, transformed
-from slideviz.sections.line import Box, trace
+from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 
@@ -174,7 +174,7 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
         }
         draw_cells(axes, seen, None, **look, zorder=0).set_rasterized(many)
     line = LineCollection(
-        trace(section, box), colors=PAPER.text, linewidths=_SECTION_LINE, zorder=3
+        section.in_plane.trace(box), colors=PAPER.text, linewidths=_SECTION_LINE, zorder=3
     )
     axes.add_collection(line, autolim=False)
 

@@ -52,7 +52,7 @@ def curve_of(lines: Polygons, section: Section, paint: Paint) -> Curve:
     ``lines``: the cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
     """
     corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
-    ends = np.sort(section.in_plane.positions(section, corners), axis=1)
+    ends = np.sort(section.in_plane.positions_along(corners), axis=1)
     order = np.lexsort(ends.T)
     cells = lines.cells[order]
     return Curve(ends[order], paint.values[cells], paint.inverted[cells], cells)
@@ -60,7 +60,7 @@ def curve_of(lines: Polygons, section: Section, paint: Paint) -> Curve:
 
 def labels_of(section: Section, paint: Paint) -> tuple[str, str]:
     """Return the labels of both axes of curves: the positions along a section, and the values."""
-    return section.in_plane.position_label(section).full, QUANTITIES[paint.label].axis
+    return section.in_plane.position_label().full, QUANTITIES[paint.label].axis
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,7 +63,7 @@ def camera(piece: Polygons, section: Section) -> FloatArray:
     The camera is somewhat aside of the straight view, which is along the plane's normal, or from
     the middle of the piece to the axis.
     """
-    side, up, straight = section.shape.aslant(section, piece.points)
+    side, up, straight = section.aslant(piece.points)
     eye = straight + _ASIDE * side + _ABOVE * up
     eye /= np.linalg.norm(eye)
     right = np.cross(up, eye)
@@ -92,8 +92,7 @@ def laid_flat(
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
         # A 2D mesh, or a plane at z = 0.
         return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
-    shape = section.shape
-    middle = shape.middle_angle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
+    middle = section.middle_angle(pieces[min(pieces, key=abs)]) if beside is None else beside
     middles: dict[int, float | None] = {}
     laid: dict[int, Polygons] = {}
     for numbers in (
@@ -103,10 +102,10 @@ def laid_flat(
         # Each passage is unrolled next to the one before, from the mesh itself outwards.
         near = middles[min(laid)] if laid else middle
         for number in numbers:
-            laid[number] = shape.flatten(section, pieces[number], near, middle)
-            near = middles[number] = shape.middle_angle(section, pieces[number], near)
+            laid[number] = section.flatten(pieces[number], near, middle)
+            near = middles[number] = section.middle_angle(pieces[number], near)
     flat = joined([laid[number] for number in sorted(laid)])
-    return flat.by_depth(), shape.flat_labels(section)
+    return flat.by_depth(), section.flat_labels()
 
 
 def arrangement(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
@@ -390,7 +389,7 @@ def _laid_beside(
             continue
         flat, labels = laid_flat(one.drawn, section, style.in_space, near)
         if near is None:
-            near = section.shape.middle_angle(section, one.drawn[min(one.drawn, key=abs)])
+            near = section.middle_angle(one.drawn[min(one.drawn, key=abs)])
         if not section.whole_cells or not flat.points[:, 2].any():
             # All is in one plane, where folded cells overlap others: draw them last.
             flat = flat.with_last(one.paint.inverted[flat.cells])

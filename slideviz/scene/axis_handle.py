@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, Quadric, axis_shape, patch_of
+from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, Quadric, axis_section
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
@@ -29,7 +29,7 @@ relative to the latter."""
 
 def patch_in(section: Section, mesh: Mesh, cuts: Cuts) -> Patch:
     """Return the patch of a section that cuts a mesh, or the patch nearest to the mesh."""
-    return patch_of(section, points_near(section, mesh, cuts))
+    return axis_section(section).patch(points_near(section, mesh, cuts))
 
 
 def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
@@ -43,8 +43,8 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
 
     A patch all around the axis has no sides.
     """
-    shape = axis_shape(section)
-    girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
+    shape = axis_section(section)
+    girth = shape.girth((patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
     margin = _MARGIN * float(np.hypot(*size))
     low = patch.along[0] - margin
@@ -60,7 +60,7 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     along = np.linspace(low, high, 2 if isinstance(shape, Quadric) else _SIDE)
     sides = [np.column_stack([np.full(len(along), at), along]) for at in (first, last)]
     sides = [] if closed else sides
-    return [shape.surface(section, line, section.size) for line in (*arcs, *sides)]
+    return [shape.surface(line, section.size) for line in (*arcs, *sides)]
 
 
 def pixel_and_slope(
@@ -71,11 +71,11 @@ def pixel_and_slope(
     Then whether it is steep: nearly along the line of sight, so that the place would hardly move on
     the screen. The derivative points upwards then, as a replacement.
     """
-    shape = axis_shape(section)
-    lever = axis_shape(section).lever(section, place[1])
+    shape = axis_section(section)
+    lever = shape.lever(place[1])
     # Outwards, around and along the section: one of the three is hardly foreshortened.
-    directions = shape.ways(section.sized(size), place[0])
-    (here,) = shape.surface(section, np.array([place]), size)
+    directions = shape.sized(size).ways(place[0])
+    (here,) = shape.surface(np.array([place]), size)
     step = 1e-3 * section.size * lever
     at = pixels_of(np.concatenate([here[None], here + step * directions]))
     slopes = (at[1:] - at[0]) / step
@@ -98,7 +98,7 @@ def dragged_size(
     and where the mouse is now, in pixels.
     """
     size = section.size
-    ends = _LEAST * size, axis_shape(section).size.high * (1.0 - _LEAST)
+    ends = _LEAST * size, section.size_terms.high * (1.0 - _LEAST)
     at, slope, steep = pixel_and_slope(pixels_of, section, place, size)
     target = at + now - start
     if steep:

@@ -62,7 +62,7 @@ class FlatScene:
     def labels(self) -> tuple[Label, Label]:
         """Return the names of both axes."""
         assert self.section is not None
-        return self.section.shape.flat_labels(self.section)
+        return self.section.flat_labels()
 
     def update(self, session: Session, section: Section) -> None:
         """Draw another state of the session, or another section."""
@@ -91,15 +91,14 @@ class FlatScene:
     ) -> None:
         """Lay the polygons flat and draw those within the threshold."""
         assert session.frame is not None
-        shape = section.shape
         ahead = self._ahead(section, session)
-        flat = shape.flatten(section, cut, ahead, ahead) if len(cut) else cut
+        flat = section.flatten(cut, ahead, ahead) if len(cut) else cut
         # Where the section lies stays, whatever cells of it are shown.
         self._all = flat
         if only is not None and section.whole_cells and len(cut):
             part = self.cuts.of(session.frame.mesh, section, only=only)
-            near = shape.middle_angle(section, cut, ahead)
-            flat = shape.flatten(section, part, near, ahead) if len(part) else part
+            near = section.middle_angle(cut, ahead)
+            flat = section.flatten(part, near, ahead) if len(part) else part
         elif only is not None:
             flat = only.among(flat)
         if not section.whole_cells and len(flat):
@@ -119,7 +118,7 @@ class FlatScene:
         if key != self._level[0]:
             assert session.mesh is not None
             points = session.mesh.points[self.cuts.cutter(session.mesh).used]
-            self._level = key, section.shape.ahead(section, points)
+            self._level = key, section.ahead(points)
         return self._level[1]
 
     def _style(self, section: Section) -> None:
@@ -154,7 +153,7 @@ class FlatScene:
                 ahead = self._ahead(section, session)
                 # Not `Cuts.of`, which caches those of the shown step.
                 cut = self.cuts.cutter(mesh).cut(mesh.points, section)
-                lines = section.shape.flatten(section, cut, ahead, ahead).outline()
+                lines = section.flatten(cut, ahead, ahead).outline()
             self._undeformed.show(lines)
         self._undeformed.actor.prop.color = self.stage.scheme.text
 
@@ -271,4 +270,4 @@ def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -
     """
     turn = np.sign(section.basis[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
     angle = turn * np.copysign(pair.period, pair.angle) * number
-    return section.shape.flat_matrix(section, matrix, angle)
+    return section.flat_matrix(matrix, angle)

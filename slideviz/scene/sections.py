@@ -16,7 +16,7 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.mesh import recolored
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.sections.line import Box, box_around, trace
+from slideviz.sections.line import Box, box_around
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, matrices, period_of
@@ -255,7 +255,8 @@ class CutLines:
             self.stage.remove(name)
             del self._actors[name], self._shapes[name]
         for name, section in wanted.items():
-            self._draw(name, trace(section, box), lift * (ABOVE if section.whole_cells else BELOW))
+            side = ABOVE if section.whole_cells else BELOW
+            self._draw(name, section.in_plane.trace(box), lift * side)
 
     def _draw(self, name: str, parts: list[FloatArray], lift: float) -> None:
         actor = self._actors.get(name)

@@ -8,17 +8,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from slideviz.case.section_shapes import Size
 from slideviz.mesh.model import FloatArray, IntArray, row_norms
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.shape import Shape, round_middle
-
-if TYPE_CHECKING:
-    from slideviz.sections.model import Section
+from slideviz.sections.shape import Section, round_middle
 
 TURN = 2.0 * np.pi
 _WHOLE = np.radians(300.0)  # a cut over more than this angle, in radians, is taken as a whole ring
@@ -103,98 +99,110 @@ class Patch:
         return self.angles[1] - self.angles[0] > _WHOLE
 
 
-class AboutAxis(Shape):
-    """A shape about an axis with a size that its handle drags; see `Shape`."""
+class AboutAxis(Section):
+    """A shape about an axis with a size that its handle drags; see `Section`."""
 
     handle = "pull"
 
-    # What each shape defines, besides the functions of `Shape` ------------------------
+    # What each shape defines, besides the functions of `Section` ------------------------
     @abstractmethod
-    def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
-        """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
+    def laid(self, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
+        """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Section.flatten`)."""
 
     @abstractmethod
-    def places(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return unrolled points (p, 3) laid flat; see `slideviz.sections.shape.Shape.flatten`."""
+    def places(self, points: FloatArray) -> FloatArray:
+        """Return unrolled points (p, 3) laid flat; see `slideviz.sections.shape.Section.flatten`."""
 
     @abstractmethod
-    def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
+    def surface(self, places: FloatArray, size: float) -> FloatArray:
         """Return the points (k, 3) at places (k, 2) of the section with the size ``size``."""
 
     @abstractmethod
-    def lean(self, section: Section) -> float:
+    def lean(self) -> float:
         """Return the angle in radians between the lines of the surface and its axis."""
 
     @abstractmethod
-    def lever(self, section: Section, along: float) -> float:
+    def lever(self, along: float) -> float:
         """Return how far a place at a length along the surface moves if the size grows by 1."""
 
     @abstractmethod
-    def girth(self, section: Section, along: float) -> float:
+    def girth(self, along: float) -> float:
         """Return the distance from the axis at a length along the surface."""
 
     # What follows from these ------------------------------------------------------------
     @property
-    def size(self) -> Size:
-        assert self.terms.size is not None
-        return self.terms.size
+    def position(self) -> float:
+        return self.size
 
-    def position(self, section: Section) -> float:
-        return section.size
+    def at_position(self, value: float) -> Self:
+        return self.sized(value)
 
-    def at_position(self, section: Section, value: float) -> Section:
-        return section.sized(value)
-
-    def first(self, section: Section, points: FloatArray) -> Section:
+    def first(self, points: FloatArray) -> Self:
         """Return the section of a round size, about through the middle of points (n, 3)."""
-        return section.sized(round_middle(self.positions(section, points)) or self.size.usual)
+        return self.sized(round_middle(self.positions(points)) or self.size_terms.usual)
 
-    def flatten(
-        self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
-    ) -> Polygons:
+    def flatten(self, polygons: Polygons, near: float | None, ahead: float | None) -> Polygons:
         """Return the polygons laid flat, in the same order and each of them whole.
 
         A point on the seam may be there twice, once for each side.
         """
         if not len(polygons):
             return polygons
-        opened = unrolled(section, polygons, near)
-        points = self.laid(section, opened, ahead)
+        opened = unrolled(self, polygons, near)
+        points = self.laid(opened, ahead)
         return Polygons(points, polygons.offsets, opened.corners, polygons.cells)
 
-    def middle_angle(
-        self, section: Section, polygons: Polygons, near: float | None = None
-    ) -> float | None:
-        return unrolled(section, polygons, near).middle if len(polygons) else None
+    def middle_angle(self, polygons: Polygons, near: float | None = None) -> float | None:
+        return unrolled(self, polygons, near).middle if len(polygons) else None
 
-    def ways(self, section: Section, angle: float) -> FloatArray:
+    def ways(self, angle: float) -> FloatArray:
         """Return unit vectors (3, 3) at an angle: outwards, around, and along the surface."""
         cos = np.cos(angle)
         sin = np.sin(angle)
-        lean = self.lean(section)
+        lean = self.lean()
         side = np.array([cos, sin, 0.0])
         high = np.array([0.0, 0.0, 1.0])
         outwards = np.cos(lean) * side - np.sin(lean) * high
         along = np.sin(lean) * side + np.cos(lean) * high
-        return np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis
+        return np.stack([outwards, [-sin, cos, 0.0], along]) @ self.basis
 
-    def facing(self, section: Section, points: FloatArray) -> FloatArray:
+    def patch(self, points: FloatArray) -> Patch:
+        """Return the part of it at points (n, 3): those of its cut or, if none, of the mesh."""
+        angle, along = self.places(points).T
+        turned = np.sort(angle)
+        gaps = np.diff(turned, append=turned[0] + TURN)
+        # Angles count from the end of the widest gap, so that no seam is between them.
+        start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
+        angle = start + (angle - start) % TURN
+        low = (float(angle.min()), float(angle.max()))
+        high = (float(along.min()), float(along.max()))
+        places = np.column_stack([angle, along])
+        middle = np.array([np.mean(low), np.mean(high)])
+        flat = (places - middle) * (self.girth(float(middle[1])), 1.0)
+        far = row_norms(flat)
+        nearest = int(np.argmin(far))
+        if far[nearest] > _HOLE * np.linalg.norm(np.ptp(flat, axis=0)):
+            middle = places[nearest]
+        some = places[:: max(len(places) // _MOST, 1)]
+        return Patch(low, high, (float(middle[0]), float(middle[1])), some)
+
+    def facing(self, points: FloatArray) -> FloatArray:
         """Return the camera's axes (3, 3) to look from outside at the middle of points (n, 3).
 
         The line of the surface there goes to the right, as in the flat view.
         """
-        to_eye, _, right = self.ways(section, patch_of(section, points).middle[0])
+        to_eye, _, right = self.ways(self.patch(points).middle[0])
         return np.stack([right, np.cross(to_eye, right), to_eye])
 
-    def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        axis = section.basis[2]
-        middle = points.mean(axis=0) - np.asarray(section.origin)
+    def aslant(self, points: FloatArray) -> FloatArray:
+        axis = self.basis[2]
+        middle = points.mean(axis=0) - self.point
         middle = middle - (middle @ axis) * axis
         size = np.linalg.norm(middle)
         # Points all around the axis have no middle: take any direction.
-        around = self.girth(section, float(self.places(section, points)[:, 1].mean()))
-        straight = middle / size if size > 1e-3 * around else section.basis[0]
-        lean = self.lean(section)
+        around = self.girth(float(self.places(points)[:, 1].mean()))
+        straight = middle / size if size > 1e-3 * around else self.basis[0]
+        lean = self.lean()
         straight = np.cos(lean) * straight - np.sin(lean) * axis
         up = np.eye(3)[1 if abs(straight[2]) > 0.9 else 2]
         return np.stack([np.cross(up, straight), up, straight])
@@ -204,22 +212,22 @@ class Quadric(AboutAxis):
     """A shape about an axis with a straight line as its profile."""
 
     @abstractmethod
-    def quadric(self, section: Section) -> tuple[FloatArray, float]:
+    def quadric(self) -> tuple[FloatArray, float]:
         """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
 
     def crossings(
-        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
         """Return where edges cross the surface, as parts of the edge (k,), exactly.
 
         Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
         one at which the distance changes its sign as it does from end to end of the edge.
         """
-        weights, total = self.quadric(section)
+        weights, total = self.quadric()
         used = weights != 0.0
-        rows = section.basis[used]
+        rows = self.basis[used]
         weight = weights[used]
-        p = (edges[0] - np.asarray(section.origin)) @ rows.T
+        p = (edges[0] - self.point) @ rows.T
         d = edges[1] @ rows.T
         square = np.sum(weight * d * d, axis=1)
         slope = np.sum(weight * p * d, axis=1)
@@ -236,29 +244,7 @@ class Quadric(AboutAxis):
         return np.clip(np.nan_to_num(roots), 0.0, 1.0)
 
 
-def axis_shape(section: Section) -> AboutAxis:
-    """Return the shape of a section, which must be one about an axis."""
-    assert isinstance(section.shape, AboutAxis)
-    return section.shape
-
-
-def patch_of(section: Section, points: FloatArray) -> Patch:
-    """Return the part of a section at points (n, 3): those of its cut or, if none, of the mesh."""
-    shape = axis_shape(section)
-    angle, along = shape.places(section, points).T
-    turned = np.sort(angle)
-    gaps = np.diff(turned, append=turned[0] + TURN)
-    # Angles count from the end of the widest gap, so that no seam is between them.
-    start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
-    angle = start + (angle - start) % TURN
-    low = (float(angle.min()), float(angle.max()))
-    high = (float(along.min()), float(along.max()))
-    places = np.column_stack([angle, along])
-    middle = np.array([np.mean(low), np.mean(high)])
-    flat = (places - middle) * (shape.girth(section, float(middle[1])), 1.0)
-    far = row_norms(flat)
-    nearest = int(np.argmin(far))
-    if far[nearest] > _HOLE * np.linalg.norm(np.ptp(flat, axis=0)):
-        middle = places[nearest]
-    some = places[:: max(len(places) // _MOST, 1)]
-    return Patch(low, high, (float(middle[0]), float(middle[1])), some)
+def axis_section(section: Section) -> AboutAxis:
+    """Return a section, which must be one about an axis, as that."""
+    assert isinstance(section, AboutAxis)
+    return section

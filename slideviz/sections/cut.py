@@ -12,8 +12,8 @@ from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.surfaces import padded
-from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
+from slideviz.sections.shape import InPlane, Section
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
@@ -55,7 +55,7 @@ class Cutter:
 
         ``points`` (n, d): the nodes of the mesh. Convex cells give one polygon, folded ones perhaps
         more. Corners lie on the edges of the cells and, up to rounding, on the section, a curved
-        one too; or at a node next to it (`Shape.near`). A side of a cell that lies in the section
+        one too; or at a node next to it (`Section.near`). A side of a cell that lies in the section
         belongs to the cell where the distance from the section is negative; where no cell is cut
         so, to the other, since the section is at the rim of the mesh. For ``whole_cells`` see
         `show`. Raises CaseError if the mesh is 2D, and the section is neither a plane nor a
@@ -63,8 +63,8 @@ class Cutter:
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)
-        if section.shape.near:
-            level[_nearly_on(level, low, high, section.shape.near)] = 0.0
+        if section.near:
+            level[_nearly_on(level, low, high, section.near)] = 0.0
             owners, low, high = self._corners(level)
         if not len(owners):
             owners, low, high = self._corners(-level)
@@ -131,7 +131,7 @@ class Cutter:
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
         if not section.can_cut(self.dim):
-            why = "it" if section.shape.in_plane is None else "its axis is not z, so it"
+            why = "its axis is not z, so it" if isinstance(section, InPlane) else "it"
             raise CaseError(
                 f"{section.describe()}: {why} needs a 3D mesh; a 2D mesh is cut by a plane, or in "
                 "a circle by a cylinder about z"
@@ -176,7 +176,7 @@ def crossed_cells(
 ) -> BoolArray:
     """Return a mask (m,) of the cells with nodes on both sides of a section, or on it.
 
-    Cells near enough to touch it count, too, where it goes through nodes near it (`Shape.near`).
+    Cells near enough to touch it count, too, where it goes through nodes near it (`Section.near`).
     ``matrices``: transformations of the mesh: cells count that are cut after any of them. ``near``:
     nodes at most so far from the section are on it.
     """
@@ -189,7 +189,7 @@ def crossed_cells(
         for ids, nodes in mesh.cells.by_type.values():
             low = level[nodes].min(axis=1)
             high = level[nodes].max(axis=1)
-            more = BESIDE * section.shape.near * (high - low) if section.shape.near else 0.0
+            more = BESIDE * section.near * (high - low) if section.near else 0.0
             crossed[ids] |= (low <= more) & (high >= -more)
     return crossed
 
@@ -272,7 +272,7 @@ def _crossings(
     # Mostly no corner is at a node, and a slice copies nothing.
     between = slice(None) if (a != b).all() else np.flatnonzero(a != b)
     edges = start[between], way[between]
-    share[between] = section.shape.crossings(section, edges, tuple(one[between] for one in levels))
+    share[between] = section.crossings(edges, tuple(one[between] for one in levels))
     return start + share[:, None] * way
 
 

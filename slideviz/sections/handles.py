@@ -11,7 +11,7 @@ from slideviz.mesh.model import FloatArray, row_dots, row_norms
 
 if TYPE_CHECKING:
     from slideviz.sections.line import Box
-    from slideviz.sections.model import Section, Triple
+    from slideviz.sections.shape import Section, Triple
 
 Part = Literal["middle", "end", "line"]
 """The part of a handle that is dragged: the middle, an end of a line (or the point on a circle), or
@@ -31,8 +31,9 @@ class HandleParts:
 
 def handle_parts(section: Section, box: Box) -> HandleParts | None:
     """Return the handle of a section in the visible ``box``; None where none of it is in there."""
-    parts = section.in_plane.trace(section, box)
-    return section.in_plane.handle_parts(section, parts, box) if parts else None
+    flat = section.in_plane
+    parts = flat.trace(box)
+    return flat.handle_parts(parts, box) if parts else None
 
 
 def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
@@ -49,16 +50,6 @@ def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) 
         elif len(points) and row_norms(points - at).min() <= reach:
             return part
     return None
-
-
-def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Section:
-    """Return a section after a part of its handle was dragged.
-
-    A line is turned by its ends, and moved by the other parts; a circle is moved by its middle, and
-    gets another radius by the other parts. ``way``: where the mouse began and where it is now, (2,)
-    each, in coordinates of the mesh. ``box``: the visible box before the drag.
-    """
-    return section.in_plane.dragged(section, part, way, box)
 
 
 def within(points: FloatArray, box: Box) -> FloatArray:

@@ -1,20 +1,36 @@
-"""The protocols of the shapes of sections, in 3D and in 2D, and words that shapes share."""
+"""A section through a mesh as a value, and the functions and words that all shapes share.
+
+A shape is a class: the functions of `Section` that differ by shape are defined in
+`slideviz.sections.plane`, ``cylinder``, ``cone`` and ``span``.
+"""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
-from slideviz.case.section_shapes import ShapeTerms
+from slideviz.argument_types import check_fields
+from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms, Size
+from slideviz.errors import CaseError
+from slideviz.mesh.axis_frame import axis_basis
+from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray
+from slideviz.mesh.surfaces import padded
 from slideviz.sections.polygons import Polygons
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
     from slideviz.sections.handles import HandleParts, Part
     from slideviz.sections.line import Box
-    from slideviz.sections.model import Section, Triple
+    from slideviz.sections.span import SpanWalls
+
+Triple = tuple[float, float, float]
 
 _LAYER = 1e-4  # nodes whose values differ by less than this part of the span are on one layer
 _NEAR = 0.03
@@ -89,28 +105,197 @@ class Label(NamedTuple):
     short: str
 
 
-class Shape(Protocol):
-    """A kind of surface that cuts 3D meshes: the functions of its sections.
+SHAPES: dict[str, type[Section]] = {}
+"""The class of each shape, by its name."""
 
-    A section (`slideviz.sections.model.Section`) has the numbers: point, direction and size. Where
-    the length unit is meant, it is that of the mesh.
+ON_SECTION = 1e-9
+"""Nodes nearer to a section than this part of the largest distance are taken as on it: where a
+layer of nodes lies in it up to rounding, one layer of cells is cut, and not some of each side."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A plane, cylinder or other surface that cuts a mesh.
+
+    Raises
+    ------
+    CaseError
+        The shape is unknown, a number is not finite, the direction has length zero, or the shape
+        cannot have the size.
     """
 
-    terms: ShapeTerms  # its names, numbers and words
-    in_plane: InPlane | None  # its functions in 2D meshes; None where it cannot cut these
-    directed: bool  # whether the sign of the direction matters, for signed distances at least
-    near: float = 0.0
+    kind: str = field(metadata=SECTION_SHAPES)
+    """Its shape: plane, cylinder, cone or span."""
+    origin: Triple = (0.0, 0.0, 0.0)
+    """(3,) tuple of float: a point of the plane or of the cylinder's axis, or the apex of the cone,
+    in the mesh's length unit."""
+    direction: Triple = (0.0, 0.0, 1.0)
+    """(3,) tuple of float: the plane's normal, or the direction of the axis; any length but
+    zero."""
+    radius: float = 0.0
+    """The radius of the cylinder; 0 for others."""
+    whole_cells: bool = False
+    """Whether the cells it cuts are shown whole, instead of cut."""
+    name: str = ""
+    """The user's name for it; empty: the words of `describe`."""
+    shown: bool = True
+    """Whether the view draws it."""
+    flat: bool = False
+    """Whether it has a flat view beside the 3D view: a plane seen along its normal, others
+    unrolled."""
+    half_angle_deg: float = 0.0
+    """The half angle of the cone; 0 for others."""
+    span: float = 0.0
+    """The constant span, 0 at the hub to 1 at the shroud; 0 for other shapes."""
+    walls: SpanWalls | None = None
+    """Hub and shroud of a section of constant span: it cuts nothing without."""
+
+    terms: ClassVar[ShapeTerms]  # names, numbers and words of the shape
+    directed: ClassVar[bool] = True
+    """Whether the sign of the direction matters, for signed distances at least."""
+    near: ClassVar[float] = 0.0
     """Part of an edge of a cell within which, next to a node, the section goes through the node."""
+    handle: ClassVar[Literal["push", "pull"]]
+    """The kind of 3D handle: a plane to push and turn, or a ball that pulls the size."""
+
+    def __new__(cls, kind: str = "", *_: object, **__: object) -> Self:
+        """Return a section of the class of the shape ``kind``."""
+        return object.__new__(SHAPES.get(kind, cls))  # type: ignore[return-value]
+
+    def __init_subclass__(cls) -> None:
+        if "terms" in vars(cls):
+            SHAPES[cls.terms.value] = cls
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        numbers = (*self.origin, *self.direction, self.size)
+        terms = self.terms
+        if not np.isfinite(numbers).all():
+            raise CaseError(f"{self.kind} section: {numbers} has a number that is not finite")
+        if not within(np.array(numbers), LARGEST):
+            raise CaseError(
+                f"{self.kind} section: {numbers} has a number too large to compute with; expected "
+                f"numbers up to {LARGEST:g}"
+            )
+        if not np.linalg.norm(self.direction) > 0:
+            raise CaseError(
+                f"{self.kind} section: the {terms.direction} 0, 0, 0 has no direction; write e.g. "
+                "0, 0, 1"
+            )
+        fault = terms.size.fault(self.size) if terms.size is not None else ""
+        if fault:
+            assert terms.size is not None
+            raise CaseError(
+                f"{self.kind} section: the {terms.size.word} {self.size:.6g} {fault}; "
+                f"{terms.size.remedy}"
+            )
+
+    @classmethod
+    def of(cls, kind: str, origin: Triple, direction: Triple, size: float) -> Section:
+        """Return the section of the shape ``kind`` with these numbers; a plane ignores ``size``."""
+        size_term = SECTION_SHAPES[kind].size
+        sizes: dict[str, Any] = {} if size_term is None else {size_term.field: size}
+        return cls(kind, origin, direction, **sizes)
+
+    @property
+    def in_plane(self) -> InPlane:
+        """Return the section as one of a 2D mesh, a line or a circle, which its shape must be."""
+        assert isinstance(self, InPlane)
+        return self
+
+    @property
+    def size(self) -> float:
+        """Return the radius, half angle in degrees, or span; 0 for a plane."""
+        size = self.terms.size
+        return 0.0 if size is None else float(getattr(self, size.field))
+
+    @property
+    def size_terms(self) -> Size:
+        """Return the words and limits of the size, which the shape must have."""
+        assert self.terms.size is not None
+        return self.terms.size
+
+    def sized(self, value: float) -> Self:
+        """Return the section with another size.
+
+        Raises CaseError if the shape cannot have it.
+        """
+        return replace(self, **{self.size_terms.field: float(value)})  # type: ignore[arg-type]
+
+    @property
+    def point(self) -> FloatArray:
+        """Return the point (3,) as an array."""
+        return np.asarray(self.origin)
+
+    @cached_property
+    def basis(self) -> FloatArray:
+        """Return unit vectors as rows (3, 3), right-handed, the third along the normal or axis.
+
+        If the shape's direction has no sign (a cylinder), its largest component is positive.
+        """
+        base = axis_basis(self.direction)
+        if not self.directed and base[2, np.argmax(np.abs(base[2]))] < 0:
+            return axis_basis(-base[2])
+        return base
+
+    def frame(self, points: FloatArray) -> FloatArray:
+        """Return the coordinates (n, 3) of points (n, 2 or 3) in ``basis``, from ``origin``."""
+        return (padded(points) - self.point) @ self.basis.T
+
+    def along(self, points: FloatArray, row: int) -> FloatArray:
+        """Return the coordinates (n,) of points (n, 2 or 3) along a row of ``basis``: 0, 1 or 2."""
+        coordinates = np.empty(len(points))
+        _project(points, self.basis[row], float(self.point @ self.basis[row]), coordinates)
+        return coordinates
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Return signed distances (n,) of points (n, 2 or 3), along the normal or outwards.
+
+        Exactly 0 for points that are on the section up to rounding (`ON_SECTION`).
+        """
+        gap = np.empty(len(points))
+
+        def of_part(part: slice) -> None:
+            gap[part] = self.gap(lambda row: self.along(points[part], row))
+
+        in_parts(of_part, len(points))
+        size = np.abs(gap)
+        gap[size <= ON_SECTION * size.max(initial=0.0)] = 0.0
+        return gap
+
+    def can_cut(self, dim: int) -> bool:
+        """Return whether the section can cut meshes of ``dim`` dimensions at all.
+
+        2D meshes are cut by planes, and by cylinders about z, which are circles there.
+        """
+        if dim == 2:
+            return isinstance(self, InPlane) and self.cuts_plane
+        return self.walls is not None or self.kind != "span"
+
+    def needs(self, dim: int) -> str:
+        """Return in words what a section needs that cannot cut meshes of ``dim`` dimensions."""
+        return "needs a 3D mesh" if dim == 2 else "needs hub and shroud"
+
+    def describe(self, dim: int = 3) -> str:
+        """Return the section in words: in 2D as a line or a circle."""
+        words = self.words_in_plane() if dim == 2 and isinstance(self, InPlane) else ""
+        return words or self.words()
+
+    def brief(self, dim: int = 3) -> str:
+        """Return the section in few words, for a list; `describe` has more digits."""
+        return self.describe(dim) if dim == 2 else self.few_words()
 
     # What it cuts ----------------------------------------------------------------------
-    def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
+    @abstractmethod
+    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed distances (n,) of points; their sign changes at the section only.
 
         ``along(i)`` returns the coordinates (n,) of the points along row i of the section's basis.
         """
 
+    @abstractmethod
     def crossings(
-        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
         """Return where edges cross the section exactly, (k,), as parts of the edge from 0 to 1.
 
@@ -119,23 +304,29 @@ class Shape(Protocol):
         """
 
     # Its numbers -----------------------------------------------------------------------
-    def position(self, section: Section) -> float:
+    @property
+    @abstractmethod
+    def position(self) -> float:
         """Return the number that a slider moves: position along the normal, radius, half angle."""
 
-    def at_position(self, section: Section, value: float) -> Section:
+    @abstractmethod
+    def at_position(self, value: float) -> Self:
         """Return the section at another position; raises CaseError where there is none."""
 
-    def positions(self, section: Section, points: FloatArray) -> FloatArray:
+    @abstractmethod
+    def positions(self, points: FloatArray) -> FloatArray:
         """Return the positions (n,) at which the section would go through points (n, 3)."""
 
-    def first(self, section: Section, points: FloatArray) -> Section:
+    @abstractmethod
+    def first(self, points: FloatArray) -> Self:
         """Return the initial position of a new section, near the middle of points (n, 3).
 
-        ``section`` has an initial point and direction: the middle of the points, or the axis of the
+        This one has an initial point and direction: the middle of the points, or the axis of the
         machine.
         """
 
-    def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
+    @abstractmethod
+    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
         """Return how far a rigid motion moves the section off itself, a length; 0: onto itself.
 
         ``turned`` (3,) is its unit direction after the motion, the same or the opposite one;
@@ -143,90 +334,116 @@ class Shape(Protocol):
         """
 
     # Words -----------------------------------------------------------------------------
-    def describe(self, section: Section) -> str:
+    @abstractmethod
+    def words(self) -> str:
         """Return the section in words."""
 
-    def brief(self, section: Section) -> str:
+    @abstractmethod
+    def few_words(self) -> str:
         """Return the section in few words."""
 
-    def miss(self, section: Section, points: FloatArray) -> str:
+    @abstractmethod
+    def miss(self, points: FloatArray) -> str:
         """Return the message that a section does not cut points (n, d), with positions that do."""
 
     # Laid flat, and looked at ----------------------------------------------------------
-    def flatten(
-        self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
-    ) -> Polygons:
+    @abstractmethod
+    def flatten(self, polygons: Polygons, near: float | None, ahead: float | None) -> Polygons:
         """Return polygons laid flat: x right, y up, z towards the camera; lengths are kept.
 
         For a shape about an axis, in radians: angles lie around ``near`` (None: 0); the line at the
         angle ``ahead`` is drawn to the right (None: at the middle angle).
         """
 
-    def middle_angle(
-        self, section: Section, polygons: Polygons, near: float | None = None
-    ) -> float | None:
+    def middle_angle(self, polygons: Polygons, near: float | None = None) -> float | None:
         """Return the middle of the angles of polygons, in radians, nearest ``near``; or None.
 
         None for a plane, which has no angles, and without polygons.
         """
+        return None
 
-    def ahead(self, section: Section, points: FloatArray) -> float | None:
+    def ahead(self, points: FloatArray) -> float | None:
         """Return the angle, in radians, at which a flat view of points (n, 3) is drawn level.
 
         None where the shape is drawn level at any angle.
         """
+        return None
 
-    def flat_labels(self, section: Section) -> tuple[Label, Label]:
+    @abstractmethod
+    def flat_labels(self) -> tuple[Label, Label]:
         """Return the axis labels of the section laid flat: to the right, and up."""
 
-    def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
+    @abstractmethod
+    def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:
         """Return the matrix (4, 4) that moves the flat section as ``matrix`` (4, 4) does in space.
 
         ``matrix`` takes the section onto itself; ``angle`` is its rotation about the section's
         direction, in radians.
         """
 
-    def facing(self, section: Section, points: FloatArray) -> FloatArray:
+    @abstractmethod
+    def facing(self, points: FloatArray) -> FloatArray:
         """Return the camera's axes (3, 3) to look straight at a section: right, up, to the camera.
 
         ``points`` (n, 3) are those of the cut.
         """
 
-    def aslant(self, section: Section, points: FloatArray) -> FloatArray:
+    @abstractmethod
+    def aslant(self, points: FloatArray) -> FloatArray:
         """Return the camera's axes (3, 3) to look at a section in a 3D view, in the same order."""
 
-    handle: Literal["push", "pull"]
-    """The kind of 3D handle: a plane to push and turn, or a ball that pulls the size."""
 
+class InPlane(Section):
+    """A shape with sections in the plane of a 2D mesh: a line or a circle."""
 
-class InPlane(Protocol):
-    """A shape in the plane of a 2D mesh: a line or a circle."""
-
-    def can_cut(self, section: Section) -> bool:
+    @property
+    @abstractmethod
+    def cuts_plane(self) -> bool:
         """Return whether a section of the shape can cut 2D meshes."""
 
-    def describe(self, section: Section) -> str:
+    @abstractmethod
+    def words_in_plane(self) -> str:
         """Return the section in words; "" where it is not a line or circle in 2D."""
 
-    def trace(self, section: Section, box: Box) -> list[FloatArray]:
+    @abstractmethod
+    def trace(self, box: Box) -> list[FloatArray]:
         """Return the parts of the line or circle inside a box, as polylines (k, 2) each."""
 
-    def middle(self, section: Section) -> FloatArray:
+    @property
+    @abstractmethod
+    def middle(self) -> FloatArray:
         """Return the point (2,) of the handle by which the mouse moves the section."""
 
-    def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
+    @abstractmethod
+    def handle_parts(self, parts: list[FloatArray], box: Box) -> HandleParts:
         """Return the drawn parts of the handle; ``parts`` are the section's polylines there."""
 
-    def dragged(
-        self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
-    ) -> Section:
-        """Return the section after a part was dragged (see `slideviz.sections.handles.dragged`)."""
+    @abstractmethod
+    def dragged(self, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Self:
+        """Return the section after a part of its handle was dragged.
 
-    def positions(self, section: Section, corners: FloatArray) -> FloatArray:
+        A line is turned by its ends, and moved by the other parts; a circle is moved by its middle,
+        and gets another radius by the other parts. ``way``: where the mouse began and where it is
+        now, (2,) each, in coordinates of the mesh. ``box``: the visible box before the drag.
+        """
+
+    @abstractmethod
+    def positions_along(self, corners: FloatArray) -> FloatArray:
         """Return the positions (q, 2) along the section of both ends of its lines (q, 2, 2)."""
 
-    def position_label(self, section: Section) -> Label:
-        """Return the axis label of `positions`."""
+    @abstractmethod
+    def position_label(self) -> Label:
+        """Return the axis label of `positions_along`."""
+
+
+@njit
+def _project(points, direction, start, found):  # type: ignore[no-untyped-def]
+    """Write coordinates of points (n, d) along a direction, less ``start``, to ``found`` (n,)."""
+    for i in range(len(points)):
+        total = 0.0
+        for axis in range(points.shape[1]):
+            total += points[i, axis] * direction[axis]
+        found[i] = total - start
 
 
 # Words that the shapes share -----------------------------------------------------------

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
@@ -24,10 +24,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import names_from
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
-from slideviz.sections.shape import Label
-
-if TYPE_CHECKING:
-    from slideviz.sections.model import Section, Triple
+from slideviz.sections.shape import Label, Triple
 
 _SPANS = np.linspace(0.0, 1.0, 33)  # at which zones are joined to each other
 _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number of right digits
@@ -196,32 +193,30 @@ class SpanWalls:
         )
 
 
-def walls_of(section: Section) -> SpanWalls:
-    """Return the walls of a section of constant span; CaseError where none are known."""
-    if section.walls is None:
-        raise CaseError(
-            "a section of constant span needs hub and shroud: name them in SPAN or --between"
-        )
-    return section.walls
-
-
 class ConstantSpan(AboutAxis):
     """A surface of constant span, whose size is the span."""
 
     terms = SECTION_SHAPES["span"]
-    in_plane = None
-    directed = True
     near = 0.02  # layers of nodes, relaxed ones too, are not cut into slivers on either side
 
-    def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
+    @property
+    def known_walls(self) -> SpanWalls:
+        """Return the walls; CaseError where none are known."""
+        if self.walls is None:
+            raise CaseError(
+                "a section of constant span needs hub and shroud: name them in SPAN or --between"
+            )
+        return self.walls
+
+    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed numbers (n,), positive towards the shroud, that grow as distances do."""
         x = along(0)
         y = along(1)
         coords = np.stack([along(2), np.hypot(x, y), np.arctan2(y, x)], axis=1)
-        return walls_of(section).level(coords, section.span)
+        return self.known_walls.level(coords, self.span)
 
     def crossings(
-        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
         """Return where edges cross, by Ridders' method (IEEE Trans. Circuits Syst. 26, 1979)."""
         start, way = edges
@@ -232,8 +227,8 @@ class ConstantSpan(AboutAxis):
 
         def value(share: FloatArray) -> FloatArray:
             points = start + share[:, None] * way
-            coords = walls_of(section).field.meridional(points)
-            return walls_of(section).level(coords, section.span)
+            coords = self.known_walls.field.meridional(points)
+            return self.known_walls.level(coords, self.span)
 
         for _ in range(_ROUNDS):
             middle = (a + b) / 2.0
@@ -253,75 +248,71 @@ class ConstantSpan(AboutAxis):
             low, high = np.take_along_axis(values, interval, axis=0)
         return root
 
-    def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        walls = walls_of(section)
+    def positions(self, points: FloatArray) -> FloatArray:
+        walls = self.known_walls
         return walls.span(walls.field.meridional(points))
 
-    def first(self, section: Section, points: FloatArray) -> Section:
+    def first(self, points: FloatArray) -> Self:
         """Return the section at mid-span."""
-        return section.sized(self.size.usual)
+        return self.sized(self.size_terms.usual)
 
-    def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
+    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
         """Return how far the point of the axis moves; infinity where the axis is turned round."""
-        return float(np.linalg.norm(step)) if turned @ section.basis[2] > 0 else np.inf
+        return float(np.linalg.norm(step)) if turned @ self.basis[2] > 0 else np.inf
 
-    def describe(self, section: Section) -> str:
-        walls = section.walls
+    def words(self) -> str:
+        walls = self.walls
         between = "hub to shroud" if walls is None else walls.words
-        return f"{self.brief(section)} from {between}"
+        return f"{self.few_words()} from {between}"
 
-    def brief(self, section: Section) -> str:
-        return f"{100.0 * section.span:.6g} % span"
+    def few_words(self) -> str:
+        return f"{100.0 * self.span:.6g} % span"
 
-    def miss(self, section: Section, points: FloatArray) -> str:
-        spans = self.positions(section, points)
+    def miss(self, points: FloatArray) -> str:
+        spans = self.positions(points)
         return f"misses the mesh, which has spans {spans.min():.4g} to {spans.max():.4g}"
 
-    def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
+    def laid(self, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return m', theta, and the span above that of the section."""
         local = opened.local
         coords = np.stack([local[:, 2], np.hypot(local[:, 0], local[:, 1]), opened.angle], axis=1)
-        plane = walls_of(section).plane(coords)
-        return np.stack([plane[:, 0], opened.angle, plane[:, 2] - section.span], axis=1)
+        plane = self.known_walls.plane(coords)
+        return np.stack([plane[:, 0], opened.angle, plane[:, 2] - self.span], axis=1)
 
-    def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return None: all its curves go to the right in the flat view."""
-        return None
-
-    def flat_labels(self, section: Section) -> tuple[Label, Label]:
+    def flat_labels(self) -> tuple[Label, Label]:
         return Label("m′ [-]", "m′"), Label("θ [rad]", "θ")
 
-    def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
+    def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:
         """Return the matrix of a shift by the angle."""
         flat = np.eye(4)
         flat[1, 3] = angle
         return flat
 
-    def places(self, section: Section, points: FloatArray) -> FloatArray:
+    def places(self, points: FloatArray) -> FloatArray:
         """Return angles in radians, and arc lengths m along the curve."""
-        walls = walls_of(section)
+        walls = self.known_walls
         coords = walls.field.meridional(points)
         return np.column_stack([coords[:, 2], walls.plane(coords)[:, 1]])
 
-    def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        walls = walls_of(section)
+    def surface(self, places: FloatArray, size: float) -> FloatArray:
+        walls = self.known_walls
         return walls.field.points(
             walls.coords(np.column_stack([places, np.full(len(places), size)]))
         )
 
-    def lean(self, section: Section) -> float:
-        return walls_of(section).lean
+    def lean(self) -> float:
+        return self.known_walls.lean
 
-    def lever(self, section: Section, along: float) -> float:
+    def lever(self, along: float) -> float:
         """Return the height of the passage there."""
-        return float(walls_of(section).height(self._coords(section, along))[0])
+        return float(self.known_walls.height(self._coords(along))[0])
 
-    def girth(self, section: Section, along: float) -> float:
-        return float(self._coords(section, along)[0, 1])
+    def girth(self, along: float) -> float:
+        return float(self._coords(along)[0, 1])
 
-    def _coords(self, section: Section, along: float) -> FloatArray:
-        walls = walls_of(section)
-        return walls.coords(np.array([[walls.field.middle, along, section.span]]))
+    def _coords(self, along: float) -> FloatArray:
+        walls = self.known_walls
+        return walls.coords(np.array([[walls.field.middle, along, self.span]]))
 
 
 def find_walls(

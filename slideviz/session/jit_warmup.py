@@ -16,7 +16,7 @@ from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.walls import walls
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
-from slideviz.sections.model import Section
+from slideviz.sections.plane import Plane
 from slideviz.session.jobs import Stopped, raise_if_cancelled
 from slideviz.session.state import cell_displacement
 from slideviz.solver.deform import deform
@@ -61,7 +61,7 @@ def _write_and_read() -> None:
 def _look() -> None:
     """Cut a mesh, color it by its displacement, and measure its walls."""
     mesh = sample("cylindrical", size=4).mesh
-    Cutter.of(mesh).cut(mesh.points, Section("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
+    Cutter.of(mesh).cut(mesh.points, Plane("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
     cell_displacement(mesh.with_points(mesh.points / 3.0), mesh)
     walls(mesh)
 

@@ -93,7 +93,7 @@ def keeps(section: Section, matrix: FloatArray) -> bool:
     origin = np.asarray(section.origin)
     turned = matrix[:3, :3] @ axis
     step = transformed(origin[None], matrix)[0] - origin
-    off = section.shape.keeps(section, turned, step)
+    off = section.keeps(turned, step)
     size = max(section.radius, float(np.linalg.norm(origin)), float(np.linalg.norm(step)))
     return bool(np.linalg.norm(np.cross(turned, axis)) <= _SAME and off <= _SAME * size)
 

@@ -195,7 +195,7 @@ def as_recovered(session: Session, source: Path | None) -> Session:
 
 
 def _text(section: Section) -> SectionText:
-    size = () if section.shape.terms.size is None else (section.size,)
+    size = () if section.terms.size is None else (section.size,)
     numbers = (*size, *section.direction, *section.origin)
     return (
         section.kind,

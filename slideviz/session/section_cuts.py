@@ -15,12 +15,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.cut import BESIDE, Cutter, transformed
-from slideviz.sections.model import ON_SECTION, SHAPES, Section, Triple
+from slideviz.sections.model import ON_SECTION, Section, Triple
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
 from slideviz.session.large import block_frame
@@ -63,7 +64,7 @@ class Groups:
     def met_by(self, section: Section) -> IntArray:
         """Return the numbers (k,) of the groups that a section may cut."""
         # The distance from the section changes at most as much as one moves.
-        beside = 1e-9 + 2.0 * BESIDE * section.shape.near
+        beside = 1e-9 + 2.0 * BESIDE * section.near
         reach = self.radii * (1.0 + beside) + ON_SECTION * self.scale
         return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
 
@@ -157,7 +158,7 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     """
     mesh = session.mesh
     case = session.case
-    shape = SHAPES[kind]
+    size = SECTION_SHAPES[kind].size
     assert mesh is not None
     pair = machine_pair(session) if pair is None else pair  # None, too, of zones that differ
     if pair is not None and pair.kind == "rotational":
@@ -171,12 +172,12 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
         origin = case.origin
     at = triple(np.asarray(origin))
     way = triple(np.asarray(axis))
-    section = Section.of(kind, at, way, shape.terms.size.usual if shape.terms.size else 0.0)
+    section = Section.of(kind, at, way, size.usual if size else 0.0)
     section = replace(section, whole_cells=mesh.dim == 2)
     pairs = session.pairs if pair is None else (pair, *session.pairs)
     [section] = bound_sections([section], mesh, case, pairs)
     shown = mesh if session.frame is None else session.frame.mesh
-    return shape.first(section, cell_points(shown))
+    return section.first(cell_points(shown))
 
 
 def _middle_of_moving(session: Session) -> FloatArray:
@@ -194,7 +195,7 @@ def position_range(section: Section, points: FloatArray) -> tuple[float, float]:
     ends: list[float] = []
 
     def of_part(part: slice) -> None:
-        positions = section.shape.positions(section, points[part])
+        positions = section.positions(points[part])
         ends.extend((float(positions.min()), float(positions.max())))
 
     in_parts(of_part, len(points))
@@ -208,10 +209,10 @@ def with_direction(section: Section, direction: Triple, points: FloatArray) -> S
     through their middle.
     """
     new = replace(section, direction=direction)
-    positions = new.shape.positions(new, points)
-    if positions.min() < new.shape.position(new) < positions.max():
+    positions = new.positions(points)
+    if positions.min() < new.position < positions.max():
         return new
-    return new.shape.at_position(new, round_middle(positions))
+    return new.at_position(round_middle(positions))
 
 
 NO_POLYGONS = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))  # no polygons

@@ -134,7 +134,7 @@ def test_nothing_is_cut_again_when_only_the_colors_change(scene, cube):
     scene.update(session)
     assert scene.sections.drawn["section:0"].polygons is before
     assert not scene.plotter.actors["section:0"].prop.show_edges
-    session = changes.replace_section(session, 0, MIDDLE.shape.at_position(MIDDLE, 0.7))
+    session = changes.replace_section(session, 0, MIDDLE.at_position(0.7))
     scene.update(session)
     assert cells_of(scene).tolist() == crossing(cube, 2, 0.7).tolist()
 
@@ -392,7 +392,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
     first = cuts.of(cube, MIDDLE)
     assert cuts.of(cube, Section("plane", MIDDLE.origin, MIDDLE.direction, name="mine")) is first
     for z in np.linspace(0.1, 0.2, CACHE_SIZE):
-        cuts.of(cube, MIDDLE.shape.at_position(MIDDLE, z))
+        cuts.of(cube, MIDDLE.at_position(z))
     assert cuts.of(cube, MIDDLE) is not first
     shifted = cube.with_points(cube.points + 0.1)
     assert cuts.of(shifted, MIDDLE).cell_ids.tolist() == crossing(shifted, 2, 0.46).tolist()
@@ -408,7 +408,7 @@ def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     plane = section_cuts.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
-    assert plane.shape.position(plane) == 6.0
+    assert plane.position == 6.0
     assert plane.whole_cells
 
 
@@ -430,8 +430,8 @@ def test_a_first_cylinder_has_the_axis_of_the_period(stator):
 
 def test_positions_move_a_plane_along_its_normal():
     plane = Section("plane", (1.0, 2.0, 3.0), (0.0, 3.0, 4.0))
-    assert plane.shape.position(plane) == pytest.approx(3.6)
-    there = plane.shape.at_position(plane, 4.6)
+    assert plane.position == pytest.approx(3.6)
+    there = plane.at_position(4.6)
     assert there.origin == pytest.approx((1.0, 2.6, 3.8))
     low, high = section_cuts.position_range(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
     assert (low, high) == pytest.approx((0.0, 3.0))

@@ -41,9 +41,7 @@ def sections(window):
 def ball(window, view=None):
     """Where the ball is, in space."""
     handle = window.section_views.handles.of(view or window.view)
-    (point,) = handle.section.shape.surface(
-        handle.section, np.array([handle.place]), handle.section.size
-    )
+    (point,) = handle.section.surface(np.array([handle.place]), handle.section.size)
     return point
 
 
@@ -129,7 +127,7 @@ def test_that_of_a_cone_is_pulled_to_another_half_angle(window, driver, panel):
     handle = window.section_views.handles.of(window.view)
     for wanted in (high - 0.2 * (high - low), low + 0.2 * (high - low)):
         section, point = sections(window)[1], ball(window)
-        (there,) = section.shape.surface(section, np.array([handle.place]), wanted)
+        (there,) = section.surface(np.array([handle.place]), wanted)
         drag(window.view, pixel(window.view, point), pixel(window.view, there))
         pulled = sections(window)[1]
         assert pulled.half_angle_deg == pytest.approx(wanted, abs=0.03 * (high - low))

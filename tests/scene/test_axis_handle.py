@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_and_slope
-from slideviz.sections.around_axis import patch_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 from tests.builders import grid, ring
@@ -22,7 +21,7 @@ def test_the_middle_of_a_sector_is_in_it_wherever_it_lies(start):
     patch = patch_in(CUT, sector(start), Cuts())
     assert np.ptp(patch.angles) == pytest.approx(np.radians(30.0))
     assert patch.along == pytest.approx((0.0, 1.0))
-    (ball,) = CUT.shape.surface(CUT, np.array([patch.middle]), 0.7)
+    (ball,) = CUT.surface(np.array([patch.middle]), 0.7)
     middle = np.radians(start + 15.0)
     assert ball == pytest.approx((0.7 * np.cos(middle), 0.7 * np.sin(middle), 0.5))
     lines = frame_of(CUT, patch)
@@ -47,9 +46,9 @@ def test_it_is_not_held_in_a_hole():
     angle, along = np.meshgrid(np.radians(np.linspace(0, 30, 31)), np.linspace(0, 1, 31))
     places = np.column_stack([angle.ravel(), along.ravel()])
     away = np.abs(places - (np.radians(15.0), 0.5)) * (0.7, 1.0)
-    points = CUT.shape.surface(CUT, places[np.linalg.norm(away, axis=1) > 0.15], 0.7)
-    patch = patch_of(CUT, points)
-    (ball,) = CUT.shape.surface(CUT, np.array([patch.middle]), 0.7)
+    points = CUT.surface(places[np.linalg.norm(away, axis=1) > 0.15], 0.7)
+    patch = CUT.patch(points)
+    (ball,) = CUT.surface(np.array([patch.middle]), 0.7)
     assert np.linalg.norm(points - ball, axis=1).min() < 1e-9
 
 
@@ -61,7 +60,7 @@ def test_where_nothing_is_cut_it_is_beside_the_mesh():
 def test_from_outside_the_axis_is_to_the_right():
     section = Section("cylinder", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0), 0.7)
     points = np.array([[1.7, 2.0, 3.0], [1.69, 2.5, 3.1]])
-    right, up, to_eye = section.shape.facing(section, points)
+    right, up, to_eye = section.facing(points)
     assert right == pytest.approx((0.0, 1.0, 0.0))
     assert np.cross(right, up) == pytest.approx(to_eye)
     assert to_eye[0] > 0.99
@@ -82,7 +81,7 @@ def test_the_ball_follows_the_mouse(seen):
     leaning = Section("cylinder", (0.1, 0.0, 0.0), (1.0, 0.0, 0.5), 0.7)
     for section in (CUT, leaning):
         place = (0.5, 0.25)
-        ends = (section.shape.surface(section, np.array([place]), radius) for radius in (0.7, 1.1))
+        ends = (section.surface(np.array([place]), radius) for radius in (0.7, 1.1))
         start, end = (seen(point)[0] for point in ends)
         # Wherever in the ball the mouse has it.
         held = np.array([3.0, -2.0])
@@ -97,7 +96,7 @@ def test_the_ball_follows_the_mouse(seen):
 def test_along_the_radius_upwards_is_outwards():
     section = Section("cylinder", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.7)
     points = np.array([[0.0, 0.0, 0.7], [1.0, 0.0, 0.7]])
-    place = patch_of(section, points).middle
+    place = section.patch(points).middle
     at, way, steep = pixel_and_slope(parallel, section, place, 0.7)
     assert steep
     assert way == pytest.approx((0.0, 100.0))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from slideviz.sections.handles import dragged, handle_parts, part_at
-from slideviz.sections.line import along, box_around, line_ends, trace
+from slideviz.sections.handles import handle_parts, part_at
+from slideviz.sections.line import box_around
 from slideviz.sections.model import Section
 
 BOX = np.array([0.0, 0.0]), np.array([4.0, 2.0])
@@ -18,34 +18,34 @@ def at(*numbers):
 
 
 def test_a_line_is_clipped_to_the_box():
-    assert np.allclose(line_ends(LINE, BOX), [[1, 0], [1, 2]])
-    assert np.allclose(line_ends(SLOPE, BOX), [[0, 0], [2, 2]])
-    assert line_ends(Section("plane", (5.0, 0.0, 0.0), (1.0, 0.0, 0.0)), BOX) is None
-    assert line_ends(Section("plane", (9.0, 0.0, 0.0), (1.0, 1.0, 0.0)), BOX) is None
-    assert trace(Section("plane", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), BOX) == []
+    assert np.allclose(LINE.ends(BOX), [[1, 0], [1, 2]])
+    assert np.allclose(SLOPE.ends(BOX), [[0, 0], [2, 2]])
+    assert Section("plane", (5.0, 0.0, 0.0), (1.0, 0.0, 0.0)).ends(BOX) is None
+    assert Section("plane", (9.0, 0.0, 0.0), (1.0, 1.0, 0.0)).ends(BOX) is None
+    assert Section("plane", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)).trace(BOX) == []
 
 
 def test_a_plane_that_leans_meets_the_mesh_beside_its_origin():
     leaning = Section("plane", (1.0, 0.0, 1.0), (1.0, 0.0, 1.0))
-    (line,) = trace(leaning, BOX)
+    (line,) = leaning.trace(BOX)
     assert line[:, 0] == pytest.approx(2.0)
 
 
 def test_a_line_runs_to_the_positive_side():
-    assert along(LINE) == pytest.approx((0, 1))
-    assert along(Section("plane", direction=(0.0, -2.0, 0.0))) == pytest.approx((1, 0))
+    assert LINE.way == pytest.approx((0, 1))
+    assert Section("plane", direction=(0.0, -2.0, 0.0)).way == pytest.approx((1, 0))
 
 
 def test_a_circle_is_cut_where_it_leaves_the_box():
-    (whole,) = trace(RING, BOX)
+    (whole,) = RING.trace(BOX)
     assert np.hypot(*(whole - (2, 1)).T) == pytest.approx(0.5)
     assert np.allclose(whole[0], whole[-1])
-    parts = trace(Section("cylinder", (2.0, 1.0, 0.0), radius=1.5), BOX)
+    parts = Section("cylinder", (2.0, 1.0, 0.0), radius=1.5).trace(BOX)
     assert len(parts) in (2, 3)  # right and left, one of them where the angle begins
     every = np.concatenate(parts)
     assert (every >= BOX[0]).all()
     assert (every <= BOX[1]).all()
-    assert trace(Section("cylinder", (2.0, 1.0, 0.0), radius=9.0), BOX) == []
+    assert Section("cylinder", (2.0, 1.0, 0.0), radius=9.0).trace(BOX) == []
 
 
 def test_the_box_around_a_mesh_has_a_margin():
@@ -85,37 +85,37 @@ def test_the_mouse_takes_points_before_the_line():
 
 def test_a_line_moves_by_its_middle_and_across_itself_by_the_rest():
     way = at(1.0, 0.5), at(1.5, 0.9)
-    assert dragged(LINE, "middle", way, BOX).origin == pytest.approx((1.5, 0.9, 0.0))
-    moved = dragged(LINE, "line", way, BOX)
+    assert LINE.dragged("middle", way, BOX).origin == pytest.approx((1.5, 0.9, 0.0))
+    moved = LINE.dragged("line", way, BOX)
     assert moved.origin == pytest.approx((1.5, 0.5, 0.0))
     assert moved.direction == LINE.direction
     assert moved.whole_cells
 
 
 def test_a_line_turns_about_its_middle():
-    turned = dragged(LINE, "end", (at(1, 2), at(2.0, 1.5)), BOX)
+    turned = LINE.dragged("end", (at(1, 2), at(2.0, 1.5)), BOX)
     assert turned.origin == pytest.approx((1.0, 0.5, 0.0))
     assert turned.direction == pytest.approx((0.7071, -0.7071, 0.0))
     # Past the vertical it does not flip to the other side.
-    other = dragged(LINE, "end", (at(1, 2), at(0.9, 2.0)), BOX)
+    other = LINE.dragged("end", (at(1, 2), at(0.9, 2.0)), BOX)
     assert other.direction[0] > 0.9
-    assert dragged(LINE, "end", (at(1, 2), at(1.0, 0.5)), BOX) == LINE
+    assert LINE.dragged("end", (at(1, 2), at(1.0, 0.5)), BOX) == LINE
 
 
 def test_a_circle_moves_by_its_middle_and_grows_by_the_rest():
     way = at(2.0, 1.0), at(2.2, 1.3)
-    assert dragged(RING, "middle", way, BOX).origin == pytest.approx((2.2, 1.3, 0.0))
+    assert RING.dragged("middle", way, BOX).origin == pytest.approx((2.2, 1.3, 0.0))
     for part in ("end", "line"):
-        grown = dragged(RING, part, (at(2.5, 1.0), at(2.0, 1.8)), BOX)
+        grown = RING.dragged(part, (at(2.5, 1.0), at(2.0, 1.8)), BOX)
         assert grown.radius == pytest.approx(0.8)
         assert grown.origin == RING.origin
-    assert dragged(RING, "end", (at(2.5, 1.0), at(2.0, 1.0)), BOX).radius > 0
+    assert RING.dragged("end", (at(2.5, 1.0), at(2.0, 1.0)), BOX).radius > 0
 
 
 def test_what_is_dragged_has_no_more_digits_than_the_mouse_can_aim():
-    moved = dragged(LINE, "middle", (at(0, 0), at(0.123456789, 0.0)), BOX)
+    moved = LINE.dragged("middle", (at(0, 0), at(0.123456789, 0.0)), BOX)
     assert moved.origin[0] == 1.1235
     tiny = tuple(1e-6 * side for side in BOX)
     small = Section("plane", (1e-6, 0.0, 0.0), (1.0, 0.0, 0.0))
-    shifted = dragged(small, "middle", (at(0, 0), at(0.1234567e-6, 0.0)), tiny)
+    shifted = small.dragged("middle", (at(0, 0), at(0.1234567e-6, 0.0)), tiny)
     assert shifted.origin[0] == pytest.approx(1.1235e-6, rel=1e-9)

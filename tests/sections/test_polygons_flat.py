@@ -5,13 +5,12 @@ import pytest
 
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.sections.plane import plane_axes
 from tests.builders import cube, grid, passage, ring
 from tests.sections.test_model_section import areas
 
 
 def flatten(polygons, section, near=None):
-    return section.shape.flatten(section, polygons, near, near)
+    return section.flatten(polygons, near, near)
 
 
 def turned(mesh, degrees):
@@ -52,7 +51,7 @@ def test_a_sector_unrolls_to_a_rectangle_wherever_it_lies(start, kind):
     assert span == pytest.approx([1.0, 0.7 * np.radians(30), 0.0], abs=1e-12)
     assert areas(flat).sum() == pytest.approx(0.7 * np.radians(30), abs=1e-12)
     wanted = np.radians(start + 15)
-    assert np.cos(section.shape.middle_angle(section, cut) - wanted) == pytest.approx(1.0)
+    assert np.cos(section.middle_angle(cut) - wanted) == pytest.approx(1.0)
 
 
 def test_a_whole_ring_is_opened_once_and_no_polygon_is_torn():
@@ -85,7 +84,7 @@ def test_copies_are_laid_beside_each_other():
         points = turned(mesh, 30 * number).points
         cut = cutter.cut(points, section)
         flat = flatten(cut, section, near)
-        near = section.shape.middle_angle(section, cut, near) + np.radians(30)
+        near = section.middle_angle(cut, near) + np.radians(30)
         tops.append(flat.points[:, 1].max())
     assert np.diff(tops) == pytest.approx(0.7 * np.radians(30))
 
@@ -103,7 +102,7 @@ def test_axis_and_centre_do_not_change_the_unrolled_shape():
     assert np.ptp(again.points, axis=0) == pytest.approx(np.ptp(flat.points, axis=0), abs=1e-12)
     # Positions along the axis are coordinates.
     assert again.points[:, 0].min() == pytest.approx(3.0)
-    assert [label.full for label in other.shape.flat_labels(other)] == ["x", "r θ"]
+    assert [label.full for label in other.flat_labels()] == ["x", "r θ"]
 
 
 def test_the_sign_of_an_axis_does_not_matter():
@@ -133,7 +132,7 @@ def test_planes_along_the_axes_show_coordinates(normal, labels, sign):
     section = Section("plane", (10.4, 20.4, 30.4), tuple(sign * v for v in normal))
     cut = Cutter.of(mesh).cut(points, section)
     flat = flatten(cut, section)
-    assert tuple(label.short for label in section.shape.flat_labels(section)) == labels
+    assert tuple(label.short for label in section.flat_labels()) == labels
     wanted = cut.points[:, ["xyz".index(label) for label in labels]]
     assert flat.points[:, :2] == pytest.approx(wanted)
     assert np.abs(flat.points[:, 2]).max() < 1e-12
@@ -144,7 +143,7 @@ def test_an_oblique_plane_keeps_lengths_and_has_z_upwards():
     section = Section("plane", (0.5, 0.5, 0.5), (1, 2, 0.5))
     cut = Cutter.of(mesh).cut(mesh.points, section)
     assert areas(flatten(cut, section)) == pytest.approx(areas(cut))
-    axes = plane_axes(section)
+    axes = section.axes
     assert axes.rows @ axes.rows.T == pytest.approx(np.eye(3))
     assert np.linalg.det(axes.rows) == pytest.approx(1.0)
     assert axes.rows[1, 2] > 0.9

@@ -16,7 +16,6 @@ from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, laid_flat, section_picture
 from slideviz.scene.axis_handle import dragged_size, frame_of
 from slideviz.scene.flat_scene import flat_matrix
-from slideviz.sections.around_axis import patch_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.opening import open_mesh
@@ -107,7 +106,7 @@ def test_an_edge_is_crossed_where_the_half_along_the_axis_is(start, end):
     section = Section("cone", half_angle_deg=45.0)
     ends = np.array([start]), np.array([end])
     level = [section.distance(np.concatenate([one, [[0.0, 0.0, 5.0]]]))[:1] for one in ends]
-    share = section.shape.crossings(section, (ends[0], ends[1] - ends[0]), tuple(level))
+    share = section.crossings((ends[0], ends[1] - ends[0]), tuple(level))
     (point,) = ends[0] + share[:, None] * (ends[1] - ends[0])
     assert point[2] > 0.0
     assert np.hypot(*point[:2]) == pytest.approx(point[2], abs=1e-14)
@@ -123,7 +122,7 @@ def developed(section, points):
 def test_a_sector_lies_flat_with_its_lengths_wherever_it_lies(start):
     mesh = sector(start, kind="simplex")
     cut = Cutter.of(mesh).cut(mesh.points, CUT)
-    flat = CUT.shape.flatten(CUT, cut, None, None)
+    flat = CUT.flatten(cut, None, None)
     assert np.abs(flat.points[:, 2]).max() < 1e-12
     # From the apex, and between neighbours: as long as the geodesic, by the law of cosines.
     corner, other = (
@@ -151,7 +150,7 @@ def test_the_area_laid_flat_tends_to_that_of_the_cone(count):
     shape = (6, count, 6)
     mesh = sector(20.0, 60.0, shape)
     cut = Cutter.of(mesh).cut(mesh.points, CUT)
-    flat = CUT.shape.flatten(CUT, cut, None, None)
+    flat = CUT.flatten(cut, None, None)
     # From z = 0 to r = 1, that is from s = 1 / cos to s = 1 / sin.
     sin, cos = np.sin(np.radians(ANGLE)), np.cos(np.radians(ANGLE))
     exact = 0.5 * (1.0 / sin**2 - 1.0 / cos**2) * np.radians(60.0) * sin
@@ -167,7 +166,7 @@ def test_a_whole_ring_is_opened_once_to_a_piece_of_a_disc():
     shape = (3, 24, 4)
     mesh = grid(shape, wrap=1, place=ring(shape, 0.5, 1.0, 360.0))
     cut = Cutter.of(mesh).cut(mesh.points, CUT)
-    flat = CUT.shape.flatten(CUT, cut, None, None)
+    flat = CUT.flatten(cut, None, None)
     angles = np.degrees(np.arctan2(flat.points[:, 1], flat.points[:, 0]))
     assert np.ptp(angles) == pytest.approx(360.0 * np.sin(np.radians(ANGLE)))
     assert len(flat.points) > len(cut.points)
@@ -190,8 +189,8 @@ def test_copies_lie_beside_each_other_and_are_turned_about_the_apex(start):
     assert abs(angles.max() + angles.min()) < 1e-9
     # The window draws its one piece again, turned.
     own, beside = (
-        CUT.shape.flatten(CUT, pieces[n], CUT.shape.middle_angle(CUT, pieces[n], near), ahead)
-        for ahead in [CUT.shape.middle_angle(CUT, pieces[0])]
+        CUT.flatten(pieces[n], CUT.middle_angle(pieces[n], near), ahead)
+        for ahead in [CUT.middle_angle(pieces[0])]
         for n, near in ((0, ahead), (2, ahead + np.radians(60.0)))
     )
     matrix = flat_matrix(CUT, pair, 2, every[2])
@@ -275,11 +274,11 @@ def test_another_axis_or_apex_leaves_it_where_it_cuts():
 def test_the_frame_lies_on_it_around_what_is_cut():
     mesh = sector(75.0)
     cut = Cutter.of(mesh).cut(mesh.points, CUT)
-    patch = patch_of(CUT, cut.points)
+    patch = CUT.patch(cut.points)
     lines = np.concatenate(frame_of(CUT, patch))
     assert np.abs(away(CUT, lines)).max() < 1e-12
     assert lines[:, 2].min() < cut.points[:, 2].min()
-    right, up, to_eye = CUT.shape.facing(CUT, cut.points)
+    right, up, to_eye = CUT.facing(cut.points)
     assert np.cross(right, up) == pytest.approx(to_eye)
     assert to_eye[2] == pytest.approx(-np.sin(np.radians(ANGLE)))
 
@@ -291,7 +290,7 @@ def parallel(points):
 
 def test_the_ball_follows_the_mouse_around_the_apex():
     place = (0.3, 1.2)
-    ends = (CUT.shape.surface(CUT, np.array([place]), angle) for angle in (ANGLE, 41.0))
+    ends = (CUT.surface(np.array([place]), angle) for angle in (ANGLE, 41.0))
     start, end = (parallel(point)[0] for point in ends)
     held = np.array([3.0, -2.0])
     assert dragged_size(parallel, CUT, place, start=start + held, now=end + held) == pytest.approx(

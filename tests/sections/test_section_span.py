@@ -14,7 +14,6 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.zones import join_zones
 from slideviz.samples.impeller import impeller_mesh
 from slideviz.scene.axis_handle import frame_of
-from slideviz.sections.around_axis import patch_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.span import find_walls
@@ -43,7 +42,7 @@ def test_between_cylinders_it_is_a_cylinder():
     assert cut.points == pytest.approx(same.points, abs=1e-12)
     # m' is z over the radius there; theta is the angle.
     section = bound(mesh, 0.3)
-    flat = section.shape.flatten(section, cut, None, None)
+    flat = section.flatten(cut, None, None)
     at = flat.points[flat.connectivity]
     assert np.ptp(at[:, 0]) == pytest.approx(1.0 / 0.65, rel=1e-5)
     assert np.ptp(at[:, 1]) == pytest.approx(np.radians(30.0), rel=1e-9)
@@ -54,11 +53,11 @@ def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
     mesh = impeller_mesh(3000)
     section = bound(mesh, 0.37)
     cut = Cutter.of(mesh).cut(mesh.points, section)
-    spans = section.shape.positions(section, cut.points)
+    spans = section.positions(cut.points)
     assert len(cut) > 100
     assert np.abs(spans - 0.37).max() < 1e-12
     # Angles between the edges of small polygons are as in space.
-    flat = section.shape.flatten(section, cut, None, None)
+    flat = section.flatten(cut, None, None)
     assert len(flat.points) == len(cut.points)
 
     def cosines(polygons):
@@ -70,13 +69,13 @@ def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
     small = flat.with_points(flat.points * [1.0, 1.0, 0.0])
     assert np.median(np.abs(cosines(small) - cosines(cut))) < 0.01
     # Its handle: places of the surface are on the span, and the frame is around them.
-    patch = patch_of(section, cut.points)
-    on = section.shape.surface(section, patch.places[::20], 0.37)
-    off = np.abs(section.shape.positions(section, on) - 0.37)
+    patch = section.patch(cut.points)
+    on = section.surface(patch.places[::20], 0.37)
+    off = np.abs(section.positions(on) - 0.37)
     assert np.median(off) < 1e-4
     assert off.max() < 0.02  # the facets of the walls have edges, which the spline rounds
     assert all(np.isfinite(line).all() for line in frame_of(section, patch))
-    assert section.shape.lever(section, 0.0) == pytest.approx(0.3, rel=0.3)
+    assert section.lever(0.0) == pytest.approx(0.3, rel=0.3)
 
 
 def test_layers_of_nodes_that_are_nearly_on_it_are_not_cut_into_slivers():
@@ -88,7 +87,7 @@ def test_layers_of_nodes_that_are_nearly_on_it_are_not_cut_into_slivers():
     cut = Cutter.of(mesh).cut(shaken, section)
     assert cut.cells.tolist() == regular.cells.tolist()
     assert cut.sizes.tolist() == regular.sizes.tolist()
-    assert np.abs(section.shape.positions(section, cut.points) - 0.5).max() < 2e-3
+    assert np.abs(section.positions(cut.points) - 0.5).max() < 2e-3
     # A mesh in its file gets the same cells: those below, which touch it only so, are read too.
     block = next(MemorySource(mesh.with_points(shaken)).blocks())
     part = cut_cells([block], section)
@@ -185,16 +184,16 @@ def test_each_zone_is_cut_by_the_span_between_its_own_walls(span):
     radius = 0.5 + 0.5 * span
     assert np.hypot(*cut.points[:, :2].T) == pytest.approx(radius, rel=0.02)
     # Laid flat, the second zone goes on where the first one ends: m' is z / r there.
-    flat = section.shape.flatten(section, cut, None, None)
+    flat = section.flatten(cut, None, None)
     low, high = flat.points[:, 0].min(), flat.points[:, 0].max()
     assert high - low == pytest.approx(1.75 / radius, rel=0.02)
-    along, z = section.shape.places(section, cut.points)[:, 1], cut.points[:, 2]
+    along, z = section.places(cut.points)[:, 1], cut.points[:, 2]
     assert along - along[0] == pytest.approx(z - z[0], abs=1e-3)
     # The handle's surface goes through both.
     places = np.column_stack([np.full(5, 0.3), along.min() + np.linspace(0.1, 1.7, 5)])
-    surface = section.shape.surface(section, places, span)
+    surface = section.surface(places, span)
     assert surface[:, 2] == pytest.approx(np.linspace(0.1, 1.7, 5), abs=0.01)
-    assert section.shape.lever(section, float(along[-1])) == pytest.approx(0.5, rel=0.02)
+    assert section.lever(float(along[-1])) == pytest.approx(0.5, rel=0.02)
 
 
 def test_zones_without_walls_are_left_out_and_others_are_named():

@@ -53,9 +53,9 @@ def test_sections_start_in_the_middle_of_the_step_that_is_shown():
     longest = int(np.argmax(np.ptp(mesh.points, axis=0)))
     low, high = np.sort(mesh.points[:, longest])[[0, -1]]
     plane, cylinder = (first_section(kind, session) for kind in ("plane", "cylinder"))
-    for value in (plane.shape.position(plane), cylinder.radius):
+    for value in (plane.position, cylinder.radius):
         assert len(f"{value:.6g}") <= 5
-    assert abs(plane.shape.position(plane) - (low + high) / 2.0) < 0.15 * (high - low)
+    assert abs(plane.position - (low + high) / 2.0) < 0.15 * (high - low)
     radii = np.hypot(*mesh.points[:, :2].T)
     assert np.abs(radii - cylinder.radius).min() > 0.003
     assert cylinder.radius == pytest.approx(0.2875, abs=0.02)
@@ -67,5 +67,5 @@ def test_sections_start_in_the_middle_of_the_step_that_is_shown():
     assert shown.frame.mesh is later
     assert first_section("cylinder", shown).radius == pytest.approx(0.575, abs=0.04)
     moved = first_section("plane", shown)
-    assert abs(moved.shape.position(moved) - (low + high)) < 0.3 * (high - low)
+    assert abs(moved.position - (low + high)) < 0.3 * (high - low)
     assert replace(moved, origin=plane.origin) == plane

@@ -147,7 +147,7 @@ class SectionEditor(QWidget):
         if mesh is not self._mesh:
             self._mesh = mesh
             self._points = section_cuts.cell_points(mesh)
-        terms = section.shape.terms
+        terms = section.terms
         flat = mesh.dim == 2
         # A circle's axis is always z, and that of a span the machine's.
         fixed = (flat and bool(terms.point)) or section.walls is not None
@@ -181,13 +181,13 @@ class SectionEditor(QWidget):
 
     def _sync_place(self, section: Section) -> None:
         """Show position or size; the slider's range is found again only if it may have changed."""
-        centre = section.origin if section.shape.terms.point else ()
+        centre = section.origin if section.terms.point else ()
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
             assert self._points is not None
             self._span = section_cuts.position_range(section, self._points)
             self._span_of = key
-        value = section.shape.position(section)
+        value = section.position
         low, high = self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
@@ -228,13 +228,13 @@ class SectionEditor(QWidget):
 
     def _position_typed(self, value: float) -> None:
         if self._section is not None:
-            self._emit(self._section.shape.at_position(self._section, value))
+            self._emit(self._section.at_position(value))
 
     def _allowed(self, value: float) -> str:
         if self._section is None:
             return ""
         try:
-            self._section.shape.at_position(self._section, value)
+            self._section.at_position(value)
         except CaseError as problem:
             return str(problem)
         return ""
@@ -252,7 +252,7 @@ class SectionEditor(QWidget):
         # A radius of 0 is not allowed, and a plane through the outermost nodes cuts nothing.
         share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
         value = low + float(share) * (high - low)
-        self._emit(self._section.shape.at_position(self._section, value))
+        self._emit(self._section.at_position(value))
 
 
 def _way(section: Section | None) -> tuple[object, ...]:
@@ -264,7 +264,7 @@ def _axis_of(section: Section) -> str:
     unit = np.asarray(section.direction) / np.linalg.norm(section.direction)
     for word, axis in AXES.items():
         along = float(unit @ np.asarray(axis))
-        if (along if section.shape.terms.one_way else abs(along)) > 1.0 - 1e-12:
+        if (along if section.terms.one_way else abs(along)) > 1.0 - 1e-12:
             return word
     return FREE
 
@@ -411,7 +411,7 @@ class SectionsPanel(Panel):
 
     def _sync_tools(self, session: Session, dim: int) -> None:
         selected = session.view.section
-        row = next(iter(SECTION_SHAPES.values())) if selected is None else selected.shape.terms
+        row = next(iter(SECTION_SHAPES.values())) if selected is None else selected.terms
         words = row.words.get(dim, row.words[3])
         shown = selected is not None and selected.shown
         for box, name, tip in (

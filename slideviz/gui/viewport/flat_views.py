@@ -403,7 +403,7 @@ class FlatView(_SectionView):
         self.scene.update(session, section)
         words = section.describe()
         self.describe(f"{called}: {words}" if called else words, self.scene.summary)
-        about = section.origin if section.shape.terms.point else ()
+        about = section.origin if section.terms.point else ()
         kind = (session.mesh, section.kind, section.direction, about, session.view.passages)
         if kind != self._fitted:
             self._fitted = kind

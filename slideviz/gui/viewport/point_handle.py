@@ -25,8 +25,8 @@ from slideviz.scene.actors import draw_in_front
 from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_and_slope
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.scene.scene import Scene
-from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
-from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, part_at, rounded
+from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_section
+from slideviz.sections.handles import HandleParts, Part, handle_parts, part_at, rounded
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
@@ -261,7 +261,7 @@ class InPlaneHandle(PointHandle[tuple[Section, Box]]):
         """Return the line or circle moved, turned, or with another radius, after a drag."""
         section, box = grasp
         assert self._part is not None
-        return dragged(section, self._part, (start, end), box)
+        return section.in_plane.dragged(self._part, (start, end), box)
 
 
 _FRAME = "handle:frame"
@@ -305,7 +305,7 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
         assert section is not None
         assert patch is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
-        pixels = self.pixels_of(axis_shape(section).surface(section, places, section.size))
+        pixels = self.pixels_of(axis_section(section).surface(places, section.size))
         wide, high = self.view.window_size
         end = np.array([wide - self.scene.stage.strip() - EDGE_PX, high - EDGE_PX])
         within = np.all((pixels >= EDGE_PX) & (pixels <= end), axis=1)

@@ -188,7 +188,7 @@ def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
     """Return the class of the handle for a section: by the mesh's dimension, then by its shape."""
     if mesh.dim == 2:
         return InPlaneHandle
-    return PlaneHandle if section.shape.handle == "push" else AxisHandle
+    return PlaneHandle if section.handle == "push" else AxisHandle
 
 
 BESIDE_PX = 1000
@@ -253,7 +253,7 @@ class SectionViews(QSplitter):
             return
         scene = self.viewing.scene
         points = points_near(section, session.frame.mesh, scene.sections.cuts)
-        rows = section.shape.facing(section, points)
+        rows = section.facing(points)
         camera = scene.plotter.camera
         camera.position = np.asarray(camera.focal_point) + rows[2] * camera.distance
         camera.up = rows[1]
