@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots, row_norms
-from slideviz.mesh.topology import facet_vectors, find_joints, unit
+from slideviz.mesh.topology import distinct_edges, facet_edges, facet_vectors, find_joints, unit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -83,11 +83,11 @@ def find_edges(points: FloatArray, facets: IntArray) -> tuple[IntArray, IntArray
     pairs, sharp = find_joints(facets, dim)
     normals = unit(facet_vectors(points, facets))
     sharp = sharp[row_dots(normals[pairs[:, 0]], normals[pairs[:, 1]]) < SHARP]
-    sides = facets.reshape(-1, 1)
     if dim == 3:
-        sides = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
-        sides = np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1)
-    sides, count = np.unique(sides, axis=0, return_counts=True)
+        sides, _, count = distinct_edges(facet_edges(facets))
+    else:
+        sides, count = np.unique(facets, return_counts=True)
+        sides = sides[:, None]
     return sharp, sides[count == 1]
 
 
@@ -239,10 +239,7 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
     # Late: scipy.sparse takes 0.1 s.
     from scipy.sparse import coo_array, diags_array
 
-    one = facets.ravel()
-    two = np.roll(facets, -1, axis=1).ravel()
-    edges = np.sort(np.stack([one, two], axis=1)[one != two], axis=1)
-    one, two = np.unique(edges, axis=0).T
+    one, two = distinct_edges(facet_edges(facets))[0].T
     k = len(points)
     weights = 1.0 / row_norms(points[one] - points[two])
     links = coo_array((weights, (one, two)), (k, k)).tocsr()

@@ -15,7 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, row_norms
+from slideviz.mesh.topology import facet_edges
 from slideviz.rbf.closest import ClosestPoints
 
 RELATIVE = 1e-7  # a distance is found up to this part of it
@@ -140,22 +142,16 @@ def bodies(nodes: IntArray, sides: IntArray) -> list[Body]:
     MeshError
         Facets meet their own image: they go around the machine, as a hub does.
     """
-    # Late: scipy.sparse takes 0.1 s.
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     used, local = np.unique(nodes, return_inverse=True)
     local = local.reshape(nodes.shape)
-    pairs = np.stack([local, np.roll(local, 1, axis=1)], axis=2).reshape(-1, 2)
-    graph = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(used),) * 2)
-    count, part = connected_components(graph, directed=False)
+    part = components(len(used), *facet_edges(local).T)
     of_facet = part[local[:, 0]]
     # A part one period on meets another one where a node's image is a node of that.
     both = sides[np.isin(sides, used).all(axis=1) & (sides[:, 0] != sides[:, 1])]
     links = np.unique(part[np.searchsorted(used, both)].reshape(-1, 2), axis=0).tolist()
     turns: dict[int, int] = {}
     made = []
-    for start in range(count):
+    for start in range(part.max(initial=-1) + 1):
         if start in turns:
             continue
         turns[start] = 0

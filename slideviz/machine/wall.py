@@ -6,8 +6,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from slideviz.mesh.fans import components
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_norms
-from slideviz.mesh.topology import facet_vectors, unit, vertex_normals
+from slideviz.mesh.topology import (
+    distinct_edges,
+    facet_edges,
+    facet_vectors,
+    unit,
+    vertex_normals,
+)
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import as_simplices
 
@@ -116,18 +123,12 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The longest
     rim of each connected part is that of the wall itself.
     """
-    # Late: scipy.sparse takes 0.1 s.
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    # Late: scipy.spatial takes 0.1 s.
     from scipy.spatial import Delaunay
 
-    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    graph = coo_array((np.ones(len(edges), bool), edges.T), shape=(len(coords),) * 2)
-    part = connected_components(graph, directed=False)[1]
+    edges = facet_edges(facets)
+    _, first, count = distinct_edges(edges)
+    part = components(len(coords), *edges.T)
     follows = dict(edges[first[count == 1]].tolist())
     rims = dict[int, list[tuple[FloatArray, IntArray]]]()
     while follows:

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
-from slideviz.mesh.nearest import row_groups
+from slideviz.mesh.topology import distinct_edges, facet_edges
 from slideviz.system.weak_cache import WeakCache
 
 LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
@@ -146,14 +146,8 @@ def is_closed(surfaces: Sequence[Surface]) -> bool:
     faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
     if len(faces) != len(surfaces) or not faces:
         return False
-    every = np.concatenate(faces)
-    start = every.ravel()
-    end = np.roll(every, -1, axis=1).ravel()
-    low = np.minimum(start, end)
-    high = np.maximum(start, end)
-    keys = np.sort((low * (every.max() + 1) + high)[low != high])
-    pairs = len(keys) % 2 == 0 and bool(np.all(keys[::2] == keys[1::2]))
-    return pairs and bool(np.all(keys[1:-1:2] != keys[2::2]))
+    _, _, count = distinct_edges(facet_edges(np.concatenate(faces)))
+    return bool((count == 2).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,10 +212,5 @@ def _rim(facets: IntArray) -> IntArray:
     """Return the edges (r, 2), nodes sorted, that only one of the faces (f, 4) has; none in 2D."""
     if facets.shape[1] == 2:
         return np.empty((0, 2), np.int64)
-    edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    group = row_groups(edges)
-    once = np.bincount(group) == 1
-    rim = np.empty((len(once), 2), np.int64)
-    rim[group] = edges
-    return rim[once]
+    edges, _, count = distinct_edges(facet_edges(facets))
+    return edges[count == 1]

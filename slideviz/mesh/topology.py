@@ -290,6 +290,23 @@ def unit(vectors: FloatArray) -> FloatArray:
     return vectors / np.where(length > 0, length, 1.0)
 
 
+def facet_edges(facets: IntArray) -> IntArray:
+    """Return the edges (e, 2) around each of facets (f, k), facet by facet, in their direction."""
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    return edges[edges[:, 0] != edges[:, 1]]
+
+
+def distinct_edges(edges: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return each of edges (e, 2) once in either direction, (u, 2), its first place, its number.
+
+    Nodes and edges are in ascending order.
+    """
+    above = int(edges.max(initial=0)) + 1
+    keys = edges.min(axis=1) * above + edges.max(axis=1)
+    keys, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return np.stack(np.divmod(keys, above), axis=1), first, count
+
+
 def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
     """Return pairs (j, 2) of facets that share a node (2D) or an edge (3D), and its nodes.
 

@@ -38,7 +38,7 @@ from slideviz.mesh.model import (
     row_dots,
     row_norms,
 )
-from slideviz.mesh.topology import TINY, corner_vectors
+from slideviz.mesh.topology import TINY, corner_vectors, distinct_edges, facet_edges
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
@@ -196,9 +196,7 @@ class WallNodes:
 
     @cached_property
     def _edges(self) -> IntArray:
-        ends = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=-1).reshape(-1, 2)
-        ends = np.unique(np.sort(ends, axis=1), axis=0)
-        return ends[ends[:, 0] != ends[:, 1]].T
+        return distinct_edges(facet_edges(self.facets))[0].T
 
     def near(self, targets: FloatArray) -> tuple[IntArray, FloatArray, csr_array, csr_array]:
         """Return which points (m, d) are in the zone, (z,), their share b (z, 1), and two matrices.

@@ -107,11 +107,11 @@ class AboutAxis(Section):
     # What each shape defines, besides the functions of `Section` ------------------------
     @abstractmethod
     def laid(self, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
-        """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Section.flatten`)."""
+        """Return unrolled points (p, 3) laid flat (see `Section.flatten`)."""
 
     @abstractmethod
     def places(self, points: FloatArray) -> FloatArray:
-        """Return unrolled points (p, 3) laid flat; see `slideviz.sections.shape.Section.flatten`."""
+        """Return unrolled points (p, 3) laid flat; see `Section.flatten`."""
 
     @abstractmethod
     def surface(self, places: FloatArray, size: float) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
+from slideviz.mesh.nearest import row_groups, sorted_in_rows
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import InPlane, Section
@@ -121,7 +122,7 @@ class Cutter:
         facets = np.concatenate(sides)
         owner = np.concatenate(owners)
         if self.dim == 3:
-            outer = _single(facets, len(points))
+            outer = _single(facets)
             facets = facets[outer]
             owner = owner[outer]
         keep = np.ones(facets.shape, bool)
@@ -227,16 +228,10 @@ def _wide(table: IntArray, width: int) -> IntArray:
     return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=-1)
 
 
-def _single(facets: IntArray, n_points: int) -> BoolArray:
+def _single(facets: IntArray) -> BoolArray:
     """Return a mask (f,) of the facets (f, 4) whose nodes no other facet has."""
-    nodes = np.sort(facets, axis=1)
-    keys = nodes[:, 0] * n_points + nodes[:, 1], nodes[:, 2] * n_points + nodes[:, 3]
-    order = np.lexsort(keys)
-    differs = np.ones(len(facets) + 1, bool)
-    differs[1:-1] = (np.diff(keys[0][order]) != 0) | (np.diff(keys[1][order]) != 0)
-    single = np.empty(len(facets), bool)
-    single[order] = differs[1:] & differs[:-1]
-    return single
+    group = row_groups(sorted_in_rows(facets))
+    return np.bincount(group)[group] == 1
 
 
 def _distinct(low: IntArray, high: IntArray) -> BoolArray:

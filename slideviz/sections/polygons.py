@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
+from slideviz.mesh.topology import distinct_edges
 
 ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
@@ -89,15 +90,13 @@ class Polygons:
         start = self.connectivity
         after = np.roll(self.connectivity, -1)
         after[self.offsets[1:] - 1] = start[self.offsets[:-1]]
-        low = np.minimum(start, after)
-        high = np.maximum(start, after)
-        _, first, count = np.unique(
-            low * len(self.points) + high, return_index=True, return_counts=True
-        )
+        edges = np.column_stack([start, after])
+        _, first, count = distinct_edges(edges)
         lines = np.sort(first[count == 1])
-        corners = np.column_stack([start[lines], after[lines]]).ravel()
         cells = np.repeat(self.cells, self.sizes)[lines]
-        return Polygons(self.points, offsets_of(np.full(len(lines), 2)), corners, cells)
+        return Polygons(
+            self.points, offsets_of(np.full(len(lines), 2)), edges[lines].ravel(), cells
+        )
 
     def with_last(self, chosen: BoolArray) -> Polygons:
         """Return all polygons, those of the mask ``chosen`` (q,) last: they are drawn on top."""

@@ -356,7 +356,7 @@ def test_wrong_sections_are_refused():
 def test_an_unknown_shape_is_refused_and_lists_become_tuples():
     with pytest.raises(CaseError, match=r"kind: 'plan' is not one of plane .*did you mean plane"):
         Section("plan")
-    with pytest.raises(ArgumentError, match=r"Section: origin is 3; expected 3 numbers"):
+    with pytest.raises(ArgumentError, match=r"Plane: origin is 3; expected 3 numbers"):
         Section("plane", 3)
     made = Section("plane", [0.5, 0.0, 0.0], np.array([1.0, 0.0, 0.0]))
     assert made == Section("plane", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
