@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh import topology
-from slideviz.mesh.fans import Fans
+from slideviz.mesh.fans import Fans, components
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, ranges, row_dots
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.tape import (
@@ -30,7 +30,6 @@ from slideviz.rbf.tape import (
     unit,
     value,
 )
-from slideviz.system.jit_cache import njit
 
 RANK_TOLERANCE = 0.02
 """Sine of the angle (about one degree) from which a further normal counts as independent."""
@@ -125,83 +124,28 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     ``local`` (m,): the fans, those of a node together.
     ``size`` (g,): the number of fans of each node.
     """
-    label = np.empty(len(local), np.int64)
     role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
-    normals = around.normals[local]
     own = around.fan_node[local]
-    _join(size, normals, role, own, around.smooth, around.merge, label)
-    return label
-
-
-@njit
-def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
-    """Write what `_clusters` returns to ``label`` (m,); ``role`` (m,) are numbers."""
-    start = 0
-    for count in size:
-        stop = start + count
-        roles = role[start:stop]
-        nodes = own[start:stop]
-        labels = label[start:stop]
-        alike = _cosines(normals[start:stop])
-        goes_on = _continuations(alike, roles, nodes, smooth)
-        for i in range(count):
-            labels[i] = i
-        for i in range(count):
-            for j in range(i):
-                one = roles[i] == roles[j] and nodes[i] == nodes[j] and alike[i, j] > merge
-                if one or (goes_on[i, j] and goes_on[j, i]) or alike[i, j] > IN_PLANE:
-                    _replace(labels, labels[i], labels[j])
-        _close_gaps(labels)
-        start = stop
-
-
-@njit
-def _cosines(normals):  # type: ignore[no-untyped-def]
-    count = len(normals)
-    alike = np.zeros((count, count))
-    for i in range(count):
-        for j in range(count):
-            for axis in range(normals.shape[1]):
-                alike[i, j] += normals[i, axis] * normals[j, axis]
-    return alike
-
-
-@njit
-def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
-    """Return a mask (c, c): whether the surface of fan i continues in fan j of an image.
-
-    At each image a surface continues in at most one fan, of the same role, at the smallest angle.
-    """
-    count = len(roles)
-    goes_on = np.zeros((count, count), np.bool_)
-    for i in range(count):
-        for k in range(count):  # nodes[k]: an image
-            most = -1
-            for j in range(count):
-                if nodes[j] == nodes[k] and nodes[j] != nodes[i] and roles[j] == roles[i]:
-                    most = j if most < 0 or alike[i, j] > alike[i, most] else most
-            if most >= 0 and alike[i, most] > smooth:
-                goes_on[i, most] = True
-    return goes_on
-
-
-@njit
-def _replace(labels, old, new):  # type: ignore[no-untyped-def]
-    for k in range(len(labels)):
-        if labels[k] == old:
-            labels[k] = new
-
-
-@njit
-def _close_gaps(labels):  # type: ignore[no-untyped-def]
-    """Renumber labels 0, 1, ... in place, in order; `np.unique` would take long to compile."""
-    number = np.zeros(len(labels), np.int64)
-    for label in labels:
-        number[label] = 1
-    for i in range(1, len(number)):
-        number[i] += number[i - 1]
-    for i in range(len(labels)):
-        labels[i] = number[labels[i]] - 1
+    fans = np.repeat(size, size)  # at the node of each
+    first = np.repeat(np.cumsum(size) - size, size)
+    begin = np.cumsum(fans) - fans
+    # All pairs of fans i and j of a node: begin[i] + j - first[i].
+    i = np.repeat(np.arange(len(local)), fans)
+    j = ranges(first, fans)
+    alike = row_dots(around.normals[local[i]], around.normals[local[j]])
+    one_role = role[i] == role[j]
+    images = own[i] != own[j]
+    # At each image a surface continues in at most one fan, of the same role, at the smallest angle.
+    some = np.flatnonzero(one_role & images)
+    some = some[np.lexsort((-alike[some], own[j[some]], i[some]))]
+    image = np.stack([i[some], own[j[some]]])
+    best = some[np.r_[True, (image[:, 1:] != image[:, :-1]).any(axis=0)][: len(some)]]
+    goes_on = np.zeros(len(i), bool)
+    goes_on[best] = alike[best] > around.smooth
+    linked = one_role & ~images & (alike > around.merge)
+    linked |= (goes_on & goes_on[begin[j] + i - first[j]]) | (alike > IN_PLANE)
+    part = components(len(local), i[linked], j[linked])
+    return part - part[first]
 
 
 def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
