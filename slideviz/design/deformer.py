@@ -44,7 +44,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR, ImageDisplacements, largest_misfit, misfits
 from slideviz.rbf.loops import farthest, to_points
-from slideviz.rbf.operations import difference, flat
+from slideviz.rbf.operations import difference_from, flat
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, Tape, Variable, put, take, transform, value
@@ -413,7 +413,7 @@ class KnownNodeMap:
         overwrite = take(vectors, self.rows)
         if self.turn is not None:
             overwrite = transform(self.turn, overwrite)
-        moved = difference(setup.frame, self.points, overwrite)
+        moved = difference_from(setup.frame, self.points, overwrite)
         self._require_alike(value(vectors), value(moved))
         shape = (len(setup.known), self.mesh.dim)
         return put(np.zeros(shape), self.known, take(moved, self.source))
@@ -428,7 +428,7 @@ class KnownNodeMap:
         mesh = self.mesh
         if len(self.others):
             overwrite = vectors[..., self.others, :]
-            follow = difference(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
+            follow = difference_from(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
             gap = np.abs(value(follow) - moved[..., self.followed, :])
             largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)

@@ -50,9 +50,9 @@ from slideviz.rbf.tape import (
     cross,
     gather,
     join,
+    linear,
     mixed,
     multiply,
-    recorded,
     reshape,
     take,
     transform,
@@ -390,7 +390,7 @@ def _outer(fixed: FloatArray, x: Array) -> Array:
         d = fixed.shape[1]
         return np.einsum("nb,...nba->...na", fixed, g.reshape(*g.shape[:-1], d, g.shape[-1] // d))
 
-    return recorded(times(value(x)), (x, times, back))
+    return linear(x, times, back)
 
 
 def wall_nodes(

@@ -13,7 +13,7 @@ from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_sl
 from slideviz.rbf.loops import place, shift
 from slideviz.rbf.slopes import pull_positions, push_positions
 from slideviz.rbf.solve import enough_threads
-from slideviz.rbf.tape import Array, Linear, Link, Variable, recorded, value
+from slideviz.rbf.tape import Array, Linear, Link, Variable, linear, recorded, summed, value
 from slideviz.system.threads import in_parts
 
 PAIRS = 1_000_000
@@ -47,14 +47,14 @@ def features(frame: Frame, coords: Array) -> Array:
 
 def columns(x: Array, nodes: IntArray) -> Array:
     """Return the columns ``nodes`` (m,) of features x (k, n), (k, m)."""
-    v = value(x)
+    count = value(x).shape[-1]
 
     def back(g: FloatArray) -> FloatArray:
-        out = np.zeros((*g.shape[:-1], v.shape[-1]))
+        out = np.zeros((*g.shape[:-1], count))
         np.add.at(out, (..., nodes), g)  # type: ignore[arg-type]
         return out
 
-    return recorded(v[..., nodes], (x, lambda t: t[..., nodes], back))
+    return linear(x, lambda t: t[..., nodes], back)
 
 
 def points(frame: Frame, coords: Array) -> Array:
@@ -85,28 +85,18 @@ def add_displacement(start: Array, by: Array, *, overwrite: bool = False) -> Arr
     x = value(start)
     u = value(by)
     out = shift(x, u if overwrite else u.copy())
-    return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
-
-
-def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
-    """Return displacements ``vectors`` of ``start`` (n, d) in the frame, (..., n, d)."""
-    v = value(vectors)
-    full = np.broadcast_to(start, v.shape)
-    out = frame.difference(flat(full), flat(v)).reshape(v.shape)
-    if not frame.cylindrical:
-        return recorded(out, (vectors, lambda t: t, lambda g: g))
-    return _turned(vectors, out, lambda: coords_slopes(frame, start + v))
+    return summed(out, start, by)
 
 
 def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
-    """Return what ``difference`` does, where ``start`` may be a variable, too."""
+    """Return displacements ``vectors`` of ``start`` (..., n, d) in the frame, (..., n, d)."""
     if not frame.cylindrical:
         return vectors
     x = value(start)
     v = value(vectors)
     out = frame.difference(flat(np.broadcast_to(x, v.shape)), flat(v)).reshape(v.shape)
-    if not any(isinstance(part, Variable) for part in (start, vectors)):
-        return out
+    if not isinstance(start, Variable):
+        return _turned(vectors, out, lambda: coords_slopes(frame, x + v))
     here = coords_slopes(frame, x)
     there = coords_slopes(frame, x + v)
     return recorded(out, _by_rows(start, there - here), _by_rows(vectors, there))

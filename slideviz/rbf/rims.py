@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +21,17 @@ from slideviz.mesh.topology import TINY, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.projection import projection_matrices, simplex_vectors
-from slideviz.rbf.tape import Array, Variable, recorded, take, transform, value
+from slideviz.rbf.tape import (
+    Array,
+    Variable,
+    linear,
+    over_columns,
+    summed,
+    sums,
+    take,
+    transform,
+    value,
+)
 
 ROUNDING = 1e-13
 """Part of the largest coordinate by which a rim may be off its wall and stays where it is: so a
@@ -35,34 +45,12 @@ BULGE = 0.25
 normals at its ends: twice the 1/8 of an arc, since normals at nodes are estimates."""
 
 
-class RimWall(Protocol):
-    """A smooth surface, in 2D a curve, that nodes of a rim are on."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return its boundaries that have the nodes."""
-
-    @property
-    def rows(self) -> IntArray:
-        """Return these nodes, as places in the rim: (k,)."""
-
-    @property
-    def bulge(self) -> float:
-        """Return how far nodes on it may be off its facets."""
-
-    def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the closest points of nodes at (k, d), and their derivatives (k, d, d)."""
-
-    def across(self, positions: FloatArray) -> FloatArray:
-        """Return the feet (k, d) of nodes at (k, d) on the planes that are tangent there."""
-
-
 @dataclass(frozen=True, eq=False)
 class FlatWall:
-    """A plane, in 2D a line, which goes on beyond its boundary; see `RimWall`."""
+    """A plane, in 2D a line, which goes on beyond its boundary."""
 
-    names: tuple[str, ...]
-    rows: IntArray
+    names: tuple[str, ...]  # its boundaries that have the nodes
+    rows: IntArray  # (k,): these nodes, as places in the rim
     point: FloatArray
     normal: FloatArray
     """`point`, `normal` (d,): of the plane."""
@@ -80,10 +68,10 @@ class FlatWall:
 
 @dataclass(frozen=True, eq=False)
 class CurvedWall:
-    """Facets that go on flat beyond the rim; see `RimWall`."""
+    """Facets that go on flat beyond the rim."""
 
-    names: tuple[str, ...]
-    rows: IntArray
+    names: tuple[str, ...]  # its boundaries that have the nodes
+    rows: IntArray  # (k,): these nodes, as places in the rim
     coords: FloatArray
     facets: IntArray
     """`coords`, `facets` (u, d), (f, k): its nodes, and its facets among them."""
@@ -110,6 +98,10 @@ class CurvedWall:
         closest, which = self._surface.nearest(positions)
         normals = unit(simplex_vectors(self._surface.simplices(which)))
         return positions - row_dots(positions - closest, normals)[:, None] * normals
+
+
+RimWall = FlatWall | CurvedWall
+"""A smooth surface, in 2D a curve, that nodes of a rim are on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,36 +163,22 @@ class Bodies:
 
     def spread(self, of_rim: FloatArray) -> FloatArray:
         """Return the correction (..., b, d) of all places, of that of the rim (..., r, d)."""
-        ahead = of_rim.shape[:-2]
-        dim = of_rim.shape[-1]
-        out = np.zeros((*ahead, len(self.share), dim))
+        out = np.zeros((*of_rim.shape[:-2], len(self.share), of_rim.shape[-1]))
         out[..., self.rim, :] = of_rim
         if len(self.inner) and of_rim.any():
             solve, columns = self._harmonic
-            inner = solve(-(columns @ _wide(of_rim)))
-            out[..., self.inner, :] = _narrow(self.share[self.inner, None] * inner, ahead, dim)
+            inner = over_columns(lambda x: solve(-(columns @ x)), of_rim)
+            out[..., self.inner, :] = self.share[self.inner, None] * inner
         return out
 
     def gathered(self, adjoint: FloatArray) -> FloatArray:
         """Return the transpose of `spread`, (..., r, d), of an adjoint (..., b, d)."""
-        ahead = adjoint.shape[:-2]
-        dim = adjoint.shape[-1]
         out = adjoint[..., self.rim, :]
         if len(self.inner):
             solve, columns = self._harmonic
-            inner = solve(self.share[self.inner, None] * _wide(adjoint[..., self.inner, :]))
-            out = out - _narrow(columns.T @ inner, ahead, dim)
+            inner = self.share[self.inner, None] * adjoint[..., self.inner, :]
+            out = out - over_columns(lambda x: columns.T @ solve(x), inner)
         return out
-
-
-def _wide(x: FloatArray) -> FloatArray:
-    """Return x (..., n, d) with the columns of all arrays side by side, (n, k)."""
-    return np.ascontiguousarray(np.moveaxis(x, -2, 0).reshape(x.shape[-2], -1))
-
-
-def _narrow(wide: FloatArray, ahead: tuple[int, ...], dim: int) -> FloatArray:
-    """Return the arrays (..., n, d) of what `_wide` returns."""
-    return np.moveaxis(wide.reshape(len(wide), *ahead, dim), 0, -2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,9 +246,7 @@ class Rims:
         x = value(positions)
         by = value(more)
         # Adding zero would turn -0.0 into 0.0.
-        return recorded(
-            np.where(by == 0.0, x, x + by), (positions, _same, _same), (more, _same, _same)
-        )
+        return summed(np.where(by == 0.0, x, x + by), positions, more)
 
     def _spread(self, bodies: Bodies, of_rim: Array) -> Array:
         there = np.flatnonzero(self.place >= 0)
@@ -284,11 +260,9 @@ class Rims:
             return out
 
         def gathered(g: FloatArray) -> FloatArray:
-            out = np.zeros((*g.shape[:-2], size, g.shape[-1]))
-            np.add.at(out, (..., place, slice(None)), g[..., there, :])  # type: ignore[arg-type]
-            return bodies.gathered(out)
+            return bodies.gathered(sums(g[..., there, :], place, size))
 
-        return recorded(spread(value(of_rim)), (of_rim, spread, gathered))
+        return linear(of_rim, spread, gathered)
 
     def closest(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the closest points (r, d) on the walls, and their derivatives (r, d, d).
@@ -350,10 +324,6 @@ class Rims:
         change = place[rows]
         out[rows] += self.frame.points(now[change]) - self.frame.points(positions[change])
         return out
-
-
-def _same(x: FloatArray) -> FloatArray:
-    return x
 
 
 def bulge_of(coords: FloatArray, facets: IntArray) -> float:

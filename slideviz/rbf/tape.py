@@ -113,6 +113,27 @@ def recorded(result: FloatArray, *links: Link) -> Array:
     return used[0][0].tape.variable(result, used) if used else result
 
 
+def linear(x: Array, there: Linear, back: Linear) -> Array:
+    """Return the linear map ``there`` of x, recorded; ``back`` is its transpose."""
+    return recorded(there(value(x)), (x, there, back))
+
+
+def summed(total: FloatArray, *parts: Array) -> Array:
+    """Return ``total``, the sum of parts of its shape, recorded."""
+
+    def same(t: FloatArray) -> FloatArray:
+        return t
+
+    return recorded(total, *((part, same, same) for part in parts))
+
+
+def over_columns(work: Linear, stacked: FloatArray) -> FloatArray:
+    """Return ``work`` of arrays (..., n, c), done for the columns of all at once: (..., m, c)."""
+    *ahead, n, c = stacked.shape
+    found = work(np.ascontiguousarray(np.moveaxis(stacked, -2, 0).reshape(n, -1)))
+    return np.ascontiguousarray(np.moveaxis(found.reshape(len(found), *ahead, c), 0, -2))
+
+
 def _stretched(tangent: FloatArray, like: FloatArray) -> FloatArray:
     return (
         tangent if tangent.shape[-1] >= like.shape[-1] else np.repeat(tangent, like.shape[-1], -1)
@@ -222,10 +243,7 @@ def transform(matrices: FloatArray, x: Array) -> Array:
     """Return ``matrices`` (n, e, d) or (e, d) times each row of x (..., n, d)."""
     there = "...ed,...d->...e"
     back = "...ed,...e->...d"
-    return recorded(
-        np.einsum(there, matrices, value(x)),
-        (x, lambda t: np.einsum(there, matrices, t), lambda g: np.einsum(back, matrices, g)),
-    )
+    return linear(x, partial(np.einsum, there, matrices), partial(np.einsum, back, matrices))
 
 
 def product(a: Array, b: Array) -> Array:
@@ -242,13 +260,10 @@ def product(a: Array, b: Array) -> Array:
 def reshape(x: Array, rows: int, columns: int) -> Array:
     """Return the entries of x (..., n, c), row by row, as (..., rows, columns)."""
     n, c = value(x).shape[-2:]
-    return recorded(
-        value(x).reshape(*value(x).shape[:-2], rows, columns),
-        (
-            x,
-            lambda t: t.reshape(*t.shape[:-2], rows, columns),
-            lambda g: g.reshape(*g.shape[:-2], n, c),
-        ),
+    return linear(
+        x,
+        lambda t: t.reshape(*t.shape[:-2], rows, columns),
+        lambda g: g.reshape(*g.shape[:-2], n, c),
     )
 
 
@@ -258,7 +273,7 @@ def transpose(x: Array) -> Array:
     def turned(t: FloatArray) -> FloatArray:
         return np.swapaxes(t, -1, -2)
 
-    return recorded(turned(value(x)), (x, turned, turned))
+    return linear(x, turned, turned)
 
 
 def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
@@ -270,19 +285,13 @@ def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
 
 def take(x: Array, rows: IntArray) -> Array:
     """Return the rows ``rows`` (m,) of x (..., n, c), (..., m, c); rows may occur repeatedly."""
-    v = value(x)
-    n = v.shape[-2]
-    return recorded(
-        v.take(rows, axis=-2), (x, lambda t: t.take(rows, axis=-2), lambda g: sums(g, rows, n))
-    )
+    n = value(x).shape[-2]
+    return linear(x, lambda t: t.take(rows, axis=-2), lambda g: sums(g, rows, n))
 
 
 def gather(x: Array, rows: IntArray, count: int) -> Array:
     """Return the sums (..., count, c) of the rows of x (..., m, c) with equal ``rows`` (m,)."""
-    v = value(x)
-    return recorded(
-        sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
-    )
+    return linear(x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
 
 
 def add_at(x: Array, rows: IntArray, more: Array) -> Array:
@@ -303,16 +312,10 @@ def add_at(x: Array, rows: IntArray, more: Array) -> Array:
 
 def mixed(matrix: csr_array, x: Array) -> Array:
     """Return the product of a constant sparse matrix (m, n) and x (..., n, c), (..., m, c)."""
-
-    def times(a: csr_array, t: FloatArray) -> FloatArray:
-        n, c = t.shape[-2:]
-        count = int(np.prod(t.shape[:-2]))
-        wide = np.moveaxis(t.reshape(count, n, c), 0, 1).reshape(n, count * c)
-        found = (a @ wide).reshape(a.shape[0], count, c)
-        return np.moveaxis(found, 1, 0).reshape(*t.shape[:-2], a.shape[0], c)
-
-    return recorded(
-        times(matrix, value(x)), (x, partial(times, matrix), lambda g: times(matrix.T.tocsr(), g))
+    return linear(
+        x,
+        partial(over_columns, matrix.__matmul__),
+        lambda g: over_columns(matrix.T.tocsr().__matmul__, g),
     )
 
 
