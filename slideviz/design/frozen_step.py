@@ -28,7 +28,7 @@ from slideviz.rbf import tape
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import gathered, parts, row_keys, row_terms
+from slideviz.rbf.exact import Fit, gathered, parts, row_keys, row_terms
 from slideviz.rbf.field import share
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.loops import add_correction, keep_undeformed
@@ -288,12 +288,8 @@ Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns the object kept under a name; calls the function to make it if there is none yet."""
 
 
-class FrozenFit:
-    """The interpolant of one step, whose rows were chosen before (`slideviz.rbf.methods.Fit`)."""
-
-    short = ""
-    history: tuple[Cycle, ...] = ()
-    refined = 0.0
+class FrozenFit(Fit):
+    """The interpolant of one step, whose rows were chosen before."""
 
     def __init__(
         self,
@@ -317,7 +313,7 @@ class FrozenFit:
         stays 0 with data reduction, as that of `GreedyFit`, and for warnings of derivatives.
         """
         basis = problem.basis
-        self._problem = problem
+        super().__init__(problem)
         self._to_come = stages
         self.dropped = dropped
         self._basis = basis
@@ -327,11 +323,9 @@ class FrozenFit:
         self._fixed = fixed
         self._refined = refined and supports(basis)
         self._checked = checked and not basis.saddle
-        self.error_estimate: Any = np.zeros(())
-        self.stages: tuple[Levels, ...] = ()
+        self.error_estimate = np.zeros(())
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
-        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, self._dim)))
 
     def condition(self) -> float:
         """Return NaN: the condition number is that of the reference."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from typing import Any
+
 import numpy as np
 
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots
@@ -25,7 +28,34 @@ from slideviz.rbf.solve import (
 from slideviz.rbf.tape import Array, gather, multiply, value
 
 
-class ExactFit:
+class Fit:
+    """An interpolant to which constraints are added."""
+
+    history: tuple[Cycle, ...] = ()
+    dropped: IntArray = NO_NODES
+    """(m,): nodes of which the pivot guard left out a constraint."""
+    stages: tuple[Levels, ...] = ()  # the rows in the system after each call of `add`
+    short = ""  # why it is above its tolerance, and a remedy; empty where it is not
+    error_estimate: Any = 0.0
+    refined = 0.0
+    """`error_estimate`, `refined`: as of a ``Solution``."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Begin without rows."""
+        self._problem = problem
+        self.interpolant = Interpolant(NO_NODES, np.empty((0, problem.dim)))
+        """Of all rows added so far."""
+
+    @abstractmethod
+    def add(self, rows: ConstraintRows) -> None:
+        """Add constraints, and meet all of them, exactly or to the tolerance."""
+
+    @abstractmethod
+    def condition(self) -> float:
+        """Return an estimate of the condition number of the system."""
+
+
+class ExactFit(Fit):
     """The interpolant that meets all rows: solves ``G w = b``, G_ab = phi_ab (n_a . n_b).
 
     With a polynomial G w = b - P c (`solve.polynomial`), or one system for both if G is not
@@ -34,24 +64,14 @@ class ExactFit:
     Rows are sorted by position, so that the pivot guard leaves out the same rows however nodes
     are numbered. Each system of pseudo sliding is the leading block of the next: one factor grows.
     Nodes that no support connects with one that moves have no weight, and are left out
-    (`Problem.reach`). ``error_estimate`` and ``refined`` are as of a ``Solution``.
+    (`Problem.reach`).
     """
 
-    short = ""  # there is no tolerance that it could miss
-
     def __init__(self, problem: Problem, timer: PhaseTimer) -> None:
-        d = problem.dim
-        self._problem = problem
+        super().__init__(problem)
         self._timer = timer
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
-        self.history: tuple[Cycle, ...] = ()
-        self.interpolant = Interpolant(NO_NODES, np.empty((0, d)))
-        """Of all rows added so far."""
-        self.dropped: IntArray = NO_NODES
-        """(m,): nodes of which the pivot guard left out a constraint."""
-        self.stages: tuple[Levels, ...] = ()  # the rows in the system after each call of add
-        self.error_estimate = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:
         """Add rows, solve with all rows added so far, and set ``interpolant``."""

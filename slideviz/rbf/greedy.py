@@ -33,10 +33,10 @@ import numpy as np
 
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
-from slideviz.rbf.exact import row_keys
+from slideviz.rbf.exact import Fit, row_keys
 from slideviz.rbf.kernels import PLAIN
 from slideviz.rbf.level import Candidates, GreedyLevel, LevelLimit, pool
-from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
+from slideviz.rbf.problem import Cycle, PhaseTimer, Problem
 from slideviz.rbf.solve import enough_threads
 
 STALE = 0.3
@@ -47,10 +47,10 @@ WORSE = 2.0
 this many times as large."""
 
 
-class GreedyFit:
+class GreedyFit(Fit):
     """An interpolant that meets its constraints to a tolerance with few control nodes.
 
-    ``short``: why the last selection ended above it, and a remedy; empty where it did not.
+    ``dropped``: nodes that the guard left out although their error is above the tolerance.
     """
 
     def __init__(
@@ -62,24 +62,14 @@ class GreedyFit:
         same step (the first of the two of direct sliding).
         """
         assert problem.reduction is not None
-        self._problem = problem
+        super().__init__(problem)
         self._timer = timer
         self._settings = problem.reduction
-        d = problem.dim
         self.history = history
-        self.short = ""
-        self.interpolant = Interpolant(NO_NODES, np.empty((0, d)))
-        """The chosen nodes, in the order of their choice, and their coefficients, summed over the
-        levels (Eq. 2.38)."""
-        self.dropped: IntArray = NO_NODES
-        """(m,): nodes left out by the pivot guard although their error is above the tolerance."""
-        self.stages: tuple[Levels, ...] = ()  # the rows chosen after each call of add
-        self.error_estimate = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._number = history[-1].level if history else 1
-        none = NO_NODES
-        rows = ConstraintRows(none, None, np.empty((0, d)))
-        self._among = Candidates(rows, none, none, none, np.empty(0))
+        rows = ConstraintRows(NO_NODES, None, np.empty((0, problem.dim)))
+        self._among = Candidates(rows, NO_NODES, NO_NODES, NO_NODES, np.empty(0))
         self._level = GreedyLevel(problem, self._among, self.interpolant)
         self._known = problem.initial_control_nodes()
         self._given = problem.stages[done:]

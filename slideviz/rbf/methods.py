@@ -16,21 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, largest_coordinate, row_norms
-from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
+from slideviz.rbf.constraint_rows import AGREE, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
-from slideviz.rbf.exact import ExactFit
+from slideviz.rbf.exact import ExactFit, Fit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import (
     CarriedError,
-    Cycle,
-    Interpolant,
-    Levels,
     PhaseTimer,
     Problem,
     Solution,
@@ -51,24 +48,6 @@ NEGLIGIBLE = 1e-14  # errors below this part of the support radius are rounding,
 
 
 IMAGES = (0, -1, 1)  # periods by which the sources of the correction are shifted, in this order
-
-
-class Fit(Protocol):
-    """An interpolant to which constraints are added: `ExactFit` or `GreedyFit`, with attributes."""
-
-    interpolant: Interpolant
-    dropped: IntArray
-    short: str
-    history: tuple[Cycle, ...]
-    stages: tuple[Levels, ...]
-    error_estimate: float
-    refined: float
-
-    def add(self, rows: ConstraintRows) -> None:
-        """Add constraints, and meet all of them, exactly or to the tolerance."""
-
-    def condition(self) -> float:
-        """Return an estimate of the condition number of the system."""
 
 
 def regular(problem: Problem, timer: PhaseTimer) -> Solution:

@@ -66,7 +66,7 @@ class FrozenChoices(Protocol):
         """Return the cached choice ``name``; the first call makes it with ``make``."""
 
     def fit(self, problem: Problem) -> Any:
-        """Return a fit (`slideviz.rbf.methods.Fit`) whose rows were chosen before."""
+        """Return a fit (`slideviz.rbf.exact.Fit`) whose rows were chosen before."""
 
     def correct(
         self, problem: Problem, displacement: Array, nodes: IntArray, errors: Array, *, needed: bool
