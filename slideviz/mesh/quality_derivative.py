@@ -229,7 +229,7 @@ def _unfold(
         flat = sum(int((depth == 0).sum()) for depth in depths)
         shares = [(depth == 0) / flat for depth in depths]
     for (vtk, nodes, scale), share in zip(parts, shares, strict=True):
-        np.add.at(gradient, nodes, _pull(vtk, _at(mesh, nodes), share * scale))
+        np.add.at(gradient, nodes, _by_nodes(mesh, vtk, nodes, share * scale))
     return -deepest * norm
 
 
@@ -238,45 +238,29 @@ def _at(mesh: Mesh, nodes: IntArray) -> FloatArray:
     return np.ascontiguousarray(mesh.points[nodes].T)
 
 
-def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
-    """Return coefficients (k, m): corner Jacobians, then the other Bernstein coefficients.
-
-    Prisms and hexahedra alone have others than the corner Jacobians.
-    """
-    count = at.shape[2]
-    jacobians = np.empty((len(CORNERS[vtk]), count))
-    corners(at, CORNERS[vtk], count, jacobians)
-    return np.concatenate((jacobians, np.delete(coefficients(vtk, at), CORNER_AT[vtk], axis=0)))
-
-
 def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
     """Return minus each scaled coefficient (k, m) of inverted cells, and -1 for positive ones.
 
     Coefficients that are not corner Jacobians count only where all of these are positive: they may
     be negative in a valid cell, and there would be a jump where the first corner folds.
     """
-    coefficients = -scale * _coefficients(vtk, at)
-    coefficients[~(coefficients >= 0)] = -1.0
-    outer = len(CORNERS[vtk])
-    coefficients[outer:, (coefficients[:outer] >= 0).any(axis=0)] = -1.0
-    return coefficients
+    depths = coefficients(vtk, at)
+    outer = CORNER_AT[vtk]
+    # As those that a cell is inverted by, to the last bit.
+    jacobians = np.empty((len(outer), at.shape[2]))
+    corners(at, CORNERS[vtk], at.shape[2], jacobians)
+    depths[outer] = jacobians
+    depths *= -scale
+    depths[~(depths >= 0)] = -1.0
+    inner = np.delete(np.arange(len(depths)), outer)
+    depths[np.ix_(inner, (depths[outer] >= 0).any(axis=0))] = -1.0
+    return depths
 
 
-def _pull(vtk: int, at: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the derivatives (m, n, d) of ``Σ_k weights_k coefficients_k`` by the nodes.
-
-    ``weights`` are (k, m). A coefficient is linear in all x coordinates together, and so in y and
-    z. So its derivative by one coordinate of a node is the coefficient with that coordinate 1 there
-    and 0 at the cell's other nodes.
-    """
-    d, n, m = at.shape
-    out = np.empty((m, n, d))
-    for axis in range(d):
-        unit = at.copy()
-        for j in range(n):
-            unit[axis] = 0.0
-            unit[axis, j] = 1.0
-            out[:, j, axis] = (weights * _coefficients(vtk, unit)).sum(axis=0)
+def _by_nodes(mesh: Mesh, vtk: int, nodes: IntArray, weights: FloatArray) -> FloatArray:
+    """Return the derivatives (m, n, d) of ``Σ_k weights_k coefficients_k`` by the nodes (m, n)."""
+    out = np.empty((*nodes.shape, mesh.dim))
+    pull_coefficients(vtk, mesh.points, nodes, CORNERS[vtk], weights, out)
     return out
 
 
@@ -352,9 +336,7 @@ def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
         used = nodes[some]
         # The derivatives of the minimum by the ratios, up to a factor that all have.
         weights = np.where(part > 0, part**power, 0.0) * factor[:, some]
-        by_nodes = np.empty((*used.shape, mesh.dim))
-        pull_coefficients(vtk, mesh.points, used, CORNERS[vtk], weights, by_nodes)
-        return float((part**p).sum()), used, by_nodes
+        return float((part**p).sum()), used, _by_nodes(mesh, vtk, used, weights)
 
     for share, used, by_nodes in ordered_map(pull, _blocks(mesh)):  # the order fixes the bits
         total += share
