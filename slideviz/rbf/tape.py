@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,7 +131,8 @@ def summed(total: FloatArray, *parts: Array) -> Array:
 def over_columns(work: Linear, stacked: FloatArray) -> FloatArray:
     """Return ``work`` of arrays (..., n, c), done for the columns of all at once: (..., m, c)."""
     *ahead, n, c = stacked.shape
-    found = work(np.ascontiguousarray(np.moveaxis(stacked, -2, 0).reshape(n, -1)))
+    wide = np.moveaxis(stacked, -2, 0).reshape(n, prod(ahead) * c)
+    found = work(np.ascontiguousarray(wide))
     return np.ascontiguousarray(np.moveaxis(found.reshape(len(found), *ahead, c), 0, -2))
 
 
