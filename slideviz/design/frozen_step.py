@@ -37,7 +37,6 @@ from slideviz.rbf.operations import add_displacement, columns, points, radial_su
 from slideviz.rbf.operations import coords as coords_of
 from slideviz.rbf.problem import (
     CarriedError,
-    Cycle,
     Interpolant,
     Levels,
     PhaseTimer,
