@@ -11,7 +11,7 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.session import changes
 from slideviz.session.runs_words import COLUMNS
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 def test_limits_are_checked_on_what_is_shown_and_rings_are_at_cells_that_fail(with_runs):

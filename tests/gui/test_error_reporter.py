@@ -15,7 +15,7 @@ from slideviz.gui.widgets import error_reporter, questions
 from slideviz.session import changes, jobs
 from slideviz.session.store import Store, notify
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -110,6 +110,7 @@ def test_errors_in_slots_and_threads_are_told_expected_ones_in_their_own_words_o
     assert "ValueError" in text(caught)
 
 
+@pytest.mark.window("own")
 def test_the_same_error_again_and_again_is_counted_and_logged_once(caught, qtbot, caplog):
     timer = QTimer()
     timer.setInterval(2)

@@ -12,6 +12,8 @@ from slideviz.gui.widgets.build import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, short_text
 from slideviz.gui.widgets.vector_field import VectorField
 
+pytestmark = pytest.mark.window("shared")
+
 NONE = Qt.KeyboardModifier.NoModifier
 THIRD = 0.005596983152812345
 
@@ -248,6 +250,7 @@ def test_a_word_for_the_lowest_number_can_be_typed(qtbot):
     assert told[-1] == 12
 
 
+@pytest.mark.window("own")
 @pytest.mark.parametrize("kind", ["text", "number", "whole"])
 def test_ctrl_z_and_ctrl_y_act_on_what_is_typed(driver, kind):
     """And not on the window, whose last change may be about something that is not seen."""
@@ -275,6 +278,7 @@ def test_ctrl_z_and_ctrl_y_act_on_what_is_typed(driver, kind):
     assert asked == ["undo", "redo"], "nothing of its own is left"
 
 
+@pytest.mark.window("own")
 def test_what_a_field_takes_back_is_no_new_change(driver, sample_folder, qtbot):
     driver.open(sample_folder / "passage" / "passage.cfg")
     window, store = driver.window, driver.window.store

@@ -6,7 +6,7 @@ import pytest
 
 from slideviz.session import changes
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 REDUCTION = ("selection", "levels", "level_end", "gamma")
 

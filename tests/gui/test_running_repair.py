@@ -12,7 +12,7 @@ from slideviz.session import changes
 from tests import builders
 from tests.solver.test_repair_stage import folded, last, scrambled
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 def test_a_folded_run_is_mended_by_the_button_of_its_message(driver, window, tmp_path):

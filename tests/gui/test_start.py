@@ -17,7 +17,7 @@ from slideviz.samples.table import SAMPLES
 from slideviz.session import jobs
 from slideviz.terms import ROLES
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture
@@ -149,6 +149,7 @@ def test_when_a_file_was_changed(tmp_path):
     assert "today" not in when_changed(path, now)
 
 
+@pytest.mark.window("own")
 def test_everything_can_be_reached_with_tab_and_cards_follow_the_theme(
     window, tmp_path, monkeypatch
 ):
@@ -177,6 +178,7 @@ def test_everything_can_be_reached_with_tab_and_cards_follow_the_theme(
     assert window.files.folder() == tmp_path
 
 
+@pytest.mark.window("own")
 def test_all_cards_are_seen_without_scrolling(driver, passage_file):
     window = driver.window
     window.start.show_recent([Path(passage_file)] * RECENT)

@@ -7,7 +7,7 @@ import pytest
 from slideviz.errors import Cancelled
 from slideviz.session import changes, jobs
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
 
 @pytest.fixture

@@ -13,6 +13,8 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from tests.windows import come_to_rest
 
+pytestmark = pytest.mark.window("shared")
+
 
 @pytest.fixture(scope="module")
 def stator_file(tmp_path_factory):
