@@ -120,8 +120,8 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     """Yield triangles (t, 4) of nodes that close each hole of a wall, such as that below a blade.
 
     They are Delaunay's, of the nodes of the hole's rim in the plane that fits these best, so they
-    mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The longest
-    rim of each connected part is that of the wall itself.
+    mostly go from one side of the blade to the other. A whole turn is ``turn`` long. The rims of a
+    connected part that go round the axis, or else its longest one, are those of the wall itself.
     """
     # Late: scipy.spatial takes 0.1 s.
     from scipy.spatial import Delaunay
@@ -131,6 +131,7 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     part = components(len(coords), *edges.T)
     follows = dict(edges[first[count == 1]].tolist())
     rims = dict[int, list[tuple[FloatArray, IntArray]]]()
+    around_axis = set[int]()
     while follows:
         start, node = follows.popitem()
         rim = [start]
@@ -139,14 +140,18 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
             node = follows.pop(node)
         steps = np.diff(coords[[*rim, start]], axis=0)
         steps[:, 2] -= turn * np.round(steps[:, 2] / turn)
-        if node == start and abs(steps[:, 2].sum()) < 0.5 * turn:  # else it goes round the axis
+        if node != start:
+            continue
+        if abs(steps[:, 2].sum()) > 0.5 * turn:
+            around_axis.add(int(part[start]))
+        else:
             first = _order(coords[rim], APART * turn)[0]
             places = coords[rim[first]] + np.cumsum(np.roll(steps, -first, axis=0), axis=0)
             nodes = np.roll(np.array(rim), -first - 1)
             rims.setdefault(int(part[start]), []).append((places, nodes))
-    for several in rims.values():
+    for number, several in rims.items():
         several.sort(key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))))
-        for places, nodes in several[:-1]:
+        for places, nodes in several if number in around_axis else several[:-1]:
             _, size, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
             if size[1] > FLAT * size[0]:  # else the blade has no thickness
                 flat = places @ axes[:2].T

@@ -1,8 +1,9 @@
 """Walls about an axis, and flat ones that have none."""
 
 import numpy as np
+import pytest
 
-from slideviz.machine.wall import turn_about_axis
+from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
 
 
 def sheet(place, n=8):
@@ -42,3 +43,65 @@ def test_flat_walls_beside_a_wing_have_no_axis():
     assert not turn_about_axis(half, [cells])
     upright, cells = sheet(lambda u, v: (2.0 + u, 0.0 * u, v))
     assert not turn_about_axis(upright, [cells])
+
+
+ROWS = 8
+
+
+def tube(columns, around, begin, holes=()):
+    """Return (z, r, theta) of a cylinder's nodes, and its facets without those of the holes."""
+    theta = begin + np.linspace(0.0, around, columns + 1)
+    if around > 6.0:
+        theta = theta[:-1]
+    theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
+    height = np.linspace(0.0, 1.0, ROWS + 1)
+    z, t = (part.ravel() for part in np.meshgrid(height, theta, indexing="ij"))
+    kept = np.ones((ROWS, columns), bool)
+    for low, high, first, last in holes:
+        kept[low:high, first:last] = False
+    i, k = np.nonzero(kept)
+    n = len(theta)
+    after = (k + 1) % n
+    facets = np.stack([i * n + k, i * n + after, (i + 1) * n + after, (i + 1) * n + k], axis=1)
+    return np.stack([z, np.ones(len(z)), t], axis=1), facets
+
+
+SECTOR, WHEEL = (12, 1.0), (24, 2.0 * np.pi)
+ONE, TWO = [(2, 6, 4, 6)], [(2, 6, 4, 6), (3, 5, 8, 9)]
+
+
+@pytest.mark.parametrize("begin", [0.2, np.pi - 0.4, np.pi - 0.6], ids=["", "branch", "between"])
+@pytest.mark.parametrize("holes", [[], ONE, TWO], ids=len)
+@pytest.mark.parametrize("wall", [SECTOR, WHEEL], ids=["sector", "wheel"])
+def test_the_holes_of_all_blades_are_closed_and_nothing_else(wall, holes, begin):
+    columns, around = wall
+    coords, facets = tube(columns, around, begin, holes)
+    _, closing = closed_wall(coords, facets, 1.0, around)
+    flat = coords[closing[:, :3]][..., [0, 2]]
+    flat[..., 1] -= 2.0 * np.pi * np.round((flat[..., 1] - flat[:, :1, 1]) / (2.0 * np.pi))
+    (a, b), (c, d) = (np.moveaxis(flat[:, at] - flat[:, 0], -1, 0) for at in (1, 2))
+    cells = sum((high - low) * (last - first) for low, high, first, last in holes)
+    assert np.abs(a * d - b * c).sum() / 2.0 == pytest.approx(cells * around / columns / ROWS)
+    assert (closing[:, 2] == closing[:, 3]).all()
+
+
+@pytest.mark.parametrize("turn", np.radians([0.0, 40.0, 130.0, 250.0]))
+def test_the_profile_goes_from_end_to_end_however_it_lies(turn):
+    """Through an arc of 150 degrees, in coordinates whose order says nothing about its ends."""
+    arc = np.radians(np.linspace(-75.0, 75.0, 21)) + turn
+    z, r = np.sin(arc), 3.0 + np.cos(arc)
+    nodes, facets = sheet(
+        lambda u, v: (
+            np.interp(u, np.linspace(0, 1, 21), z),
+            np.interp(u, np.linspace(0, 1, 21), r),
+            v,
+        ),
+        20,
+    )
+    shuffled = np.random.default_rng(1).permutation(len(nodes))
+    coords = np.empty_like(nodes)
+    coords[shuffled] = nodes
+    profile = wall_profile(coords, shuffled[facets])
+    path = np.concatenate([profile[:, 0], profile[-1:, 1]])
+    expected = np.stack([z, r], axis=1)
+    assert np.allclose(path, expected) or np.allclose(path, expected[::-1])
