@@ -114,6 +114,25 @@ def test_a_point_of_the_stacking_line_stays_in_place(block):
     assert np.linalg.norm(after - before, axis=1).max() > 0.05
 
 
+def about_z(points, angles):
+    x, y, z = np.moveaxis(points, -1, 0)
+    turned = (x + 1j * y) * np.exp(1j * angles)
+    return np.stack([turned.real, turned.imag, z], axis=-1)
+
+
+@pytest.mark.parametrize("side", [-1, 0, 1])
+def test_a_blade_cut_by_periodic_sides_moves_as_the_whole_one_from_either_side(block, side):
+    field, points, triangles, before = block
+    period = np.radians(30.0)
+    turns = np.where(before[:, 2] < before[:, 2].mean(), period, 0.0)
+    totals = np.zeros((TOTALS, len(points)))
+    totals[ANGLE] = 0.3
+    whole = BladeSections(field, points, triangles, points[0]).moved(totals)[0]
+    stack = about_z(points[0], side * period)
+    parts = BladeSections(field, about_z(points, -turns), triangles, stack, turns).moved(totals)[0]
+    assert np.abs(parts - about_z(whole, -turns)).max() < 1e-12
+
+
 def test_lean_and_sweep_are_lengths_and_chord_is_a_factor(block):
     before, _, change = moved(block, LEAN, 0.02)
     assert change[:, 2] * before[:, 1] == pytest.approx(0.02, abs=1e-12)
