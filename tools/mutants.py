@@ -184,7 +184,7 @@ def _mutable(node: ast.AST) -> Iterator[ast.AST]:
             parts: list[ast.AST] = []
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
             parts = []
-        case ast.Assign(value=ast.Constant() | ast.BinOp()) if node.col_offset == 0:
+        case ast.Assign(value=ast.Constant() | ast.BinOp() | ast.UnaryOp()) if node.col_offset == 0:
             parts = []  # a size or a tolerance
         case ast.AnnAssign():
             parts = [node.value] if node.value else []
