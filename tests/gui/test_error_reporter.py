@@ -169,6 +169,7 @@ def test_errors_in_a_job_and_in_a_file_dialog_are_told_and_the_next_job_runs(
     assert driver.open(passage_file).mesh is not None
 
 
+@pytest.mark.window("own")
 def test_a_layer_that_cannot_draw_leaves_the_others_and_the_state(
     driver, caught, monkeypatch, passage_file
 ):
