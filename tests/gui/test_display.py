@@ -49,7 +49,7 @@ def test_colors_map_and_points_are_chosen_and_undone(shown):
     assert view(shown).points == "types"
     assert shown.window.view.actors["points:nodes"].visibility
     shown.choose(panel(shown).points, "none")
-    assert not shown.window.view.actors["points:nodes"].visibility
+    assert "points:nodes" not in shown.window.view.actors
     session = shown.session
     lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
     shown.window.store.put(replace(lonely, pairs=()))
