@@ -13,16 +13,22 @@ from functools import reduce
 
 import numpy as np
 
+from slideviz.case.check import motion_doubts
+from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.moving_nodes import ROUNDING
+from slideviz.case.moving_nodes import ROUNDING, moving_nodes
 from slideviz.case.spans import span_ends
 from slideviz.errors import Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
+from slideviz.rbf.rims import Rims
+from slideviz.solver.domain import Domain, find_domain, roles_of_copies
+from slideviz.solver.prescribed import displaced, motion_messages
 from slideviz.solver.remedies import KEEPS_RIMS
-from slideviz.solver.rims import find_rims
+from slideviz.solver.rims import find_rims, on_walls, rims_key
 from slideviz.solver.setup import Setup
 from slideviz.system.threads import in_parts
+from slideviz.system.weak_cache import WeakCache
 
 GROWTH = 5.0
 """A displacement overshoots where it is longer than this times the reach of the motion (`_reach`).
@@ -43,6 +49,8 @@ OFF_WALL = 1e-3  # part of the span by which sliding nodes may leave hub or shro
 NOISE = 1e-6  # part of the size of what moves by which its nodes may leave a wall: digits of a file
 
 ROUGHEST = "wendland-c0"  # the kernel that overshoots least
+
+_DOMAINS = WeakCache()
 
 HOPELESS = 0.1
 """A system was not solved where its solution misses the displacement of a control node by more than
@@ -185,20 +193,56 @@ def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> l
     over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
     """
     farthest: dict[tuple[str, str], _OffWall] = {}
-    for off in (*_off_span(setup, case, mesh, points), *_off_walls(setup, case, mesh, points)):
+    kept = "", KEEPS_RIMS
+    if case.rims == "slide":
+        kept = ", to which it cannot be brought back", "move it less"
+    fixed = _fixed_rims(case, mesh, setup)
+    for off in (
+        *_off_span(setup, case, mesh, points),
+        *_off_walls(setup, mesh, points, setup.rims, *kept),
+        *_off_walls(setup, mesh, points, fixed, *_of_fixed(case)),
+    ):
         # A wall with edges has several pieces, and is told of once.
         known = farthest.setdefault((off.boundary, off.wall), off)
         if off.distance > known.distance:
             farthest[off.boundary, off.wall] = off
-    return [
-        Message(
-            f"node {mesh.number(off.node)} of {off.boundary} at "
-            f"({', '.join(f'{value:.6g}' for value in points[off.node])}) has left {off.wall} by "
-            f"{off.distance:.3g}{off.why}",
-            off.remedy,
-        )
-        for off in farthest.values()
-    ]
+    return [off.message(mesh, points) for off in farthest.values()]
+
+
+def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
+    """Return the `motion_messages` of a case of one zone before it runs, or a doubt about it.
+
+    Without these, that a boundary leaves a fixed wall, as `wall_warnings` of the run will.
+    """
+    moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
+    problem, folded = motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
+    return problem, folded or next(_before_run(case, mesh, moved), None)
+
+
+def _before_run(case: Case, mesh: Mesh, moved: Displacements) -> Iterator[Message]:
+    yield from motion_doubts(case, mesh)
+
+    def found() -> tuple[Domain, Rims] | None:
+        domain = find_domain(case, mesh)
+        rims = _fixed_rims(case, mesh, domain)
+        return None if rims is None else (domain, rims)  # a domain is large
+
+    known = _DOMAINS.of(mesh, rims_key(case), found)
+    if known is not None:
+        points = mesh.points.copy()
+        points[moved.nodes] += moved.vectors
+        for off in _off_walls(known[0], mesh, points, known[1], *_of_fixed(case)):
+            yield off.message(mesh, points)
+
+
+def _fixed_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
+    return find_rims(case.change(rims="free"), mesh, domain, ("fixed",))
+
+
+def _of_fixed(case: Case) -> tuple[str, str]:
+    """Return the end of the sentence on a fixed wall that nodes left, and the remedy."""
+    slides = "" if case.rims == "slide" else ", with RIMS= SLIDE"
+    return ", which is fixed", f"let that boundary slide{slides}, or move it less"
 
 
 @dataclass(frozen=True)
@@ -212,27 +256,31 @@ class _OffWall:
     why: str  # the rest of the sentence
     remedy: str
 
+    def message(self, mesh: Mesh, points: FloatArray) -> Message:
+        """Return that the node has left the wall; ``points`` (n, d): deformed."""
+        place = ", ".join(f"{value:.6g}" for value in points[self.node])
+        return Message(
+            f"node {mesh.number(self.node)} of {self.boundary} at ({place}) has left {self.wall} "
+            f"by {self.distance:.3g}{self.why}",
+            self.remedy,
+        )
 
-def _off_walls(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
+
+def _off_walls(
+    domain: Domain, mesh: Mesh, points: FloatArray, rims: Rims | None, why: str, remedy: str
+) -> Iterator[_OffWall]:
     """Yield for each wall with a rim the node of that which is farthest off."""
-    free = "", KEEPS_RIMS
-    if case.rims == "slide":
-        free = ", to which it cannot be brought back", "move it less"
-    fixed = find_rims(case.change(rims="free"), mesh, setup, ("fixed",))
-    slides = "" if case.rims == "slide" else ", with RIMS= SLIDE"
-    of_fixed = ", which is fixed", f"let that boundary slide{slides}, or move it less"
-    for rims, words in ((setup.rims, free), (fixed, of_fixed)):
-        if rims is None:
-            continue
-        least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
-        for wall in rims.walls:
-            nodes = rims.nodes[rims.rim[wall.rows]]
-            off = rims.off(wall, points[nodes])
-            k = int(np.argmax(off))
-            if off[k] > least and off[k] > least + wall.bulge:
-                names = [n for n in _names_at(setup, nodes[k]) if setup.roles.get(n) == "moving"]
-                who = " and ".join(names)
-                yield _OffWall(int(nodes[k]), who, " and ".join(wall.names), float(off[k]), *words)
+    if rims is None:
+        return
+    least = NOISE * float(np.ptp(mesh.points[rims.nodes], axis=0).max())
+    for wall in rims.walls:
+        nodes = rims.nodes[rims.rim[wall.rows]]
+        off = rims.off(wall, points[nodes])
+        k = int(np.argmax(off))
+        if off[k] > least and off[k] > least + wall.bulge:
+            names = [n for n in _names_at(domain, nodes[k]) if domain.roles.get(n) == "moving"]
+            who = " and ".join(names)
+            yield _OffWall(int(nodes[k]), who, " and ".join(wall.names), float(off[k]), why, remedy)
 
 
 def _off_span(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> Iterator[_OffWall]:
@@ -346,6 +394,6 @@ def listed_or(remedies: Sequence[str]) -> str:
     return ", or ".join(filter(None, (", ".join(others), last)))
 
 
-def _names_at(setup: Setup, node: int) -> list[str]:
-    mine = (setup.boundary.facets == node).any(axis=1)
-    return [setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine])]
+def _names_at(domain: Domain, node: int) -> list[str]:
+    mine = (domain.boundary.facets == node).any(axis=1)
+    return [domain.boundary.names[k] for k in np.unique(domain.boundary.marker[mine])]

@@ -19,8 +19,8 @@ from slideviz.mesh.interfaces import (
 )
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZoneInterface, sealed
 from slideviz.mesh.zones import names_in, with_zones
+from slideviz.solver.growth import check_motion
 from slideviz.solver.prepare import Prepared, prepare
-from slideviz.solver.prescribed import check_motion
 from slideviz.solver.rims import on_walls
 from slideviz.solver.steps import Progress, Step
 from slideviz.terms import Role

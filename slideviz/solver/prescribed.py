@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes, same
@@ -18,9 +17,9 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.rbf.images import ImageDisplacements, require_free
 from slideviz.rbf.rims import Rims
-from slideviz.solver.domain import Domain, find_classes, roles_of_copies
+from slideviz.solver.domain import Domain, find_classes
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
-from slideviz.solver.rims import displaced_on, on_walls
+from slideviz.solver.rims import displaced_on
 
 APART = 100.0
 """Allowed difference of the displacements of images over the largest displacement, divided by their
@@ -114,13 +113,6 @@ def motion_messages(
     asked = case, mesh, moved.nodes, moved.vectors
     problem = intersection_message(*asked) or jump_message(*asked)
     return problem, None if problem else folding_message(*asked)
-
-
-def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
-    """Return the `motion_messages` of a case of one zone before it runs, or a doubt about it."""
-    moved = on_walls(case, mesh, displaced(moving_nodes(case, mesh), mesh))
-    problem, folded = motion_messages(roles_of_copies(case, mesh)[0], mesh, moved)
-    return problem, folded or next(iter(motion_doubts(case, mesh)), None)
 
 
 def prescribe(

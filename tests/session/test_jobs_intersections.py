@@ -89,7 +89,10 @@ def test_boundaries_that_disagree_about_a_node_are_told(square):
     motions = (Translate("bottom", (0.1, 0.0)), Translate("left", (0.2, 0.0)))
     case = Case(roles=roles, motions=motions)
     assert "bottom" in look(case, square)
-    assert look(case.change(motions=(motions[0], Translate("left", (0.1, 0.0)))), square) == ""
+    alike = case.change(motions=(motions[0], Translate("left", (0.1, 0.0))))
+    text, said = find_intersection(alike, square, lambda _: None, lambda: False)
+    assert text == ""
+    assert "of bottom at (4.1, 0) has left right by 0.1, which is fixed; let that" in str(said)
 
 
 def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):

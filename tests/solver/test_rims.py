@@ -19,6 +19,7 @@ from slideviz.session.motions import Ghosts
 from slideviz.session.run_messages import remedy_for
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.growth import wall_warnings
+from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.streaming.run import stream
@@ -240,9 +241,14 @@ def test_a_fixed_wall_that_its_rim_leaves_is_told_of(rims, steps):
     nodes = np.intersect1d(mesh.marker("x_m").nodes, mesh.marker("y_m").nodes)
     for y, walls in ((0.0, []), (0.1, [("y_m", "0.1"), ("y_p", "0.1")])):
         motion = sv.Translate("x_m", (0.05, y, 0.0))
-        step = last(case_of(roles, [motion], rims=rims, steps=steps), mesh)
+        case = case_of(roles, [motion], rims=rims, steps=steps)
+        step = last(case, mesh)
         assert re.findall(LEFT + "?", "".join(step.warnings)) == walls
         assert ("fixed; let that boundary slide" in "".join(step.warnings)) == bool(walls)
+        problem, said = check_motions(case, mesh)  # as the ghost does
+        assert problem is None
+        assert (said is not None) == bool(walls)
+        assert said is None or str(said) in step.warnings
         moved = step.mesh.points[nodes] - mesh.points[nodes]
         np.testing.assert_allclose(moved, np.tile([0.05, y, 0.0], (len(nodes), 1)), atol=1e-15)
 
