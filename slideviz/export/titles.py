@@ -71,7 +71,7 @@ def names_of(session: Session) -> list[str]:
 
 
 def title_words(
-    session: Session, frame: StepFrame, place: str, letters: float, longest: str = ""
+    session: Session, frame: StepFrame, place: str, letters: float, longest: str
 ) -> str:
     """Return the longest title of a frame that fits into a number of letters.
 

@@ -194,8 +194,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
 
 def _lines(mesh: Mesh, name: str) -> FloatArray:
     """Return the segments (s, 2, 2) of a 2D mesh's boundary."""
-    parts = [mesh.points[nodes] for _, nodes in mesh.marker(name).cells.by_type.values()]
-    return np.concatenate([part for part in parts if part.shape[1] == 2] or [np.empty((0, 2, 2))])
+    return mesh.points[mesh.marker(name).cells.connectivity].reshape(-1, 2, 2)
 
 
 def _title(figure: Any, words: str, options: PictureOptions, *, size: float, left: float) -> None:

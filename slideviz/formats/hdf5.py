@@ -88,7 +88,7 @@ class Hdf5Draft(FileIO):
 
 @contextmanager
 def hdf5_write(
-    path: Path, replaces: Path | None = None, source: Path | None = None
+    path: Path, replaces: Path | None, source: Path | None = None
 ) -> Iterator[Hdf5Draft]:
     """Context with an HDF5 file to write, which replaces ``path`` at the end if nothing was raised.
 

@@ -154,7 +154,7 @@ def window(cut: Box, around: Polygons, ratio: float) -> Box:
     # Where the mesh ends on one side, the box is shifted to show more of the other.
     shift = np.maximum(ends[0] - box[0], 0.0) - np.maximum(box[1] - ends[1], 0.0)
     fits = ends[1] - ends[0] >= wanted
-    box = np.where(fits, box + shift, np.stack([ends[0], ends[1]]))
+    box = np.where(fits, box + shift, ends)
     return box[0], box[1]
 
 
@@ -194,7 +194,7 @@ def bar_beside(axes: Any) -> Any:
     return axes.inset_axes((BAR_GAP, 0.0, _THICK, 1.0), transform=place)
 
 
-def bar_below(axes: Any, length: float, gap: float = BAR_BELOW) -> Any:
+def bar_below(axes: Any, length: float, gap: float) -> Any:
     """Return inset axes for a color bar below ``axes``; its length and their gap in inches."""
     middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
     return axes.inset_axes((-length / 2.0, -gap - _THICK, length, _THICK), transform=middle)

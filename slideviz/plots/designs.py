@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -69,7 +69,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
     others = [name for name in table.columns if name != column]
     curves = []
     for fixed, rows in groups.items():
-        places = _numbers(place_of[table.rows[row.design - 1][at]] for row in rows)
+        places = np.array([place_of[table.rows[row.design - 1][at]] for row in rows])
         order = np.argsort(places, kind="stable")
         name = "min" if what == "quality" else what
         curves.append(
@@ -77,8 +77,8 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
                 ", ".join(fixed),
                 np.array([row.design for row in rows])[order],
                 places[order],
-                _numbers(getattr(row, name) for row in rows)[order],
-                _numbers(row.mean for row in rows)[order],
+                np.array([float(getattr(row, name)) for row in rows])[order],
+                np.array([row.mean for row in rows])[order],
                 np.array([row.inverted > 0 for row in rows])[order],
                 words,
                 ",\n".join(others),
@@ -225,7 +225,3 @@ def nearest_design(
         if best is None or far < best[0]:
             best = far, design
     return None if best is None else best[1]
-
-
-def _numbers(values: Iterable[float]) -> FloatArray:
-    return np.array(list(values), np.float64)

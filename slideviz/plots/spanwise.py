@@ -78,7 +78,7 @@ def in_layers(
     coordinate: str,
     *,
     layers: int | None = None,
-    label: str = "",
+    label: str,
 ) -> Profile:
     """Return the quality in layers of equal height, of nodal coordinates ``height`` (n,).
 

@@ -17,7 +17,7 @@ _BETWEEN = 1.2  # least distance of two labels, relative to the size of a label
 _OFF = 0.005  # largest rounding error of the number at an end, relative to the range
 
 
-def round_step(width: float, most: int = 6) -> float:
+def round_step(width: float, most: int) -> float:
     """Return the smallest round step by which a width above 0 has at most ``most`` steps."""
     least = width / most
     power = 10.0 ** math.floor(math.log10(least))

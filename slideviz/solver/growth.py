@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
@@ -145,17 +144,14 @@ def farthest_node(
     before: FloatArray, after: FloatArray, numbers: IntArray | None = None
 ) -> Farthest:
     """Return the node that went farthest, of points (n, d) with ``numbers`` (n,), or 0, 1, ..."""
-    parts: list[Farthest] = []
+    length = np.empty(len(before))
 
     def measure(part: slice) -> None:
-        length = np.linalg.norm(after[part] - before[part], axis=1)
-        k = int(np.argmax(length))
-        node = part.start + k
-        number = node if numbers is None else int(numbers[node])
-        parts.append(Farthest(float(length[k]), number, before[node]))
+        length[part] = np.linalg.norm(after[part] - before[part], axis=1)
 
     in_parts(measure, len(before))
-    return reduce(Farthest.further, parts)
+    k = int(np.argmax(length))
+    return Farthest(float(length[k]), k if numbers is None else int(numbers[k]), before[k])
 
 
 def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) -> list[str]:

@@ -119,8 +119,8 @@ def prescribe(
     case: Case,
     mesh: Mesh,
     domain: Domain,
-    moved: Displacements | None = None,
-    rims: Rims | None = None,
+    moved: Displacements | None,
+    rims: Rims | None,
 ) -> BoundaryConditions:
     """Return what a case prescribes at the moving and fixed nodes of a domain.
 

@@ -112,7 +112,7 @@ def streamed_kind(source: Path, target: Path) -> FileFormat | None:
 
 
 def convert_streamed(
-    source: Path, target: Path, zone: int | None, *, warn: Warn, tick: Tick = lambda _: None
+    source: Path, target: Path, zone: int | None, *, warn: Warn, tick: Tick
 ) -> None:
     """Convert an SU2 mesh from text to binary or back, with the bytes of `slideviz.convert`.
 

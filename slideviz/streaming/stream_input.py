@@ -126,7 +126,7 @@ class StreamInput:
         return read_skin(self.path, self.zone, share, ranks, self.texts)
 
 
-def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
+def require_su2(path: Path, file_format: FileFormat | None) -> FileFormat:
     """Return the format of a mesh file; MeshError if it is neither SU2 text nor binary."""
     kind = format_of(path, file_format).value
     if kind is None:
@@ -193,7 +193,7 @@ def open_for_run(
     warn: Callable[[str], object],
     tick: Tick,
     ranks: SerialPool,
-    later: int = 0,
+    later: int,
 ) -> Iterator[StreamInput]:
     """Context with a mesh to be deformed; the binary copy of a text is beside the output.
 

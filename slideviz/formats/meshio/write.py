@@ -229,7 +229,7 @@ def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
 
 
 def vtu_blocks(
-    mesh: Mesh, cell_data: Mapping[str, NDArray], point_data: Mapping[str, NDArray] | None = None
+    mesh: Mesh, cell_data: Mapping[str, NDArray], point_data: Mapping[str, NDArray]
 ) -> Iterator[bytes]:
     """Yield a VTU file, block by block.
 
@@ -269,7 +269,7 @@ def vtu_blocks(
         filled[: len(values)] = values
         yield from _array(name, filled)
     yield b"</CellData>\n<PointData>\n"
-    for name, values in (point_data or {}).items():
+    for name, values in point_data.items():
         vectors = values.ndim == 2 and values.shape[1] == 2
         yield from _array(name, np.pad(values, ((0, 0), (0, 1))) if vectors else values)
     yield b"</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
