@@ -54,11 +54,6 @@ class BinaryLayout:
     place: ZonePlace  # where each part of the zone begins, without its markers
     markers: int  # first byte of the markers
 
-    def names(self) -> list[bytes]:
-        """Return the names of the markers as bytes of the file, filled up to ``NAME_BYTES``."""
-        markers = self.text.zone.markers
-        return [padded((m.name if self.named else str(k)).encode()) for k, m in enumerate(markers)]
-
 
 _WIDTHS = SIZES[list(SORTED)] + 2
 """How many numbers an element has in the list, by type in the order of ``SORTED``."""
@@ -154,8 +149,11 @@ def _write_layout(layout: BinaryLayout, path: Path, progress: Tick, ranks: Seria
         parse_cells(lines, m.rows, zone.dim - 1, text.n_points, lambda _: None)
         for m in zone.markers
     )
-    names = layout.names()
-    markers = [name + marker_table(c, conn) for name, c in zip(names, facets, strict=True)]
+    names = (m.name if layout.named else str(k) for k, m in enumerate(zone.markers))
+    markers = [
+        padded(name.encode()) + marker_table(cells, conn)
+        for name, cells in zip(names, facets, strict=True)
+    ]
     lines.raw.require_same()
     with open_temporary(path) as file:
         for at, content in (
