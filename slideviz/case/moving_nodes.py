@@ -180,21 +180,15 @@ def _together(
     for place, motion in enumerate(motions):
         here = {name: points[on[name]] + total[name] for name in on if applies_to(motion, name)}
         if len(here) > 1 and motion.joins_zones:
-            joined.append(motion.as_one(_common_points(here, on)))
+            # Common nodes of two markers count once, and sums do not depend on the markers' order.
+            nodes = np.concatenate([on[name] for name in here])
+            once = np.unique(nodes, return_index=True)[1]
+            joined.append(motion.as_one(np.concatenate(list(here.values()))[once]))
         else:
             joined.append(motion)
         for name, now in here.items():
             total[name] += joined[-1].change(now, on[name], placed.get(place))
     return joined, total
-
-
-def _common_points(points: Mapping[str, FloatArray], on: Mapping[str, IntArray]) -> FloatArray:
-    """Return the points (k, d) of the nodes of several markers, in the order of the nodes.
-
-    Common nodes of two markers count once, and sums do not depend on the order of markers.
-    """
-    _, first = np.unique(np.concatenate([on[name] for name in points]), return_index=True)
-    return np.concatenate(list(points.values()))[first]
 
 
 def by_zone(case: Case, mesh: Mesh) -> Case:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from slideviz.errors import CaseError, SlidevizError, nearest
+from slideviz.errors import CaseError, nearest
 from slideviz.machine.span_field import WHOLE, SpanField, find_span
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Mesh
@@ -71,12 +71,3 @@ def span_field(case: Case, mesh: Mesh) -> SpanField:
         origin = pair.origin
         period = pair.period
     return find_span(mesh, hub, shroud, axis, origin, period)
-
-
-def span_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return why motions over the span are impossible with a 3D mesh, a sentence each."""
-    try:
-        span_field(case, mesh)
-    except SlidevizError as problem:
-        return (str(problem),)
-    return ()

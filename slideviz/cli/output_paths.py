@@ -89,24 +89,22 @@ def require_output_paths(arguments: Namespace, *outputs: OutputPath) -> None:
             )
     for output in there:
         assert output.path is not None
-        if output.is_mesh:
-            _require_mesh_ending(output.path)
+        if output.is_mesh and format_for(output.path).writer == MESHIO.writer:
+            # Late: meshio takes 0.1 s.
+            from slideviz.formats.meshio.bridge import formats_of
+
+            formats_of(output.path)
         if output.files:
             make_folder(output.path)
         else:
             require_writable(output.path, CaseError, output.replaces)
-    if not arguments.quiet:
-        _print_replaced([output for output in there if not output.named])
-
-
-def _print_replaced(unnamed: list[OutputPath]) -> None:
     old_files = []
-    for output in unnamed:
+    for output in there:
         old = [path for path in _paths(output) if path.exists()]
-        if old:
+        if old and not output.named:
             more = f" and {len(old) - 1} more" if len(old) > 1 else ""
             old_files.append(f"{old[0]}{more} ({output.option})")
-    if old_files:
+    if old_files and not arguments.quiet:
         say("note", f"there already, and replaced by this run: {', '.join(old_files)}")
 
 
@@ -131,11 +129,3 @@ def _overlap(output: OutputPath, other: OutputPath) -> bool:
     folder, name = os.path.split(os.path.realpath(other.path))
     inside = os.path.realpath(output.path) == folder and re.fullmatch(output.files, name)
     return bool(inside) or any(same_file(path, other.path) for path in _paths(output))
-
-
-def _require_mesh_ending(file: Path) -> None:
-    if format_for(file).writer == MESHIO.writer:
-        # Late: meshio takes 0.1 s.
-        from slideviz.formats.meshio.bridge import formats_of
-
-        formats_of(file)

@@ -227,8 +227,11 @@ def _require_output_paths(
         remedy="choose another name with -o or MESH_OUT_FILENAME"
         + (", or add --force to write over it" if may_force else ""),
     )
-    if arguments.steps_file:
-        _require_series(arguments.steps_file)
+    if arguments.steps_file and not format_for(arguments.steps_file).series:
+        raise CaseError(
+            f"{arguments.steps_file}: only {own_endings('series')} files hold all steps; end the "
+            "name of --steps-file with it, or use --steps-dir"
+        )
     if arguments.picture:
         # Late: VTK takes 0.6 s.
         from slideviz.export.offscreen import check_png, check_size
@@ -251,14 +254,6 @@ def _require_output_paths(
             files=rf"{re.escape(case.mesh_file.stem)}_\d+({ours})",
         ),
     )
-
-
-def _require_series(path: Path) -> None:
-    if not format_for(path).series:
-        raise CaseError(
-            f"{path}: only {own_endings('series')} files hold all steps; end the name of "
-            "--steps-file with it, or use --steps-dir"
-        )
 
 
 def _default_output(case: Case) -> Path:

@@ -318,17 +318,6 @@ def zone_rows(rows: IntArray, design: Array) -> Array:
     return put(out, moved, take(design, rows[moved]), overwrite=True)
 
 
-def over_zones(zones: Sequence[ZoneDesign], start: FloatArray, design: Array, work: Work) -> Array:
-    """Return the points (..., n, d) of all zones, each by ``work`` after those that it follows.
-
-    A zone that stays is at ``start`` (n, d). ``design`` (..., m, d).
-    """
-    out: Array = start
-    for zone in zones:
-        out = put(out, zone.points, work(zone.deformer, zone.moved(design, out, start)))
-    return out
-
-
 def zone_designs(
     prepared: Prepared,
     mesh: Assembly,
@@ -915,7 +904,15 @@ class Deformer:
         return np.stack([errors, np.broadcast_to(state.number("error_estimate"), errors.shape)])
 
     def _joined(self, design: Array, work: Work) -> Array:
-        return over_zones(self._zones, self.mesh.points, design, work)
+        """Return the points (..., n, d) of all zones, each by ``work`` after those it follows.
+
+        A zone that stays is undeformed. ``design`` (..., m, d).
+        """
+        start = self.mesh.points
+        out: Array = start
+        for zone in self._zones:
+            out = put(out, zone.points, work(zone.deformer, zone.moved(design, out, start)))
+        return out
 
     def _points(self, design: Array) -> Array:
         """Return the points (n, d) of a design (m, d)."""

@@ -19,7 +19,7 @@ from slideviz.case.motions.motion import (
     place_words,
     without_brackets,
 )
-from slideviz.case.spans import span_field, span_problems
+from slideviz.case.spans import span_field
 from slideviz.case.values import read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
@@ -140,8 +140,11 @@ class SpanMotion(Motion):
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
         if mesh.dim == 2:
             yield f"{self.kind} changes a blade over its span, and the mesh has none: it is 2D"
-        else:
-            yield from span_problems(case, mesh)
+            return
+        try:
+            span_field(case, mesh)
+        except SlidevizError as problem:
+            yield str(problem)
 
     @classmethod
     def placed(

@@ -640,7 +640,10 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     faults = dict[Message, None]()
     # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
     inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
-    for file, numbers in _numbers_of_zones(files).items():
+    zones_of: dict[Path, list[int]] = {}  # the numbers that each file is listed for
+    for zone, file in enumerate(files, 1):
+        zones_of.setdefault(file, []).append(zone)
+    for file, numbers in zones_of.items():
         try:
             own, problems, said = _rows(file)
             said = (*said, *_list_warnings(path, file, own, numbers))
@@ -665,14 +668,6 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     )
     ignored = dict.fromkeys(key for config in each.values() for key in config.ignored)
     return replace(first, case=case, zone=None, zones=tuple(zones), ignored=tuple(ignored))
-
-
-def _numbers_of_zones(files: Iterable[Path]) -> dict[Path, list[int]]:
-    """Return the numbers of the zones, from 1, that each configuration is listed for."""
-    numbers: dict[Path, list[int]] = {}
-    for zone, file in enumerate(files, 1):
-        numbers.setdefault(file, []).append(zone)
-    return numbers
 
 
 def _list_warnings(

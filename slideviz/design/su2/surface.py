@@ -650,8 +650,12 @@ class MovedBoxes(Displacer):
     @cached_property
     def at_design(self) -> BoxDeformation:
         """Return the deformation by this design."""
-        values = [value for variable in self.config.variables for value in variable.values]
-        return self._deformed(np.array(values), limits_of(self.config))
+        design = [value for variable in self.config.variables for value in variable.values]
+        values = self.config.values
+        iterations = values["FFD_INTPREV_ITER"] if values["FFD_INTPREV"] else 0
+        bound = values["OPT_LINE_SEARCH_BOUND"]
+        limits = Limits(bound, iterations, values["FFD_INTPREV_DEPTH"])
+        return self._deformed(np.array(design), limits)
 
     @cached_property
     def _at_rest(self) -> BoxDeformation:
@@ -703,13 +707,6 @@ class MovedBoxes(Displacer):
             moves = (nodes[rows] == listed) & (marker in self.config.markers)
             surfaces[marker] = listed, np.where(moves[:, None], uvw[rows], before)
         return surfaces
-
-
-def limits_of(config: Su2Config) -> Limits:
-    """Return what keeps boxes from being deformed too much."""
-    values = config.values
-    iterations = values["FFD_INTPREV_ITER"] if values["FFD_INTPREV"] else 0
-    return Limits(values["OPT_LINE_SEARCH_BOUND"], iterations, values["FFD_INTPREV_DEPTH"])
 
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
@@ -863,18 +860,17 @@ def scaled(config: Su2Config, part: float) -> Su2Config:
     if config.zones:
         zones = (scaled(z, part) if _is_checked(z) else z for z in config.zones)
         return joined(config, tuple(zones))
-    variables = tuple(_scaled(variable, part) for variable in config.variables)
-    return replace(config, variables=variables)
+    variables = []
+    for variable in config.variables:
+        # The value that moves nothing.
+        neutral = 1.0 if variable.kind in ("SCALE", "SCALE_GRID") else 0.0
+        values = tuple(neutral + part * (value - neutral) for value in variable.values)
+        variables.append(replace(variable, values=values))
+    return replace(config, variables=tuple(variables))
 
 
 def _is_checked(config: Su2Config) -> bool:
     return bool(config.values["CONVEXITY_CHECK"])
-
-
-def _scaled(variable: DesignVariable, part: float) -> DesignVariable:
-    # The value that moves nothing.
-    neutral = 1.0 if variable.kind in ("SCALE", "SCALE_GRID") else 0.0
-    return replace(variable, values=tuple(neutral + part * (v - neutral) for v in variable.values))
 
 
 def convex_part(

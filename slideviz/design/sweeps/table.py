@@ -98,7 +98,11 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
     columns: dict[str, NumberPlace | str] = {}
     first: dict[NumberPlace | str, str] = {}
     problems = list[Message]()
-    known = _all_names(case)
+    known = numbers_of(case) | {
+        f"motion{at + 1}.{part}": place
+        for at, motion in enumerate(case.motions)
+        for part, place in _parts(motion, at)
+    }
     for name in names:
         try:
             meant = _column_meaning(case, name, known)
@@ -184,7 +188,8 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
         if KEYS[key].group in (FILES, VIEW):
             raise CaseError("files and the view come from the case for all designs")
         return key
-    wanted = _normalized_name(name)
+    head, dot, last = name.strip().rpartition(".")
+    wanted = f"{head}{dot}{_ALSO.get(last.lower(), last.lower())}"
     if wanted in known:
         return known[wanted]
     # Markers may differ in capitals alone.
@@ -222,20 +227,6 @@ def _absent_motion(case: Case, name: str) -> str:
     begin = f"{match[1]}.{match[2]}.".lower()
     has = any(f"{motion.design_name()}.".lower().startswith(begin) for motion in case.motions)
     return "" if has else f"({match[1]}, {match[2].lower()}, ...)"
-
-
-def _all_names(case: Case) -> dict[str, NumberPlace]:
-    return numbers_of(case) | {
-        f"motion{at + 1}.{part}": place
-        for at, motion in enumerate(case.motions)
-        for part, place in _parts(motion, at)
-    }
-
-
-def _normalized_name(name: str) -> str:
-    """Return the name of a number with its last part in lower case, as here (`_ALSO`)."""
-    head, dot, part = name.strip().rpartition(".")
-    return f"{head}{dot}{_ALSO.get(part.lower(), part.lower())}"
 
 
 def _parts(motion: Motion, place: int) -> Iterator[tuple[str, NumberPlace]]:
@@ -445,7 +436,11 @@ def _read_csv(case: Case, path: Path) -> Designs:
     In a table of results (``results.csv``) the columns of results are ignored.
     """
     text, _ = read_text(path, "table of designs")
-    lines = _filled_lines(text)
+    lines = [
+        (at, line)
+        for at, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     if len(lines) < 2:
         raise CaseError(
             f"{path}: has no designs; expected a line with the names of the columns, e.g. "
@@ -464,7 +459,10 @@ def _read_csv(case: Case, path: Path) -> Designs:
         columns = columns_of(case, names)
     except CaseError as problem:
         problems += problem.within(line=first)
-        columns = _known_columns(case, names)
+        columns = {}  # those with known names, so that mistakes in their values are found, too
+        for name in names:
+            with suppress(CaseError):
+                columns |= columns_of(case, [name])
     designs: list[Design] = []
     for at, (line, content) in enumerate(rest, start=1):
         try:
@@ -531,42 +529,21 @@ def design_columns(head: Sequence[str]) -> slice:
     return slice(1, at) if at > 1 and head[0] == "design" else slice(None)
 
 
-def _known_columns(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
-    """Return the columns with known names, so that mistakes in their values are found, too."""
-    columns: dict[str, NumberPlace | str] = {}
-    for name in names:
-        with suppress(CaseError):
-            columns |= columns_of(case, [name])
-    return columns
-
-
 def _design(
     case: Case, columns: Mapping[str, NumberPlace | str], number: int, values: Mapping[str, Value]
 ) -> Design:
     """Return a design, with motions' numbers as float; CaseError where values are wrong."""
     made = applied(case, columns, values)
     if TIME in columns:
-        values = {**values, TIME: _time(values[TIME])}
+        try:
+            values = {**values, TIME: number_of(values[TIME])}
+        except CaseError as problem:
+            raise CaseError(f"column {TIME!r}: {problem}") from problem
     plain = {
         name: float(value) if isinstance(columns[name], NumberPlace) and value != "" else value
         for name, value in values.items()
     }
     return Design(number, plain, made)
-
-
-def _time(value: Value) -> float:
-    try:
-        return number_of(value)
-    except CaseError as problem:
-        raise CaseError(f"column {TIME!r}: {problem}") from problem
-
-
-def _filled_lines(text: str) -> list[tuple[int, str]]:
-    return [
-        (at, line)
-        for at, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -633,20 +610,18 @@ class SweepResults:
         """Do what `start` does, in the locked folder."""
         if resume and self.path.exists():
             earlier = {row.design: row for row in self._earlier_rows()}
-            return [row for row in earlier.values() if not row.problem and _has_mesh(row, meshes)]
+            done = (row for row in earlier.values() if not row.problem)
+            return [r for r in done if not meshes or (r.mesh is not None and r.mesh.is_file())]
         if self.path.exists() and not force:
             raise CaseError(
                 f"{self.path}: there are results already; continue with --resume (resume=True), "
                 f"start again with --force (force=True), or choose another folder"
             )
-        self._write_head()
-        return []
-
-    def _write_head(self) -> None:
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())
         write_csv(self.path, [self._head], CaseError)
+        return []
 
     def _earlier_rows(self) -> list[DesignRow]:
         """Return the rows of the table; CaseError where they are of another sweep.
@@ -820,10 +795,6 @@ def sources_of(case: Case, mesh: Mesh | None) -> dict[str, str]:
         if value is not None and key.name != "DEFORMATION_FILENAME":
             found[key.name] = " ".join(key.kind.write(value).split())
     return found
-
-
-def _has_mesh(row: DesignRow, meshes: bool) -> bool:
-    return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 
 def _digest(*parts: Any) -> str:
