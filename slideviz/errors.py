@@ -142,6 +142,15 @@ class Cancelled(SlidevizError):
     """The user stopped the work; nothing is wrong."""
 
 
+def why_failed(problem: Exception, remedy: str) -> str:
+    """Return why one of many runs has no result; ``remedy`` is one against too little memory."""
+    if isinstance(problem, SlidevizError):
+        return "; ".join(map(str, problem.messages))
+    if isinstance(problem, MemoryError):
+        return f"out of memory; a coarser mesh or {remedy}"
+    return f"internal error ({type(problem).__name__}: {problem})"
+
+
 def printable(path: str | Path) -> str:
     """Return a path as text for a message; bytes that are not UTF-8 become escape sequences."""
     return str(path).encode("utf-8", "backslashreplace").decode()

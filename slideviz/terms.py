@@ -344,7 +344,8 @@ PERIODIC_MODES: dict[PeriodicMode, Term] = {
     ),
 }
 
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+Vector = tuple[float, float, float]
+AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 """The directions that can be given by a letter."""
 
 PeriodicKind = Literal["translational", "rotational"]

@@ -7,7 +7,7 @@ by spaces, tabs, commas or semicolons; ``%``, ``#`` and ``$`` start comments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,6 +44,8 @@ MOST_APART = 5.0
 LITTLE = 1e-4
 """Largest difference of displacements in a file, and a suspiciously small largest one, over the
 extent of what moves."""
+NodesOn = Mapping[str, IntArray]
+"""The nodes (k,) of each moving boundary."""
 DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 

@@ -37,14 +37,14 @@ class CaseFields(CheckedFields):
     ffd_blending: terms.FfdBlending = field(default="BEZIER", metadata=terms.FFD_BLENDINGS)
     ffd_orders: tuple[int, int, int] = (2, 2, 2)
     ffd_system: terms.FfdSystem = field(default="CARTESIAN", metadata=terms.FFD_SYSTEMS)
-    ffd_axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ffd_axis: terms.Vector = (0.0, 0.0, 0.0)
     method: terms.Method = field(default="rbf", metadata=terms.METHODS)
     sliding: terms.Sliding = field(default="none", metadata=terms.SLIDING)
     rims: terms.Rims = field(default="free", metadata=terms.RIMS)
     periodic: terms.PeriodicMode = field(default="none", metadata=terms.PERIODIC_MODES)
     periodic_type: terms.PeriodicType = field(default="auto", metadata=terms.PERIODIC_TYPES)
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: terms.Vector = (0.0, 0.0, 1.0)
+    origin: terms.Vector = (0.0, 0.0, 0.0)
     direction: int | None = None
     span: tuple[str, str] | None = None
     feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG

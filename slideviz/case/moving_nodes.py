@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.case.check import marker_problems, motion_problems
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.kinds import FAMILIES
@@ -31,7 +31,7 @@ PlacedDisplacements = Mapping[int, Displacements]
 def placed_displacements(
     case: Case,
     mesh: Mesh,
-    on: Mapping[str, IntArray],
+    on: NodesOn,
     problems: list[Message],
     families: Iterable[type[Motion]] = FAMILIES,
 ) -> dict[int, Displacements]:
@@ -52,7 +52,7 @@ def placed_displacements(
 def _of_zones(
     case: Case,
     mesh: Mesh,
-    on: Mapping[str, IntArray],
+    on: NodesOn,
     problems: list[Message],
     family: type[Motion],
 ) -> dict[int, Displacements]:
@@ -81,9 +81,7 @@ def _of_zones(
     }
 
 
-def required_displacements(
-    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
-) -> dict[int, Displacements]:
+def required_displacements(case: Case, mesh: Mesh, on: NodesOn) -> dict[int, Displacements]:
     """Return what `placed_displacements` does; CaseError with all problems, if there are any."""
     problems = list[Message]()
     try:
@@ -155,7 +153,7 @@ def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
 def moved_together(
     motions: Iterable[Motion],
     points: FloatArray,
-    on: Mapping[str, IntArray],
+    on: NodesOn,
     placed: PlacedDisplacements,
 ) -> dict[str, FloatArray]:
     """Return the displacement (k, d) of the nodes of each marker after all motions, in sequence.
@@ -171,7 +169,7 @@ def moved_together(
 def _together(
     motions: Iterable[Motion],
     points: FloatArray,
-    on: Mapping[str, IntArray],
+    on: NodesOn,
     placed: PlacedDisplacements,
 ) -> tuple[list[Motion], dict[str, FloatArray]]:
     """Return the motions as one body each (`Motion.as_one`), and the displacements by them."""

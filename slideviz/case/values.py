@@ -23,7 +23,7 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError, not_one_of, shown
-from slideviz.terms import AXES, Term, labels, tips
+from slideviz.terms import AXES, Term, Vector, labels, tips
 
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
 """The kind of field by which the window lets users enter a value."""
@@ -236,7 +236,7 @@ def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
     return tuple(number(item.text) for item in items)
 
 
-def read_axis(items: list[Word]) -> tuple[float, float, float]:
+def read_axis(items: list[Word]) -> Vector:
     """Return the direction ``x``, ``y``, ``z`` or of three numbers, of any length; or CaseError."""
     if len(items) == 1 and items[0].text.lower() in AXES:
         return AXES[items[0].text.lower()]
@@ -254,7 +254,7 @@ def vector_text(values: tuple[float, ...]) -> str:
     return f"({', '.join(repr(float(value)) for value in values)})"
 
 
-def axis_text(axis: tuple[float, float, float]) -> str:
+def axis_text(axis: Vector) -> str:
     """Return ``x``, ``y`` or ``z`` for a direction that is just this, else its three numbers."""
     for name, unit in AXES.items():
         # By text, since -0.0 == 0.0 and the two do not give the same bits.
@@ -263,7 +263,7 @@ def axis_text(axis: tuple[float, float, float]) -> str:
     return vector_text(axis)
 
 
-def _read_origin(text: str) -> tuple[float, float, float]:
+def _read_origin(text: str) -> Vector:
     values = read_vector(list_of(text), "the point")
     return (*values, 0.0)[:3] if len(values) == 2 else values  # type: ignore[return-value]
 

@@ -21,7 +21,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Translate
-from slideviz.errors import Cancelled, CaseError, SlidevizError
+from slideviz.errors import Cancelled, CaseError, why_failed
 from slideviz.mesh.model import Assembly, FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
@@ -312,16 +312,9 @@ def compare(
             yield CombinationRow(combination, _result(combination, case, mesh, shared, report))
         except Cancelled:
             raise
-        except SlidevizError as problem:
-            yield CombinationRow(combination, problem="; ".join(map(str, problem.messages)))
-        except MemoryError:
-            yield CombinationRow(
-                combination, problem="out of memory; a coarser mesh or DATA_REDUCTION= YES"
-            )
         except Exception as problem:  # one that fails must not take the others with it
-            yield CombinationRow(
-                combination, problem=f"internal error ({type(problem).__name__}: {problem})"
-            )
+            reason = why_failed(problem, "DATA_REDUCTION= YES")
+            yield CombinationRow(combination, problem=reason)
 
 
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from slideviz import terms
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.motion import (
     Motion,
     NewMotion,
@@ -101,7 +101,7 @@ class OnAirfoil(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
+        cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):

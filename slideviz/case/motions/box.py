@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.motion import (
     Motion,
     NewMotion,
@@ -39,9 +39,9 @@ from slideviz.ffd.box import (
 from slideviz.ffd.deformation import parametric
 from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
+from slideviz.mesh.model import FloatArray, Mesh, ZonePart
 from slideviz.system.weak_cache import WeakCache, weak_cache
-from slideviz.terms import Term
+from slideviz.terms import Term, Vector
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -218,7 +218,7 @@ class BoxMotion(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
+        cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
     ) -> dict[int, Displacements]:
         motions = box_motions(case)
         boxes = boxes_for(case, mesh) if motions else {}
@@ -264,7 +264,7 @@ class Ffd(BoxMotion):
     marker: Target
     box: str
     index: tuple[int, int, int]
-    vector: tuple[float, float, float]
+    vector: Vector
 
     kind_term = Term("free-form box")
     verbs = ("ffd",)
@@ -429,7 +429,7 @@ class FfdTwist(BoxMotion):
     plane: int
     angle_deg: float
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
-    axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    axis: Vector = (0.0, 1.0, 0.0)
 
     kind_term = Term("twist by box")
     verbs = ("ffd-twist",)
@@ -438,7 +438,7 @@ class FfdTwist(BoxMotion):
     )
     rows = ("plane", "box", "angle", "point", "axis")
     proportional = ("angle_deg",)
-    words: ClassVar[Mapping[str, str]] = {**Motion.words, "degrees": "angle_deg"}
+    words = (("degrees", "angle_deg"),)
     only_3d = True
 
     @classmethod
@@ -550,7 +550,7 @@ def box_changes(
 
 
 def _moved(
-    box: Box, mesh: Mesh, q: FloatArray, change: FloatArray, on: Mapping[str, IntArray]
+    box: Box, mesh: Mesh, q: FloatArray, change: FloatArray, on: NodesOn
 ) -> Displacements | None:
     """Return the displacements that a change of control points gives all nodes of some markers.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.case.displacement import Displacements, read_displacements
+from slideviz.case.displacement import Displacements, NodesOn, read_displacements
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named, nodes_moved
 from slideviz.case.values import path_text
 from slideviz.case.words import Word
@@ -76,7 +76,7 @@ class FromFile(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
+        cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         for place, motion in enumerate(case.motions):
@@ -91,7 +91,7 @@ class FromFile(Motion):
                 problems += problem.messages
         return found
 
-    def listed(self, case: Case, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
+    def listed(self, case: Case, mesh: Mesh, moved: NodesOn) -> Displacements:
         """Return what the file lists for markers and their nodes; read again if it has changed."""
         nodes = nodes_moved(self, moved)
         names = " or ".join(repr(name) for name in named(self.marker))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from numbers import Real
 from pathlib import Path
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from slideviz.argument_types import CheckedFields
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.words import Word, name_text
 from slideviz.errors import CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.terms import AXES, Term
+from slideviz.terms import AXES, Term, Vector
 
 if TYPE_CHECKING:
     from typing import Self
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Point = tuple[float, ...] | Literal["centroid"]
 Target = str | tuple[str, ...]
 """The markers a motion moves: one, several as one body, or, where it is empty, all moving ones."""
-Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
+Axis = tuple[Vector, Vector]
 """An axis: its direction, and a point on it."""
 
 ALL_MOVING = "*"  # what stands for the markers of an empty target
@@ -51,7 +51,7 @@ def applies_to(motion: Motion, marker: str) -> bool:
     return not motion.marker or marker in named(motion.marker)
 
 
-def nodes_moved(motion: Motion, on: Mapping[str, IntArray]) -> IntArray:
+def nodes_moved(motion: Motion, on: NodesOn) -> IntArray:
     """Return the nodes (m,) that a motion moves, of those of each moving marker; ascending."""
     moved = (nodes for name, nodes in on.items() if applies_to(motion, name))
     return np.unique(np.concatenate([np.empty(0, np.int64), *moved]))
@@ -109,10 +109,7 @@ class Motion(CheckedFields):
     """What its file is."""
     has_table: ClassVar[bool] = False
     """Whether its file is a table that the user can edit in the window."""
-    words: ClassVar[Mapping[str, str]] = {
-        **{f"d{axis}": axis for axis in "xyz"},
-        **{f"p{axis}": f"point_{axis}" for axis in "xyz"},
-    }
+    words: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Words of ``grammar`` for numbers that `design_numbers` names otherwise, and these names."""
     in_zones: ClassVar[bool] = True
     """Whether what `placed` returns is found in each zone of a mesh alone."""
@@ -192,7 +189,7 @@ class Motion(CheckedFields):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
+        cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
     ) -> dict[int, Displacements]:
         """Return the displacements by all motions of this family, by their place in the case.
 
@@ -203,7 +200,7 @@ class Motion(CheckedFields):
 
     @classmethod
     def derivatives(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+        cls, case: Case, mesh: Mesh, on: NodesOn
     ) -> Iterator[tuple[int, IntArray, FloatArray, FloatArray]]:
         """Yield the derivative of the displacement by each motion of this family, in two factors.
 

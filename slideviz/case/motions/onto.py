@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
 from slideviz.case.words import Word, number
@@ -130,7 +130,7 @@ class Onto(FromFile):
                     "leaves before; put this one first"
                 )
 
-    def listed(self, case: Case, mesh: Mesh, moved: Mapping[str, IntArray]) -> Displacements:
+    def listed(self, case: Case, mesh: Mesh, moved: NodesOn) -> Displacements:
         return laid_displacements(self, case, mesh, moved)
 
 

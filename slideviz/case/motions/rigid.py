@@ -6,7 +6,7 @@ Each begins where the motions before it have taken the boundary.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -33,7 +33,7 @@ from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.terms import Term
+from slideviz.terms import Term, Vector
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -129,7 +129,7 @@ class Rotate(_AboutPoint):
     marker: Target
     angle_deg: float
     point: Point = "centroid"
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axis: Vector = (0.0, 0.0, 1.0)
 
     kind_term = Term("rotate")
     verbs = ("rotate",)
@@ -141,7 +141,7 @@ class Rotate(_AboutPoint):
     )
     rows = ("angle",)
     proportional = ("angle_deg",)
-    words: ClassVar[Mapping[str, str]] = {**Motion.words, "degrees": "angle_deg"}
+    words = (("degrees", "angle_deg"),)
 
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
@@ -278,7 +278,7 @@ class Radial(_AboutPoint):
     marker: Target
     factor: float = 1.0
     distance: float = 0.0
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axis: Vector = (0.0, 0.0, 1.0)
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     kind_term = Term("push radially")
@@ -290,7 +290,7 @@ class Radial(_AboutPoint):
     stays_at = ("point",)
     proportional = ("distance",)
     ratios = ("factor",)
-    words: ClassVar[Mapping[str, str]] = {**Motion.words, "dr": "distance"}
+    words = (("dr", "distance"),)
 
     @classmethod
     def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
@@ -346,7 +346,7 @@ class Radial(_AboutPoint):
         return arm * ((self.factor - 1.0) + outwards)[:, None]
 
 
-def rotated(arm: FloatArray, angle_deg: float, axis: tuple[float, float, float]) -> FloatArray:
+def rotated(arm: FloatArray, angle_deg: float, axis: Vector) -> FloatArray:
     """Return the change of vectors (k, d) by a rotation (Rodrigues).
 
     ``sin(a) k x v + (1 - cos(a)) k x (k x v)``, with ``1 - cos(a) = 2 sin(a/2)^2``, which keeps
@@ -385,6 +385,6 @@ def _factor_words(values: tuple[float, ...], form: str = ".4g") -> str:
     return " × ".join(format(value, form) for value in values)
 
 
-def _axis_problems(axis: tuple[float, float, float], dim: int) -> Iterator[str]:
+def _axis_problems(axis: Vector, dim: int) -> Iterator[str]:
     if dim == 2 and any(axis[:2]):
         yield f"the axis {axis} leaves the plane; in 2D leave the axis out"

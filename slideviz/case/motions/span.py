@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements
+from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.motion import (
     Amount,
     Motion,
@@ -30,7 +30,7 @@ from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.system.weak_cache import WeakCache
-from slideviz.terms import SPAN_KINDS, SpanKind, Term
+from slideviz.terms import SPAN_KINDS, SpanKind, Term, Vector
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -61,7 +61,7 @@ class SpanMotion(Motion):
     kind: SpanKind = field(metadata=SPAN_KINDS)
     spans: tuple[float, ...]
     values: tuple[float, ...]
-    point: tuple[float, float, float] | None = None
+    point: Vector | None = None
 
     kind_term = Term("blade over span")
     verbs = tuple(SPAN_KINDS)
@@ -148,7 +148,7 @@ class SpanMotion(Motion):
 
     @classmethod
     def placed(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray], problems: list[Message]
+        cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
     ) -> dict[int, Displacements]:
         found: dict[int, Displacements] = {}
         try:
@@ -171,7 +171,7 @@ class SpanMotion(Motion):
 
     @classmethod
     def derivatives(
-        cls, case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+        cls, case: Case, mesh: Mesh, on: NodesOn
     ) -> Iterator[tuple[int, IntArray, FloatArray, FloatArray]]:
         for blade in blades_of(case, mesh, on):
             totals, slopes = blade.totals()
@@ -247,7 +247,7 @@ class Blade:
         return np.array(totals), slopes
 
 
-def blades_of(case: Case, mesh: Mesh, on: Mapping[str, IntArray]) -> list[Blade]:
+def blades_of(case: Case, mesh: Mesh, on: NodesOn) -> list[Blade]:
     """Return the blades that motions over the span move; ``on``: nodes (k,) of moving markers.
 
     Motions that share a boundary move one blade. Raises CaseError where they have different
@@ -270,9 +270,7 @@ def blades_of(case: Case, mesh: Mesh, on: Mapping[str, IntArray]) -> list[Blade]
     return [_blade(case, mesh, on, sorted(names), places) for names, places in groups]
 
 
-def _blade(
-    case: Case, mesh: Mesh, on: Mapping[str, IntArray], names: list[str], places: list[int]
-) -> Blade:
+def _blade(case: Case, mesh: Mesh, on: NodesOn, names: list[str], places: list[int]) -> Blade:
     motions = [one for one in (case.motions[k] for k in places) if isinstance(one, SpanMotion)]
     point = motions[0].point
     points = zip(places, motions, strict=True)

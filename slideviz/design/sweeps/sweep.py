@@ -58,7 +58,7 @@ from slideviz.design.sweeps.table import (
     read_designs,
     sources_of,
 )
-from slideviz.errors import CaseError, DeformError, SlidevizError, messages_of
+from slideviz.errors import CaseError, DeformError, messages_of, why_failed
 from slideviz.formats.files import read, write
 from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
@@ -137,14 +137,8 @@ def run_task(task: Task) -> TaskResult:
         try:
             with nullcontext() if task.streamed else _one_thread():
                 row = _result(task, mesh, begin)
-        except SlidevizError as problem:
-            row = DesignRow(task.design, problem="; ".join(map(str, problem.messages)))
-        except MemoryError:
-            row = DesignRow(task.design, problem="out of memory; a coarser mesh or fewer workers")
         except Exception as problem:
-            row = DesignRow(
-                task.design, problem=f"internal error ({type(problem).__name__}: {problem})"
-            )
+            row = DesignRow(task.design, problem=why_failed(problem, "fewer workers"))
         return TaskResult(_worker_name(), row)
 
 

@@ -51,7 +51,12 @@ from slideviz.system.file_checks import read_json, require_regular_file
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""
 
-_ALSO = {"angle": "angle_deg"} | {k: v for kind in KINDS for k, v in kind.words.items()}
+_ALSO = {
+    "angle": "angle_deg",
+    **{f"d{axis}": axis for axis in "xyz"},
+    **{f"p{axis}": f"point_{axis}" for axis in "xyz"},
+    **dict(word for kind in KINDS for word in kind.words),
+}
 """Names of numbers in the grammar of ``MOTION``, and their names here."""
 TIME = "time"
 """The column with the time of a design, which changes nothing but the name of its mesh."""
