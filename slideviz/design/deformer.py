@@ -300,6 +300,11 @@ class ZoneDesign:
     place among its own, and the nodes that they follow, by their number in the mesh."""
     deformer: Deformer
 
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Return the messages of its deformer, with the number of the zone."""
+        return SlidevizError(*self.deformer.messages).within(f"zone {self.number}")
+
     def moved(self, design: Array, points: Array, start: FloatArray) -> Array:
         """Return the displacements (..., m_z, d) of its moving nodes, from those of a design.
 
@@ -624,22 +629,17 @@ class Deformer:
         if isinstance(mesh, Assembly):
             make = partial(Deformer, progress=report)
             self._zones = zone_designs(prepared, mesh, asked.nodes, references, make)
-            points = self.deform(references[0])
-            left_out = *left_out, *disjoint_interfaces(mesh, case.interfaces)
-            self.messages = (*prepared.alone.warnings, *left_out)
-            for zone in self._zones:
-                said = SlidevizError(*zone.deformer.messages)
-                self.messages += said.within(f"zone {zone.number}")
-            self.messages += (*torn_interfaces(mesh, points, case.interfaces),)
+            self.messages = (
+                *prepared.alone.warnings,
+                *left_out,
+                *disjoint_interfaces(mesh, case.interfaces),
+                *(text for zone in self._zones for text in zone.messages),
+                *torn_interfaces(mesh, self.deform(references[0]), case.interfaces),
+            )
             return
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
-        held = case
-        if automatic_radius(case) and len(references) > 1:
-            far = np.linalg.norm(references, axis=2).argmax(axis=0)
-            widest = references[far, np.arange(len(asked.nodes))]
-            together = Displacements(asked.nodes, widest, asked.warnings)
-            held = case.change(support_radius=support_radius(case, mesh, together))
+        held = _with_common_radius(case, mesh, asked, references)
         setup = make_setup(Prepared(held, mesh), displaced(most, mesh))
         if setup.reduction is not None and not sizes.any():
             raise DeformError(
@@ -931,3 +931,15 @@ class Deformer:
         end = self._points(start)
         assert isinstance(end, Variable)
         return start, end
+
+
+def _with_common_radius(
+    case: Case, mesh: Mesh, asked: Displacements, references: FloatArray
+) -> Case:
+    """Return the case with a support radius for several designs (k, m, d), if it is automatic."""
+    if not automatic_radius(case) or len(references) < 2:
+        return case
+    far = np.linalg.norm(references, axis=2).argmax(axis=0)
+    widest = references[far, np.arange(len(asked.nodes))]
+    together = Displacements(asked.nodes, widest, asked.warnings)
+    return case.change(support_radius=support_radius(case, mesh, together))

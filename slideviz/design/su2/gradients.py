@@ -284,20 +284,7 @@ def match(
         return Matched(
             _vectors(sensitivities.values, mesh, positions, moving, markers), True, (sentence,)
         )
-    unit = largest_coordinate(mesh.points)
-    gap, rows = _nearest(sensitivities, mesh.points)
-    at_design = design is None
-    if design is not None and gap > EXACT * unit:
-        there, others = _nearest(sensitivities, design())
-        if there <= gap:
-            gap = there
-            rows = others
-            at_design = True
-    if gap > SAME * unit:
-        raise CaseError(
-            f"{sensitivities.path}: its points match neither {mesh.name} nor this design (they "
-            f"differ by {gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
-        )
+    gap, rows, at_design = _rows_at(sensitivities, mesh, design)
     for interface in mesh.interfaces if isinstance(mesh, Assembly) else ():
         # A place with one row of two nodes: the row is that of the node that moves.
         alone = np.isin(interface.nodes, rows) & ~np.isin(interface.partners, rows)
@@ -306,7 +293,7 @@ def match(
         place[interface.nodes[alone]] = interface.partners[alone]
         rows = place[rows]
     notes = list[Remark]()
-    if gap > CLOSE * unit:
+    if gap > CLOSE * largest_coordinate(mesh.points):
         where = "this design" if at_design else mesh.name
         notes.append(
             f"{sensitivities.path}: its points differ from {where} by {gap:.2g}: is the file older?"
@@ -330,6 +317,30 @@ def match(
         notes.append(note(sentence) if expected else sentence)
     positions = design() if design is not None and at_design and normal_only else mesh.points
     return Matched(_vectors(values, mesh, positions, moving, markers), at_design, tuple(notes))
+
+
+def _rows_at(
+    sensitivities: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | None
+) -> tuple[float, IntArray, bool]:
+    """Return how far points in the file are off, the node of each row, and whether at the design.
+
+    Raises CaseError if they are neither those of the mesh nor those of the design.
+    """
+    unit = largest_coordinate(mesh.points)
+    gap, rows = _nearest(sensitivities, mesh.points)
+    at_design = design is None
+    if design is not None and gap > EXACT * unit:
+        there, others = _nearest(sensitivities, design())
+        if there <= gap:
+            gap = there
+            rows = others
+            at_design = True
+    if gap > SAME * unit:
+        raise CaseError(
+            f"{sensitivities.path}: its points match neither {mesh.name} nor this design (they "
+            f"differ by {gap:.3g}); run the adjoint solver on the mesh that `slideviz def` writes"
+        )
+    return gap, rows, at_design
 
 
 def _vectors(
