@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather, half_sum, minus3
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def node(at, k, c):  # type: ignore[no-untyped-def]
     """Return the coordinates, a triple, of local node ``k`` of cell ``c``."""
     return at[0, k, c], at[1, k, c], at[2, k, c]
 
 
-@njit(**OPTIONS)
+@njit
 def _face(at, row, count, area, centre):  # type: ignore[no-untyped-def]
     """Write area vectors and centres of a face of cells into ``area`` and ``centre`` (3, …).
 
@@ -64,7 +64,7 @@ def _face(at, row, count, area, centre):  # type: ignore[no-untyped-def]
                 centre[axis, c] = moment[axis] / (3.0 * total) if total > 0.0 else middle[axis]
 
 
-@njit(**OPTIONS)
+@njit
 def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ignore[no-untyped-def]
     """Write centres (m, 3) and volumes (m,) of cells of one type; in 2D, areas.
 
@@ -101,7 +101,7 @@ def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ig
                 volumes[start + c] = areas[0, 2, c] * signs[start + c]
 
 
-@njit(**OPTIONS)
+@njit
 def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewness, expansion):  # type: ignore[no-untyped-def]
     """Write the worst values of the faces of cells of one type.
 
@@ -142,7 +142,7 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
             expansion[cells[c]] = worst[2, c]
 
 
-@njit(**OPTIONS)
+@njit
 def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # type: ignore[no-untyped-def]
     """Write what is across side ``k`` of ``cells`` (c,).
 
@@ -173,7 +173,7 @@ def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # t
                 across[axis, c] = through / square * area[axis, c] if square > 0.0 else 0.0
 
 
-@njit(**OPTIONS)
+@njit
 def _raise_skewness(at, row, cells, centres, area, middle, across, share, worst):  # type: ignore[no-untyped-def]
     """Raise ``worst`` (…) to the skewness of a face of ``cells`` (c,), local nodes ``row``."""
     v = np.empty((3, LANES))

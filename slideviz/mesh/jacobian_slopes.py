@@ -20,10 +20,10 @@ from slideviz.mesh.jacobians import (
     half_sum,
     spreads,
 )
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 
-@njit(**OPTIONS)
+@njit
 def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: ignore[no-untyped-def]
     """Write the derivative of ln f_ss by the nodes of each cell into ``out`` (m, n, d).
 
@@ -55,7 +55,7 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
                     out[first + c, j, axis] = slope[axis, j, c]
 
 
-@njit(**OPTIONS)
+@njit
 def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
     """Replace Jacobians and spreads (k, ...) by the derivatives of ln f_ss by each of them.
 
@@ -78,13 +78,13 @@ def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
             spread[k, c] = -powers[0] * share / spread[k, c]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _power(base, exponent):  # type: ignore[no-untyped-def]
     """Return ``base ** exponent``; exponent 1 is a shortcut."""
     return base if exponent == 1.0 else base**exponent
 
 
-@njit(**OPTIONS)
+@njit
 def _pull_plane(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
 
@@ -120,7 +120,7 @@ def _pull_plane(vtk, coords, table, count, alpha, spread, slope):  # type: ignor
                 slope[axis, o, c] -= by_a[axis] + by_b[axis]
 
 
-@njit(**OPTIONS)
+@njit
 def _pull_solid(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
     for k in range(len(table)):
@@ -148,7 +148,7 @@ def _pull_solid(vtk, coords, table, count, alpha, spread, slope):  # type: ignor
                 slope[axis, o, c] -= one + two + three
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
     """Return the derivatives of a corner's spread by its three edges, a triple each.
 
@@ -184,7 +184,7 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**OPTIONS)
+@njit
 def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[no-untyped-def]
     """Write derivatives by nodes of the weighted sum of each cell's coefficients to ``out``.
 
@@ -208,7 +208,7 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
                     out[first + c, j, axis] = slope[axis, j, c]
 
 
-@njit(**OPTIONS)
+@njit
 def pull_proof(vtk, coords, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
     """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES).
 
@@ -235,7 +235,7 @@ _PRISM_SIDES = np.array([[0, 1], [0, 2], [3, 4], [3, 5]])
 _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 
 
-@njit(**OPTIONS)
+@njit
 def _pull_hexahedron(coords, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
     heights = NODE.reshape(4, 2)
@@ -252,7 +252,7 @@ def _pull_hexahedron(coords, count, weights, slope):  # type: ignore[no-untyped-
             _pull_heights(coords, count, _SIDES[i, j], heights, factors, slope)
 
 
-@njit(**OPTIONS)
+@njit
 def _pull_heights(coords, count, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
     """Add derivatives of ``Σ_h w_h · (f0h u0 x v0 + f1h (u0 x v1 + u1 x v0) / 2 + f2h u1 x v1)``.
 
@@ -303,7 +303,7 @@ def _pull_heights(coords, count, sides, heights, factors, slope):  # type: ignor
                 slope[axis, stop, c] += value
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _cross(a, b, axis, c):  # type: ignore[no-untyped-def]
     """Return a component of the cross product of vectors (3, ...) of cell ``c``."""
     one = (axis + 1) % 3
@@ -311,7 +311,7 @@ def _cross(a, b, axis, c):  # type: ignore[no-untyped-def]
     return a[one, c] * b[two, c] - a[two, c] * b[one, c]
 
 
-@njit(**OPTIONS)
+@njit
 def add_to_points(nodes, weights, slopes, lane, lanes, out):  # type: ignore[no-untyped-def]
     """Add ``weights * slopes`` of cells to their points in ``out``, for the points of one lane.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def check_cells(mesh: Mesh) -> None:
         )
 
 
-@njit(**OPTIONS)
+@njit
 def gather(points, nodes, first, count, coords):  # type: ignore[no-untyped-def]
     """Write the coordinates of ``count`` cells, from number ``first`` on, into ``coords``.
 
@@ -122,7 +122,7 @@ def gather(points, nodes, first, count, coords):  # type: ignore[no-untyped-def]
                 coords[axis, j, c] = points[node, axis]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def edge(coords, start, stop, c):  # type: ignore[no-untyped-def]
     """Return the vector, a triple, from local node ``start`` to ``stop`` of cell ``c``."""
     return (
@@ -132,37 +132,37 @@ def edge(coords, start, stop, c):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def cross3(a, b):  # type: ignore[no-untyped-def]
     """Return the cross product of two triples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def dot3(a, b):  # type: ignore[no-untyped-def]
     """Return the scalar product of two triples, added up in order."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def half_sum(a, b):  # type: ignore[no-untyped-def]
     """Return the mean of two triples."""
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def add3(a, b):  # type: ignore[no-untyped-def]
     """Return the sum of two triples."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def minus3(a, b):  # type: ignore[no-untyped-def]
     """Return the difference of two triples."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(**OPTIONS)
+@njit
 def corners(coords, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
 
@@ -187,7 +187,7 @@ def corners(coords, table, count, alpha):  # type: ignore[no-untyped-def]
                 alpha[k, c] = dot3(normal, edge(coords, o, h, c))
 
 
-@njit(**OPTIONS)
+@njit
 def spreads(vtk, coords, table, count, spread):  # type: ignore[no-untyped-def]
     """Write the spread of each corner into ``spread`` (k, ...).
 
@@ -227,7 +227,7 @@ def spreads(vtk, coords, table, count, spread):  # type: ignore[no-untyped-def]
                 spread[k, c] = np.sqrt(xx * yy * zz)
 
 
-@njit(**OPTIONS)
+@njit
 def write_prism(coords, count, out):  # type: ignore[no-untyped-def]
     """Write the Bernstein coefficients of det J of prisms into ``out`` (3, 3, ...).
 
@@ -254,7 +254,7 @@ NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 """Node of a hexahedron by its parameters (i, j, k), each 0 or 1."""
 
 
-@njit(**OPTIONS)
+@njit
 def write_hexahedron(coords, count, out):  # type: ignore[no-untyped-def]
     """Write the Bézier coefficients of det J of hexahedra into ``out`` (3, 3, 3, ...).
 
@@ -286,7 +286,7 @@ def write_hexahedron(coords, count, out):  # type: ignore[no-untyped-def]
                         out[i + p, j + q, 2, c] += weight * dot3(top, w)
 
 
-@njit(**OPTIONS)
+@njit
 def add_corners(points, nodes, table, sums):  # type: ignore[no-untyped-def]
     """Write the sums of the corner Jacobians of cells, ``nodes`` (m, n), into ``sums`` (m,)."""
     coords = np.empty((points.shape[1], nodes.shape[1], LANES))
@@ -301,7 +301,7 @@ def add_corners(points, nodes, table, sums):  # type: ignore[no-untyped-def]
                 sums[first + c] += alpha[k, c]
 
 
-@njit(**OPTIONS)
+@njit
 def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ignore[no-untyped-def]
     """Write corner Jacobians, spreads and a first status of cells of one type, in one pass.
 
@@ -340,7 +340,7 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
                 spread[k, first + c] = products[k, c]
 
 
-@njit(**OPTIONS)
+@njit
 def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
     """Set ``states`` (m,) to ``as_`` where not all ``values * sides`` (k, m) are in 0 < v < inf."""
     least = np.full(len(states), np.inf)
@@ -354,7 +354,7 @@ def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
         states[c] = states[c] if least[c] > 0.0 and total[c] < np.inf else as_
 
 
-@njit(**OPTIONS)
+@njit
 def write_coefficients(vtk, coords, table, count, out):  # type: ignore[no-untyped-def]
     """Write the coefficients of the proof of validity of cells of one type into ``out`` (k, m).
 

@@ -33,7 +33,7 @@ from slideviz.mesh.jacobians import (
 )
 from slideviz.mesh.model import Cells, largest_coordinate
 from slideviz.mesh.orientation import reference_of
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
     return safe
 
 
-@njit(**OPTIONS)
+@njit
 def _write_bounds(before, after, nodes, turn, far, ends, found):  # type: ignore[no-untyped-def]
     """Write how many of the ascending ``ends`` the margins of hexahedra surely reach, (m,).
 
@@ -281,7 +281,7 @@ def _write_bounds(before, after, nodes, turn, far, ends, found):  # type: ignore
         found[first : first + count] = level[:count]
 
 
-@njit(**OPTIONS)
+@njit
 def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
     """Write the modes (7, 3, ...) of hexahedra, and their lengths: what edges are sums of.
 
@@ -311,7 +311,7 @@ def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
             lengths[k, c] = np.sqrt(dot3(mode, mode))
 
 
-@njit(**OPTIONS)
+@njit
 def _write_spare(modes, lengths, turn, far, end, spare):  # type: ignore[no-untyped-def]
     """Write by how much the coefficients of cells, if positive, surely exceed 0 up to ``end``."""
     for c in range(len(turn)):
@@ -347,7 +347,7 @@ def _write_spare(modes, lengths, turn, far, end, spare):  # type: ignore[no-unty
         spare[c] = low - change - 2 * ROUNDING * (far[0] + end * far[1]) * size * size
 
 
-@njit(**OPTIONS)
+@njit
 def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, found):  # type: ignore[no-untyped-def]
     """Write the margins of cells of one type, ``nodes`` (m, n), into ``found`` (m,)."""
     dim = points.shape[1]
@@ -382,7 +382,7 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, fou
                     found[first + c] = min(cap, scale[c] * root)
 
 
-@njit(**OPTIONS)
+@njit
 def _normalize(start, motion, count, scale, errors):  # type: ignore[no-untyped-def]
     """Take both relative to the cell's first node, and divide s by ``scale``, (LANES,).
 
@@ -423,7 +423,7 @@ def _normalize(start, motion, count, scale, errors):  # type: ignore[no-untyped-
         errors[3, c] = ROUNDING * fast * quadratic[2]
 
 
-@njit(**OPTIONS)
+@njit
 def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-untyped-def]
     """Turn determinants at x, x + v, x - v and v, ``values`` (4, k, ...), into coefficients.
 
@@ -457,7 +457,7 @@ def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-unty
     return safe
 
 
-@njit(**OPTIONS)
+@njit
 def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
     """Return a lower bound for the first t, up to ``end``, at which a cell is not valid.
 
@@ -503,7 +503,7 @@ def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
     return min(least, high)
 
 
-@njit(**OPTIONS)
+@njit
 def _bounds(poly, corner, end):  # type: ignore[no-untyped-def]
     """Return the first roots, up to ``end``, of all coefficients and of the values in corners."""
     high = end
@@ -517,7 +517,7 @@ def _bounds(poly, corner, end):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@njit(**OPTIONS)
+@njit
 def _cut(poly, stride, firsts, half):  # type: ignore[no-untyped-def]
     """Cut a part in two along an axis: ``poly`` becomes the second half, ``half`` the first."""
     for k in firsts:
@@ -535,7 +535,7 @@ def _cut(poly, stride, firsts, half):  # type: ignore[no-untyped-def]
             poly[k + stride, j] = bc
 
 
-@njit(**OPTIONS)
+@njit
 def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
     """Return the smallest t at which a + b t + c t² + d t³ is not positive, or ``end``.
 
@@ -567,7 +567,7 @@ def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
     return end
 
 
-@njit(**OPTIONS)
+@njit
 def _root_between(a, b, c, d, left, right):  # type: ignore[no-untyped-def]
     """Return the root in an interval from below: positive at ``left``, not at ``right``.
 

@@ -27,7 +27,7 @@ from slideviz.mesh.jacobians import (
     write_coefficients,
 )
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 
 LEAST_SCALE = 0.1  # least coefficient of a target, over its mean one
 
@@ -105,7 +105,7 @@ def _opened(gram: FloatArray, length: FloatArray) -> tuple[FloatArray, FloatArra
     return inverse, np.sqrt(value.prod(axis=1)) * length.prod(axis=1)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _chi(depth, epsilon):  # type: ignore[no-untyped-def]
     """Return chi, and the root in it; chi' is chi / root."""
     root = np.sqrt(epsilon * epsilon + depth * depth)
@@ -113,7 +113,7 @@ def _chi(depth, epsilon):  # type: ignore[no-untyped-def]
     return 0.5 * (depth + root) if depth > 0.0 else folded, root
 
 
-@njit(**OPTIONS)
+@njit
 def _write_pulls(at, corner, shape, count, pulls, total):  # type: ignore[no-untyped-def]
     """Write ``tr(JᵀJ)`` of a corner of cells, and half its slopes by the edges of the corner.
 
@@ -139,7 +139,7 @@ def _write_pulls(at, corner, shape, count, pulls, total):  # type: ignore[no-unt
                 total[c] += pulls[i, axis, c] * (at[axis, stop, c] - at[axis, start, c])
 
 
-@njit(**OPTIONS)
+@njit
 def write_energy(  # type: ignore[no-untyped-def]
     vtk, points, nodes, table, corner_at, scale, shape, epsilon, low, high, values, slopes, least
 ):
@@ -208,7 +208,7 @@ def write_energy(  # type: ignore[no-untyped-def]
                     slopes[first + c, j, axis] = slope[axis, j, c]
 
 
-@njit(**OPTIONS)
+@njit
 def write_curvatures(  # type: ignore[no-untyped-def]
     vtk, points, nodes, table, corner_at, scale, shape, epsilon, low, high, curvatures
 ):

@@ -195,7 +195,7 @@ class Patch:
         return (vector * inverse[:, None, :]) @ np.swapaxes(vector, 1, 2)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _move(place, row, maps, unknowns, out):  # type: ignore[no-untyped-def]
     """Add the displacements of unknowns (b, d) to the points ``out`` (k, d)."""
     d = out.shape[1]
@@ -214,7 +214,7 @@ def _move(place, row, maps, unknowns, out):  # type: ignore[no-untyped-def]
                 out[i, a] += total
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _gather_blocks(begins, order, nodes, row, maps, slopes, out):  # type: ignore[no-untyped-def]
     """Write the sums of slopes (e, d), each times its map's transpose, into ``out`` (b, d)."""
     d = out.shape[1]
