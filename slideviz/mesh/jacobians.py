@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Signs
 from slideviz.system.jit_cache import njit
 from slideviz.terms import CELL_STATES
 
@@ -33,7 +34,7 @@ _HALVES = np.array(
 )
 
 
-def decide_unproven(vtk: int, coords: FloatArray, signs: NDArray[np.int8]) -> Status:
+def decide_unproven(vtk: int, coords: FloatArray, signs: Signs) -> Status:
     """Return the status (m,) of cells with positive corner Jacobians, but not all coefficients.
 
     They are prisms or hexahedra with nodes ``coords`` (3, n, m). ``signs`` (m,) are 1, or -1 for a

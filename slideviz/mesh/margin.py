@@ -31,14 +31,12 @@ from slideviz.mesh.jacobians import (
     gather,
     write_coefficients,
 )
-from slideviz.mesh.model import Cells, largest_coordinate
+from slideviz.mesh.model import BoolArray, Cells, Signs, largest_coordinate
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import njit
 from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh
 
 GAP = 2.0**-9
@@ -57,7 +55,7 @@ BOUNDED = np.array([1 / 8, 1 / 4, 1 / 2, 1])
 """Parts of the largest margin that is looked for, up to which margins are bounded from below."""
 
 
-def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
+def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, BoolArray]:
     """Return how cells of a type with ``size`` coefficients are cut in halves.
 
     That is, for the axes in which they can be cut: the distances (a,) of neighbouring coefficients
@@ -81,7 +79,7 @@ def margins(
     displacement: FloatArray,
     cells: Cells,
     cap: float,
-    signs: NDArray[np.int8] | None = None,
+    signs: Signs | None = None,
 ) -> FloatArray:
     """Return the margins (m,) of cells along ``points + s * displacement``, from 0 to ``cap``.
 
@@ -167,9 +165,7 @@ def path_margins(mesh: Mesh, reference: Mesh, signs_of: Mesh | None = None) -> F
     return margins(reference.points, mesh.points - reference.points, mesh.cells, FARTHEST, signs)
 
 
-def least_margin(
-    before: Mesh, after: Mesh, cap: float, signs: NDArray[np.int8]
-) -> tuple[float, int]:
+def least_margin(before: Mesh, after: Mesh, cap: float, signs: Signs) -> tuple[float, int]:
     """Return the least margin, up to ``cap``, of all cells without the halo's, and its first cell.
 
     It is that of `margins`, which are found only of cells that may have the least one: of a

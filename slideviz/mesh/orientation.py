@@ -14,19 +14,17 @@ import numpy as np
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNERS, add_corners
-from slideviz.mesh.model import Mesh, sealed
+from slideviz.mesh.model import BoolArray, Mesh, Signs, sealed
 from slideviz.system.weak_cache import weak_cache
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from slideviz.mesh.model import Cells, FloatArray, Index, IntArray
 
 
 @weak_cache
-def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
+def reference_of(mesh: Mesh) -> tuple[FloatArray, Signs]:
     """Return what deformed cells are compared with: sums of corner Jacobians (m,), and signs (m,).
 
     The signs are those of `orientation`; the sums are multiplied by them, so that they are positive
@@ -51,7 +49,7 @@ def corner_sums(mesh: Mesh) -> FloatArray:
     return sums
 
 
-def orientation(cells: Cells, sums: FloatArray) -> NDArray[np.int8]:
+def orientation(cells: Cells, sums: FloatArray) -> Signs:
     """Return a sign (m,) of each cell: 1, or -1 if it is numbered the other way round.
 
     Where all ``sums`` have one sign, all cells are taken to be numbered alike, without a look
@@ -69,7 +67,7 @@ def orientation(cells: Cells, sums: FloatArray) -> NDArray[np.int8]:
     return np.where(total[part] < 0, -signs, signs).astype(np.int8)
 
 
-def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
+def _consistent(cells: Cells) -> tuple[Signs, IntArray]:
     """Return signs (m,) that make all cells of a connected part agree, and the part (m,) of each.
 
     The graph has each cell twice, as numbered and reversed. Neighbours that agree are linked as
@@ -89,7 +87,7 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
     return signs, np.minimum(plain, mirrored)
 
 
-def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
+def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, BoolArray]:
     """Return pairs of cells with a common facet (p,), (p,), and a mask (p,) of those that agree.
 
     Two cells agree if they traverse the facet in opposite directions.
@@ -116,7 +114,7 @@ def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
     return owner[start], owner[start + 1], turn[start] != turn[start + 1]
 
 
-def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, NDArray[np.bool_]]]:
+def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, BoolArray]]:
     """Yield facets of cells, in tables: cell (k,), sorted nodes (k, n) and direction (k,) of each.
 
     The direction is a boolean that differs for the two ways to traverse the same nodes.

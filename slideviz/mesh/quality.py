@@ -27,7 +27,16 @@ from slideviz.mesh.jacobians import (
     decide_unproven,
     measure,
 )
-from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh, sealed
+from slideviz.mesh.model import (
+    NO_NODES,
+    BoolArray,
+    FloatArray,
+    Index,
+    IntArray,
+    Mesh,
+    Signs,
+    sealed,
+)
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.skew import SKEW_METRICS, ordered_sum
@@ -131,14 +140,14 @@ def pairwise_sum(
 def lowest(
     values: FloatArray,
     count: int,
-    only: NDArray[np.bool_] | None = None,
+    only: BoolArray | None = None,
     release: Callable[[], object] = lambda: None,
 ) -> IntArray:
     """Return the indices (k,) of the ``count`` lowest values (m,), ascending, ties by index.
 
     ``only`` (m,) is a mask of those that count; ``release`` as for `quality_totals`.
     """
-    ids = np.empty(0, np.int64)
+    ids = NO_NODES
     for first in range(0, len(values) if count > 0 else 0, PIECE):
         part = values[first : first + PIECE]
         if only is not None:
@@ -164,12 +173,12 @@ class Quality:
     status: NDArray[np.uint8]
     """(m,): ``VALID`` (positive Jacobian in the whole cell, proved), ``INVERTED`` (a point was
     found where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither)."""
-    signs: NDArray[np.int8]
+    signs: Signs
     """(m,): 1, or -1 for a cell that is numbered the other way round."""
     metric: SkewMetric
     """``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as the
     program of the thesis has it, for comparison with its figures."""
-    halo: NDArray[np.bool_] | None = None
+    halo: BoolArray | None = None
     """(m,): the cells of the halo. They have values like all others, but are copies: numbers of the
     whole mesh (minimum, mean, counts, histogram, worst cells) leave them out."""
     derivative: QualityDerivative | None = None
@@ -183,7 +192,7 @@ class Quality:
         return len(self.values)
 
     @property
-    def counted(self) -> NDArray[np.bool_] | slice:
+    def counted(self) -> BoolArray | slice:
         """Return an index (slice or mask) into ``values`` that leaves out the halo's cells."""
         return slice(None) if self.halo is None else ~self.halo
 
@@ -330,7 +339,7 @@ def cell_quality(
     points: FloatArray,
     vtk: int,
     nodes: IntArray,
-    signs: NDArray[np.int8],
+    signs: Signs,
     sums: FloatArray,
     metric: SkewMetric,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:

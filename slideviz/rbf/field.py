@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, column_bounds
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, column_bounds, row_norms
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from scipy.spatial import cKDTree
 
 BOXES = 128  # most boxes of a `Vicinity` along an axis
@@ -50,7 +49,7 @@ class Vicinity:
 
     low: FloatArray  # (d,): the lowest corner of the grid
     size: float  # of a box, along each axis
-    marked: NDArray[np.bool_]  # one entry, along d axes, for each box
+    marked: BoolArray  # one entry, along d axes, for each box
 
     @classmethod
     def of(cls, points: FloatArray, reach: float) -> Vicinity:
@@ -174,11 +173,11 @@ class Correction:
         symmetric mesh a little, changes the mean little.
         """
         if not len(points):
-            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+            return NO_NODES, NO_NODES, np.empty(0)
         found = self.tree.query_ball_point(points, (1.0 + TIE) * distance)
         row = np.repeat(np.arange(len(points)), [len(each) for each in found])
         source = np.concatenate([np.array(each, np.int64) for each in found])
-        beyond = np.linalg.norm(points[row] - self.tree.data[source], axis=1) - distance[row]
+        beyond = row_norms(points[row] - self.tree.data[source]) - distance[row]
         weight = np.clip(1.0 - beyond / np.maximum(TIE * distance[row], 1e-300), 0.0, 1.0)
         return row, source, weight
 

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slideviz.mesh.model import FloatArray, IntArray, sealed
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, sealed
 
 Project = Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]
 """Takes nodes (k,) that slide on curved boundaries, with all images and copies of each, and
@@ -36,10 +35,10 @@ class Freedom:
     """Puts them back after each outer round; None if no boundary is curved."""
 
     @classmethod
-    def within(cls, dim: int, held: NDArray[np.bool_]) -> Freedom:
+    def within(cls, dim: int, held: BoolArray) -> Freedom:
         """Return the freedom of nodes that move anywhere, but for those of the mask held (n,)."""
         place = np.where(held, -1, np.cumsum(~held) - 1)
-        none = np.empty(0, np.int64)
+        none = NO_NODES
         return cls(sealed(place), none, np.empty((0, dim, dim)), none)
 
     def of_part(self, nodes: IntArray) -> Freedom:
@@ -85,7 +84,7 @@ class Freedom:
         place = np.where(np.isin(self.place, blocks[blocks >= 0]), -1, self.place)
         return replace(self, place=sealed(place))
 
-    def only(self, moves: NDArray[np.bool_]) -> Freedom:
+    def only(self, moves: BoolArray) -> Freedom:
         """Return the freedom in which the nodes of the mask (n,) move alone; blocks from 0."""
         _, first, block = np.unique(self.place[moves], return_index=True, return_inverse=True)
         every = np.full(len(moves), -1)

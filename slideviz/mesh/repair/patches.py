@@ -10,11 +10,10 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, LANES
-from slideviz.mesh.model import Cells, FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, Cells, FloatArray, IntArray
 from slideviz.mesh.repair.energy import Targets, write_curvatures, write_energy
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.system.jit_cache import njit
@@ -26,8 +25,8 @@ FLAT = 1e-12  # curvature of a block, over its largest one, below which a direct
 
 
 def find_patches(
-    cells: Cells, freedom: Freedom, bad: NDArray[np.bool_], rings: int
-) -> tuple[list[IntArray], NDArray[np.bool_]]:
+    cells: Cells, freedom: Freedom, bad: BoolArray, rings: int
+) -> tuple[list[IntArray], BoolArray]:
     """Return the cells (k,) of each patch, ascending, and a mask (n,) of nodes that may move.
 
     ``bad`` is a mask (m,) of cells; patches are these and ``rings`` rings of cells by nodes.
@@ -50,7 +49,7 @@ def find_patches(
     return [ids[label == one] for one in np.unique(label)], inside
 
 
-def _nodes_of(cells: Cells, chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+def _nodes_of(cells: Cells, chosen: BoolArray, count: int) -> BoolArray:
     """Return a mask (count,) of the nodes of the cells in the mask ``chosen`` (m,)."""
     out = np.zeros(count, bool)
     for ids, nodes in cells.by_type.values():
@@ -58,7 +57,7 @@ def _nodes_of(cells: Cells, chosen: NDArray[np.bool_], count: int) -> NDArray[np
     return out
 
 
-def with_images(place: IntArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def with_images(place: IntArray, chosen: BoolArray) -> BoolArray:
     """Return the mask ``chosen`` (n,) with all nodes of the blocks of those in it."""
     blocks = np.zeros(int(place.max(initial=-1)) + 2, bool)  # the last one: of held nodes
     blocks[place[chosen]] = True

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobian_slopes import write_slopes
 from slideviz.mesh.jacobians import CORNERS, INVERTED, VALID
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, Signs, row_norms, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, cell_quality, checked_reference, quality
 from slideviz.mesh.repair.descent import descend
@@ -133,12 +132,12 @@ class _Work:
     reference: Mesh | None
     freedom: Freedom
     sums: FloatArray
-    signs: NDArray[np.int8]
+    signs: Signs
     metric: SkewMetric
     below: float
     report: Callable[[float], object]
-    hopeless: NDArray[np.bool_]
-    bad: NDArray[np.bool_]
+    hopeless: BoolArray
+    bad: BoolArray
     """`hopeless`, `bad` (m,): cells that cannot be mended, which no energy counts, and those that
     were bad before the first round."""
     wanted: float  # the limit of the last round
@@ -174,7 +173,7 @@ def repair_mesh(
     whole = _Whole(mesh, shapes, freedom, np.array(layers, np.int64))
     after, folded, impossible = mend_cells(whole, before, ratings[before], below, metric, report)
     points = whole.points
-    way = np.linalg.norm(points - mesh.points, axis=1)
+    way = row_norms(points - mesh.points)
     return Repaired(
         points=sealed(points),
         bad_before=sealed(before),
@@ -338,8 +337,8 @@ def quality_ratings(found: Quality) -> FloatArray:
 
 def _impossible(
     region: Region,
-    bad: NDArray[np.bool_],
-    signs: NDArray[np.int8],
+    bad: BoolArray,
+    signs: Signs,
     sums: FloatArray,
     metric: SkewMetric,
 ) -> list[Impossible]:
@@ -366,9 +365,7 @@ def _impossible(
     return out
 
 
-def _fold(
-    vtk: int, nodes: IntArray, held: NDArray[np.bool_], at: FloatArray, sign: int
-) -> IntArray | None:
+def _fold(vtk: int, nodes: IntArray, held: BoolArray, at: FloatArray, sign: int) -> IntArray | None:
     """Return the nodes of a folded corner or side of a cell that are all held, or None."""
     for corner in CORNERS[vtk]:
         if held[corner].all() and not sign * np.linalg.det(at[corner[1:]] - at[corner[0]]) > 0:
@@ -379,14 +376,14 @@ def _fold(
             x = at[local]
             normals = np.cross(np.roll(x, -1, 0) - x, np.roll(x, 1, 0) - x)
             mean = normals.sum(axis=0)
-            size = np.linalg.norm(normals, axis=1).max()
+            size = row_norms(normals).max()
             flat = np.abs(np.cross(normals, mean)).max() <= FLAT_SIDE * size * np.linalg.norm(mean)
             if flat and not (normals @ mean).min() > 0:
                 return nodes[local]
     return None
 
 
-def _mend_patches(work: _Work, bad: NDArray[np.bool_], rings: int, points: FloatArray) -> None:
+def _mend_patches(work: _Work, bad: BoolArray, rings: int, points: FloatArray) -> None:
     """Mend all patches; write the points (n, d)."""
     patches, free = find_patches(work.mesh.cells, work.freedom, bad, rings)
     for number, cells in enumerate(patches):
@@ -416,7 +413,7 @@ class _Mending:
     """The work on one patch."""
 
     def __init__(
-        self, work: _Work, cells: IntArray, free: NDArray[np.bool_], tell: Callable[[float], object]
+        self, work: _Work, cells: IntArray, free: BoolArray, tell: Callable[[float], object]
     ) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
         self.work = work
@@ -457,7 +454,7 @@ class _Mending:
         self.best_points = self.patch.start
         self.best = self.score(self.best_points)
 
-    def _patch(self, points: FloatArray, moves: NDArray[np.bool_]) -> Patch:
+    def _patch(self, points: FloatArray, moves: BoolArray) -> Patch:
         """Return the patch, in which the nodes of the mask ``moves`` (k,) move."""
         freedom = self.work.freedom.of_part(self.nodes).only(moves)
         return Patch(points, freedom, self.parts, self.work.pool)
@@ -564,14 +561,14 @@ class _Mending:
         for part in self.parts if len(patch.freedom.curved) else ():
             for local in ELEMENTS[part.vtk].edges:
                 pair = part.nodes[:, local]
-                length = np.linalg.norm(patch.start[pair[:, 1]] - patch.start[pair[:, 0]], axis=1)
+                length = row_norms(patch.start[pair[:, 1]] - patch.start[pair[:, 0]])
                 np.minimum.at(out, pair, length[:, None])
         return out[patch.freedom.curved]
 
     def _longest(self, patch: Patch, edges: FloatArray, direction: FloatArray) -> float:
         """Return the step by which no node on a curved boundary goes further than half an edge."""
         curved = patch.freedom.curved
-        way = np.linalg.norm(direction[patch.freedom.place[curved]], axis=1)
+        way = row_norms(direction[patch.freedom.place[curved]])
         return float(np.min(0.5 * edges[way > 0] / way[way > 0], initial=np.inf))
 
     def _lift(self) -> None:
@@ -637,7 +634,7 @@ def _local_lengths(points: FloatArray, tables: Mapping[int, IntArray]) -> FloatA
     for vtk, table in tables.items():
         for pair in ELEMENTS[vtk].edges:
             ends = table[:, pair]
-            length = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+            length = row_norms(points[ends[:, 1]] - points[ends[:, 0]])
             for end in ends.T:
                 total += np.bincount(end, length, len(points))
                 count += np.bincount(end, minlength=len(points))
@@ -659,7 +656,7 @@ IDEAL: dict[int, FloatArray] = {
 def lift_energy(
     patch: Patch,
     unknowns: FloatArray,
-    signs: NDArray[np.int8],
+    signs: Signs,
     sums: FloatArray,
     sized: bool,
     metric: SkewMetric,
