@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots, row_norms
-from slideviz.mesh.topology import distinct_edges, facet_edges, facet_vectors, find_joints, unit
+from slideviz.mesh.topology import (
+    distinct_edges,
+    facet_edges,
+    facet_vectors,
+    find_joints,
+    single_edges,
+    unit,
+)
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -84,11 +91,10 @@ def find_edges(points: FloatArray, facets: IntArray) -> tuple[IntArray, IntArray
     normals = unit(facet_vectors(points, facets))
     sharp = sharp[row_dots(normals[pairs[:, 0]], normals[pairs[:, 1]]) < SHARP]
     if dim == 3:
-        sides, _, count = distinct_edges(facet_edges(facets))
-    else:
-        sides, count = np.unique(facets, return_counts=True)
-        sides = sides[:, None]
-    return sharp, sides[count == 1]
+        edges = facet_edges(facets)
+        return sharp, distinct_edges(edges[single_edges(edges)])
+    nodes, count = np.unique(facets, return_counts=True)
+    return sharp, nodes[count == 1, None]
 
 
 def lay_onto(
@@ -239,7 +245,7 @@ def _bending(points: FloatArray, facets: IntArray) -> csr_array:
     # Late: scipy.sparse takes 0.1 s.
     from scipy.sparse import coo_array, diags_array
 
-    one, two = distinct_edges(facet_edges(facets))[0].T
+    one, two = distinct_edges(facet_edges(facets)).T
     k = len(points)
     weights = 1.0 / row_norms(points[one] - points[two])
     links = coo_array((weights, (one, two)), (k, k)).tocsr()

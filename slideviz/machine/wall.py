@@ -9,9 +9,10 @@ import numpy as np
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_norms
 from slideviz.mesh.topology import (
-    distinct_edges,
+    edge_keys,
     facet_edges,
     facet_vectors,
+    single_edges,
     unit,
     vertex_normals,
 )
@@ -127,9 +128,9 @@ def _patches(coords: FloatArray, facets: IntArray, turn: float) -> Iterator[IntA
     from scipy.spatial import Delaunay
 
     edges = facet_edges(facets)
-    _, first, count = distinct_edges(edges)
+    single = edges[single_edges(edges)]
     part = components(len(coords), *edges.T)
-    follows = dict(edges[first[count == 1]].tolist())
+    follows = dict(single[np.argsort(edge_keys(single))].tolist())
     rims = dict[int, list[tuple[FloatArray, IntArray]]]()
     around_axis = set[int]()
     while follows:

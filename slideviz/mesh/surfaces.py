@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
-from slideviz.mesh.topology import distinct_edges, facet_edges
+from slideviz.mesh.topology import distinct_edges, edge_keys, facet_edges, single_edges
 from slideviz.system.weak_cache import WeakCache
 
 LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
@@ -146,8 +146,8 @@ def is_closed(surfaces: Sequence[Surface]) -> bool:
     faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
     if len(faces) != len(surfaces) or not faces:
         return False
-    _, _, count = distinct_edges(facet_edges(np.concatenate(faces)))
-    return bool((count == 2).all())
+    keys = edge_keys(facet_edges(np.concatenate(faces)))
+    return bool((np.unique(keys, return_counts=True)[1] == 2).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,5 +212,5 @@ def _rim(facets: IntArray) -> IntArray:
     """Return the edges (r, 2), nodes sorted, that only one of the faces (f, 4) has; none in 2D."""
     if facets.shape[1] == 2:
         return np.empty((0, 2), np.int64)
-    edges, _, count = distinct_edges(facet_edges(facets))
-    return edges[count == 1]
+    edges = facet_edges(facets)
+    return distinct_edges(edges[single_edges(edges)])

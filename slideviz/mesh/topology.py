@@ -296,15 +296,23 @@ def facet_edges(facets: IntArray) -> IntArray:
     return edges[edges[:, 0] != edges[:, 1]]
 
 
-def distinct_edges(edges: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return each of edges (e, 2) once in either direction, (u, 2), its first place, its number.
+def edge_keys(edges: IntArray) -> IntArray:
+    """Return a number (e,) for each of edges (e, 2), one for both directions, as nodes ascend."""
+    one, two = edges.T
+    return np.minimum(one, two) * (int(edges.max(initial=0)) + 1) + np.maximum(one, two)
 
-    Nodes and edges are in ascending order.
-    """
-    above = int(edges.max(initial=0)) + 1
-    keys = edges.min(axis=1) * above + edges.max(axis=1)
-    keys, first, count = np.unique(keys, return_index=True, return_counts=True)
-    return np.stack(np.divmod(keys, above), axis=1), first, count
+
+def distinct_edges(edges: IntArray) -> IntArray:
+    """Return each of edges (e, 2) once, in either direction: nodes and edges ascending, (u, 2)."""
+    keys = np.unique(edge_keys(edges))
+    return np.stack(np.divmod(keys, int(edges.max(initial=0)) + 1), axis=1)
+
+
+def single_edges(edges: IntArray) -> BoolArray:
+    """Return a mask (e,) of the edges (e, 2) that are there once, in either direction."""
+    keys = edge_keys(edges)
+    distinct, count = np.unique(keys, return_counts=True)
+    return count[np.searchsorted(distinct, keys)] == 1
 
 
 def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:

@@ -196,7 +196,7 @@ class WallNodes:
 
     @cached_property
     def _edges(self) -> IntArray:
-        return distinct_edges(facet_edges(self.facets))[0].T
+        return distinct_edges(facet_edges(self.facets)).T
 
     def near(self, targets: FloatArray) -> tuple[IntArray, FloatArray, csr_array, csr_array]:
         """Return which points (m, d) are in the zone, (z,), their share b (z, 1), and two matrices.

@@ -11,7 +11,6 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
-from slideviz.mesh.nearest import row_groups, sorted_in_rows
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import InPlane, Section
@@ -230,8 +229,15 @@ def _wide(table: IntArray, width: int) -> IntArray:
 
 def _single(facets: IntArray) -> BoolArray:
     """Return a mask (f,) of the facets (f, 4) whose nodes no other facet has."""
-    group = row_groups(sorted_in_rows(facets))
-    return np.bincount(group)[group] == 1
+    nodes = np.sort(facets, axis=1)
+    above = int(facets.max(initial=0)) + 1
+    keys = nodes[:, 0] * above + nodes[:, 1], nodes[:, 2] * above + nodes[:, 3]
+    order = np.lexsort(keys)
+    differs = np.ones(len(facets) + 1, bool)
+    differs[1:-1] = (np.diff(keys[0][order]) != 0) | (np.diff(keys[1][order]) != 0)
+    single = np.empty(len(facets), bool)
+    single[order] = differs[1:] & differs[:-1]
+    return single
 
 
 def _distinct(low: IntArray, high: IntArray) -> BoolArray:

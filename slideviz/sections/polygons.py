@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
-from slideviz.mesh.topology import distinct_edges
+from slideviz.mesh.topology import single_edges
 
 ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
@@ -91,8 +91,7 @@ class Polygons:
         after = np.roll(self.connectivity, -1)
         after[self.offsets[1:] - 1] = start[self.offsets[:-1]]
         edges = np.column_stack([start, after])
-        _, first, count = distinct_edges(edges)
-        lines = np.sort(first[count == 1])
+        lines = np.flatnonzero(single_edges(edges))
         cells = np.repeat(self.cells, self.sizes)[lines]
         return Polygons(
             self.points, offsets_of(np.full(len(lines), 2)), edges[lines].ravel(), cells
