@@ -31,7 +31,7 @@ from slideviz.cli.run_command import measured, run_steps, silent_timer
 from slideviz.cli.terminal import DONE, say
 from slideviz.design.su2.config import Su2Config, on_mesh, own_changes, read_config, read_mesh
 from slideviz.design.su2.surface import MovingSurface, at_rest, convex_part, make_surface, set_boxes
-from slideviz.errors import CaseError, SlidevizError
+from slideviz.errors import CaseError, SlidevizError, messages_of
 from slideviz.formats.losses import warning_of_losses
 from slideviz.mesh.model import Mesh
 from slideviz.solver.steps import Step
@@ -59,12 +59,11 @@ def read_configuration(arguments: Namespace) -> tuple[Su2Config, Mesh]:
             "first"
         )
     if not file.exists() and "MESH_FILENAME" not in config.present:
-        hints = [
-            text for text in map(str, config.case.warnings) if "did you mean MESH_FILENAME?" in text
-        ]
+        said = messages_of(config.case.warnings)
+        hint = next((one for one in said if "MESH_FILENAME" in one.keys), "name the mesh to deform")
         raise CaseError(
             f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
-            f"{hints[0] if hints else 'name the mesh to deform'}"
+            f"{hint}"
         )
     mesh = read_mesh(config)
     return on_mesh(config, mesh), mesh
@@ -135,7 +134,8 @@ def _relaxation_told(config: Su2Config) -> Iterator[None]:
         if config.relaxation == 1.0:
             raise
         said = f"OPT_RELAX_FACTOR= {config.relaxation:g} multiplies all values of DV_VALUE"
-        raise type(problem)(f"{problem}\n{config.source}: {said}") from problem
+        problem.args = *problem.args, f"{config.source}: {said}"
+        raise
 
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:

@@ -754,14 +754,17 @@ def _config(
     return Su2Config(case, markers, variables, files, values, ignored, reader.named, keys, zone)
 
 
-def _perhaps_ours(path: Path, ignored: Iterable[str], rows: dict[str, Entry]) -> list[str]:
+def _perhaps_ours(path: Path, ignored: Iterable[str], rows: dict[str, Entry]) -> list[Message]:
     """Return a warning for each ignored key that resembles one that is read."""
     messages = []
     for key in (key for key in ignored if rows[key].line >= 0 and key not in NOT_MISTYPED):
         own, similar, one_letter_off = _resembled(key)
         close = own or [other for other in similar if other not in rows] or one_letter_off
         if close:
-            messages.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
+            meant = f"did you mean {close[0]}?"
+            line = rows[key].line
+            message = Message(f"{key} is not read", meant, (path,), line, keys=(close[0],))
+            messages.append(message)
     return messages
 
 
