@@ -226,7 +226,10 @@ class Autosave(QObject):
             self._lock = _lock(self.path)
             if self._lock.tryLock(0):
                 private_file(Path(self._lock.fileName()))
-        remarks = [] if case.source is None else [f"{SOURCE}{_path_text(case.source)}"]
+        remarks = []
+        if case.source is not None:
+            plain = str(case.source).isprintable()
+            remarks = [f"{SOURCE}{case.source if plain else case.source.absolute().as_uri()}"]
         if table.rows:
             write_results(_designs_file(self.path), table)
             private_file(_designs_file(self.path))
@@ -344,11 +347,6 @@ def _source(path: Path) -> Path | None:
         if found:
             return Path(name)
     return None
-
-
-def _path_text(path: Path) -> str:
-    """Return a path as text in UTF-8: as it is, or else as a URI."""
-    return str(path) if str(path).isprintable() else path.absolute().as_uri()
 
 
 def _rename_broken(path: Path, why: str) -> str:

@@ -86,18 +86,16 @@ class DockTabs(QObject):
         """Install the event filter on every tab bar; show a title bar on docks without a tab."""
         for dock in self._docks.values():
             tabbed = bool(self.window.tabifiedDockWidgets(dock))
-            self._set_title(dock, dock.isFloating() or not (tabbed or dock in self._bare))
+            titled = dock.isFloating() or not (tabbed or dock in self._bare)
+            # An empty widget in place of the title bar hides it.
+            if (dock.titleBarWidget() is None) != titled:
+                dock.setTitleBarWidget(None if titled else QWidget())  # type: ignore[arg-type]
         for bar in self.bars():
             bar.removeEventFilter(self)
             bar.installEventFilter(self)
             for index in range(bar.count()):
                 bar.setTabToolTip(index, f"{bar.tabText(index)}\n{TAB_TIP}")
             _fit_texts(bar)
-
-    def _set_title(self, dock: QDockWidget, titled: bool) -> None:
-        # An empty widget in place of the title bar hides it.
-        if (dock.titleBarWidget() is None) != titled:
-            dock.setTitleBarWidget(None if titled else QWidget())  # type: ignore[arg-type]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and isinstance(watched, QTabBar):

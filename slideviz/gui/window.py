@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -137,14 +137,22 @@ class ToolBar(QToolBar):
         self._add("undo", "redo")
         self.addSeparator()
         self._add_color(window.store)
-        self._add_range()
+        menu = actions.menus["colors"]
+        self.range = tool_button(
+            menu.menuAction().statusTip(), image="colors", menu=menu, name="color_range"
+        )
+        self.addWidget(self.range)
+        self.addSeparator()
         self._add(*(name for name, term in SHOWN.items() if term.in_bar))
         self.addSeparator()
         self._add("fit", *(name for name, command in COMMANDS.items() if command.short))
         space = QWidget()
         space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(space)
-        self._add_zone(window.files.open_zone)
+        self.zone = Choice({}, "Which zones of the file are open: all, or one.", "zone")
+        self.zone.chosen.connect(window.files.open_zone)
+        self.zone_label = self.addWidget(QLabel(" Zone "))
+        self.zone_shown = self.addWidget(self.zone)
 
     def _add(self, *names: str) -> None:
         self.addActions([self._actions.by_name[name] for name in names])
@@ -156,20 +164,6 @@ class ToolBar(QToolBar):
         self.color.chosen.connect(lambda value: store.change(changes.set_view, color_by=value))
         self.color.setFixedWidth(self.color.fontMetrics().horizontalAdvance("m" * 16))
         self.addWidget(self.color)
-
-    def _add_range(self) -> None:
-        menu = self._actions.menus["colors"]
-        self.range = tool_button(
-            menu.menuAction().statusTip(), image="colors", menu=menu, name="color_range"
-        )
-        self.addWidget(self.range)
-        self.addSeparator()
-
-    def _add_zone(self, open_zone: Callable[[int], object]) -> None:
-        self.zone = Choice({}, "Which zones of the file are open: all, or one.", "zone")
-        self.zone.chosen.connect(open_zone)
-        self.zone_label = self.addWidget(QLabel(" Zone "))
-        self.zone_shown = self.addWidget(self.zone)
 
     def sync(self, now: CommandState) -> None:
         session: Session = now.session

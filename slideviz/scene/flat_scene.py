@@ -52,7 +52,13 @@ class FlatScene:
         self._undeformed = PolygonActor(self.stage, "undeformed", pickable=False)
         self._outlines = Instances(self.stage, self._undeformed)
         self._undeformed_of: tuple[object, ...] = ()
-        self._style_lines()
+        prop = self._mark.actor.prop
+        prop.style = "wireframe"
+        prop.color = SELECTED_COLOR
+        prop.line_width = 4.0
+        self._undeformed.actor.prop.line_width = 2.0
+        for one in (self._mark, self._undeformed):
+            draw_in_front(one.mapper)
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
         self.session = Session()  # the state that is shown
@@ -84,7 +90,9 @@ class FlatScene:
         self._style(section)
         self._draw_undeformed(section)
         self._draw_neighbours(section)
-        self._draw_mark()
+        marked = None if session.lacks_cells else session.view.marked_cell
+        polygons = self._shown.polygons
+        self._mark.show(polygons.take(np.flatnonzero(polygons.cells == marked)))
 
     def _place(
         self, cut: Polygons, only: CellsInRange | None, section: Section, session: Session
@@ -156,21 +164,6 @@ class FlatScene:
                 lines = section.flatten(cut, ahead, ahead).outline()
             self._undeformed.show(lines)
         self._undeformed.actor.prop.color = self.stage.scheme.text
-
-    def _style_lines(self) -> None:
-        prop = self._mark.actor.prop
-        prop.style = "wireframe"
-        prop.color = SELECTED_COLOR
-        prop.line_width = 4.0
-        self._undeformed.actor.prop.line_width = 2.0
-        for one in (self._mark, self._undeformed):
-            draw_in_front(one.mapper)
-
-    def _draw_mark(self) -> None:
-        assert self.polygons is not None
-        marked = None if self.session.lacks_cells else self.session.view.marked_cell
-        mine = np.flatnonzero(self.polygons.cells == marked)
-        self._mark.show(self.polygons.take(mine))
 
     # Facts --------------------------------------------------------------------------------
     @property

@@ -244,12 +244,6 @@ def _number(bar: Any, length: float) -> None:
     bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
 
 
-def lines_room(plotter: Any, end: float, scale: float) -> Rect:
-    """Return the rectangle of the lines in the upper right corner, down to ``end`` pixels."""
-    height = plotter.window_size[1]
-    return _rect(plotter, height - (end + 13) * scale, height, scale)
-
-
 def _rect(plotter: Any, bottom: float, top: float, scale: float) -> Rect:
     """Return the rectangle of the legend's strip between two heights, in pixels."""
     width, height = plotter.window_size
@@ -315,7 +309,8 @@ class LegendLayer(KeyedLayer):
         if size == self._placed or not self._key:
             return
         self._placed = size
-        rect = lines_room(plotter, self._end, scale)
+        high = plotter.window_size[1]
+        rect = _rect(plotter, high - (self._end + 13) * scale, high, scale)
         if self._bar is not None:
             bar_rect = place_bar(plotter, *self._bar, scale)
             rect = (*bar_rect[:3], rect[3]) if self._has_lines else bar_rect

@@ -162,11 +162,7 @@ def new_target(session: Session) -> Target:
     without = [n for n in moving if not any(applies_to(motion, n) for motion in case.motions)]
     names = tuple(name for name in moving if name in session.view.selected)
     chosen = tuple(name for name in without if name not in session.guesses)
-    return _target(names or chosen or tuple(without) or moving)
-
-
-def _target(names: tuple[str, ...]) -> Target:
-    """Return the target with some boundaries; a single one is a name, not a tuple."""
+    names = names or chosen or tuple(without) or moving
     return names[0] if len(names) == 1 else names or ""
 
 

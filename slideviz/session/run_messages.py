@@ -143,14 +143,12 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> s
     pitch = beyond_pitch(run.case, mesh)
     helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, run.last_step))
     helps = with_field_labels(f"What may help: {helps}.")
-    words = (_last_valid_words(run), f"{pitch}." if pitch else "", helps)
+    last = ""
+    valid = [frame.step for frame in run.frames if not frame.quality.inverted and frame.step]
+    if valid:
+        last = f"Step {valid[-1].index} of {valid[-1].total} is the last without any."
+    words = (last, f"{pitch}." if pitch else "", helps)
     return " ".join(filter(None, words))
-
-
-def _last_valid_words(run: Run) -> str:
-    """Return a sentence on the last step without inverted cells; "" where none was kept."""
-    steps = [frame.step for frame in run.frames if not frame.quality.inverted and frame.step]
-    return f"Step {steps[-1].index} of {steps[-1].total} is the last without any." if steps else ""
 
 
 def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
@@ -218,7 +216,8 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         text = "Linear elasticity needs all of a mesh in memory, and this one stays in its file."
         requirements.append(Requirement(f"{text} Choose another method.", "method"))
     if not requirements:
-        requirements = [Requirement(text, "boundaries") for text in _problems(session)]
+        said = (with_field_labels(str(each)) for each in check_case(case, session.mesh))
+        requirements = [Requirement(text[:1].upper() + text[1:], "boundaries") for text in said]
     if not requirements and session.intersection:
         requirements = [Requirement(session.intersection, "motion")]
     return tuple(requirements)
@@ -249,12 +248,6 @@ def tolerance_warning(case: Case, extent: float, largest: float) -> str:
         f"This is {is_} the largest displacement, {largest:.3g}: cells near the boundary may be "
         f"inverted. A hundredth of it is {largest / 100:.2g}."
     )
-
-
-def _problems(session: Session) -> list[str]:
-    assert session.mesh is not None
-    said = (with_field_labels(str(each)) for each in check_case(session.case, session.mesh))
-    return [text[:1].upper() + text[1:] for text in said]
 
 
 _LABELLED = sorted((name for name, key in KEYS.items() if key.label), key=len, reverse=True)

@@ -135,7 +135,6 @@ class DisplayPanel(Panel):
         self.form.setContentsMargins(6, 6, 6, 4)
         grow_fields(self.form, 5)
         self._make_colors()
-        self._make_threshold()
         self._make_rest()
         self.follow(_shown)
 
@@ -154,8 +153,6 @@ class DisplayPanel(Panel):
         self.reset_range = self._button("reset_range", "Reset", "usual_colors")
         parts = (self.range, self.fit_range, self.reset_range)
         self.form.addRow("Range", in_row(*parts, wide=[self.range], spacing=3))
-
-    def _make_threshold(self) -> None:
         self.only = check_box("Only cells", ONLY, self._only, "only")
         self.threshold = RangeField("threshold")
         self.threshold.changed.connect(lambda values: self._set(threshold=values))

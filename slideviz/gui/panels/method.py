@@ -38,7 +38,13 @@ from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes
-from slideviz.session.motions import largest_prescribed, pair_text, support_key, support_of
+from slideviz.session.motions import (
+    largest_prescribed,
+    machine_pair,
+    pair_text,
+    support_key,
+    support_of,
+)
 from slideviz.session.opening import suggested_reduction
 from slideviz.session.run_messages import Requirement, tolerance_warning, with_field_labels
 from slideviz.session.state import Session
@@ -301,17 +307,18 @@ class MethodPanel(Panel):
     def sync(self, session: Session) -> None:
         """Fill the panel from the session's case."""
         self._reduction = session.case.reduction or self._reduction
-        reduction = replace(
-            self._with_absolute_tolerance(self._reduction or Reduction()), auto=False
-        )
         case = session.case
+        given = self._reduction or Reduction()
+        # The tolerance as a length, to six significant digits.
+        absolute = given.relative * self._extent if given.relative else given.tolerance
+        reduction = replace(given, tolerance=float(f"{absolute:.6g}"), auto=False)
         spare = Case(reduction=reduction)
         if case.reduction is not None:
             case = case.change(reduction=replace(reduction, auto=case.reduction.auto))
         fields = self.form.fields
         fields["origin"].set_scale(self._extent)
-        rotational = case.periodic_type != "translational" and "rotational" in _pair_kinds(session)
-        rotational = rotational or case.periodic_type == "rotational"
+        turned = case.periodic_type != "translational" and machine_pair(session)
+        rotational = turned or case.periodic_type == "rotational"
         no_axis = "" if rotational else "only rotational periodicity has an axis"
         self.form.sync(case, spare, {"axis": no_axis, "origin": no_axis})
         self.more.sync(case, spare)
@@ -325,11 +332,6 @@ class MethodPanel(Panel):
         self.watch.restore()
         # Once for each mesh: it takes 10 ms where there are 250,000 cells.
         self._extent = session.mesh.extent if session.mesh is not None else 0.0
-
-    def _with_absolute_tolerance(self, given: Reduction) -> Reduction:
-        """Return data reduction with its tolerance as a length, to six significant digits."""
-        absolute = given.relative * self._extent if given.relative else given.tolerance
-        return replace(given, tolerance=float(f"{absolute:.6g}"))
 
     def _sync_hints(self, session: Session) -> None:
         case = session.case
@@ -377,8 +379,3 @@ class MethodPanel(Panel):
 
 def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemRole]:
     return cast("tuple[int, QFormLayout.ItemRole]", form.getWidgetPosition(field))
-
-
-def _pair_kinds(session: Session) -> set[str]:
-    names = set(session.case.markers_with("periodic"))
-    return {pair.kind for pair in session.pairs if {pair.first, pair.second} <= names}

@@ -21,7 +21,7 @@ from slideviz.case.motions.motion import (
     direction_words,
     named,
 )
-from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
+from slideviz.case.motions.span import curve_text, read_curve
 from slideviz.gui.widgets.build import Choice, as_widget, grow_fields, in_row, push_button
 from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
 from slideviz.gui.widgets.span_curve import SpanCurveField
@@ -192,7 +192,7 @@ class MotionEditor(QWidget):
         grow_fields(self.form)
         self._make_fields()
         self._place_fields()
-        self._motion: Motion | None = None
+        self._motion: Any = None  # Motion | None
         self._dim = 3
         self._targets: tuple[Target, ...] = ()
         self.centroid_of: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
@@ -237,18 +237,18 @@ class MotionEditor(QWidget):
         self.form.addRow("Motion", as_widget(line))
         file = as_widget(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
         self._rows: dict[str, QWidget] = {}
-        for name, row in ROWS.items():
+        self._titles = {name: QLabel(row.title) for name, row in ROWS.items()}
+        for name, title in self._titles.items():
             self._rows[name] = file if name == "path" else getattr(self, name)
-            self.form.addRow(QLabel(row.title), self._rows[name])
+            self.form.addRow(title, self._rows[name])
             if name == "curve":
                 self.form.addRow(self.drawn)
             if name == "box":
                 self.form.addRow("", self.new_box)
         self.form.addRow("Hub, shroud", self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
-        labels = [self.form.labelForField(widget) for widget in self._rows.values()]
-        widest = max(label.sizeHint().width() for label in labels)
-        for label in labels:
+        widest = max(label.sizeHint().width() for label in self._titles.values())
+        for label in self._titles.values():
             label.setMinimumWidth(widest)
         for choice in (self.kind, self.marker, self.about, self.box, self.side, self.change):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
@@ -277,7 +277,7 @@ class MotionEditor(QWidget):
         self.walls.show_for(named(motion.marker))
         for kind in KINDS:
             self.kind.set_item_enabled(kind, dim == 3 or not kind.only_3d)
-        self.kind.show_value(type(motion))
+        self.kind.setCurrentText(motion.kind_term.label)
         for name in motion.rows:
             row = ROWS[name]
             self._show_value(name, row.shown(getattr(motion, row.attribute)))
@@ -285,7 +285,9 @@ class MotionEditor(QWidget):
         self.path.setToolTip(motion.kind_term.tip)
         shown = {*motion.rows}
         if "raised" in shown:
-            self._name_height(motion)
+            title, way = motion.height_row
+            self._titles["raised"].setText(title)
+            self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
         if motion.stays_at:
             shown |= {"about"} | self._show_place(motion, dim)
         for shared in (self.drawn, self.walls):
@@ -304,23 +306,15 @@ class MotionEditor(QWidget):
     def _show_value(self, name: str, value: Any) -> None:
         """Show a value in the field of a row."""
         if name == "box":
-            self._sync_boxes(value)
+            self.box.offer({name: name or "(no box)" for name in (*self.boxes, value)})
+            self.box.show_value(value)
         elif name == "curve":
-            assert isinstance(self._motion, SpanMotion)
             self.drawn.show_motion(self._motion)
             self.curve.show_value(curve_text(self._motion))
         elif name != "path":
             getattr(self, name).show_value(value)
         elif str(value) != self.path.text() and not self.path.hasFocus():
             self.path.setText("" if value == Path() else str(value))
-
-    def _name_height(self, motion: Motion) -> None:
-        """Say in the row of the height in which direction an airfoil's side moves."""
-        title, way = motion.height_row
-        label = self.form.labelForField(self.raised)
-        assert isinstance(label, QLabel)
-        label.setText(title)
-        self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
 
     def _show_place(self, motion: Motion, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
@@ -378,12 +372,8 @@ class MotionEditor(QWidget):
         self.marker.offer({k: target_words(target) for k, target in enumerate(targets)})
         self.marker.show_value(targets.index(motion.marker))
 
-    def _sync_boxes(self, chosen: str) -> None:
-        self.box.offer({name: name or "(no box)" for name in (*self.boxes, chosen)})
-        self.box.show_value(chosen)
-
     def _kind_chosen(self, kind: type[Motion]) -> None:
-        if self._motion is not None and type(self._motion) is not kind:
+        if self._motion is not None and self._motion.kind_term != kind.kind_term:
             marker = self._motion.marker
             chord = self.chord_of(marker)
             start = NewMotion(self._dim, self.machine, self.boxes, chord)

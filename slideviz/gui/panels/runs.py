@@ -17,7 +17,6 @@ from qtpy.QtWidgets import (
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -262,7 +261,10 @@ class RunsPanel(Panel):
         super().__init__(store)
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
-        self.buttons = {"compare": self._make_compare()}
+        menu = QMenu()
+        menu.aboutToShow.connect(lambda: fill_compare(menu, store))
+        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
+        self.buttons = {"compare": tool_button(tip, image="beside", text="Compare", menu=menu)}
         for command in filter(None, RUN_COMMANDS):
             self.buttons[command.name] = tool_button(
                 command.tip, lambda _=False, command=command: command.do(self), image=command.image
@@ -387,12 +389,6 @@ class RunsPanel(Panel):
         menu.popup(self.tree.viewport().mapToGlobal(where))
 
     # Actions, of the selected run or that with a number --------------------------------
-    def _make_compare(self) -> QToolButton:
-        menu = QMenu()
-        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
-        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
-        return tool_button(tip, image="beside", text="Compare", menu=menu)
-
     def _sync_buttons(self, session: Session) -> None:
         """Enable the buttons of the actions that the shown run allows, or the undeformed mesh."""
         run = session.run_shown

@@ -439,14 +439,10 @@ class NumberBox(QSpinBox):
         # Return would replace an invalid text by a number that nobody typed.
         elif not self.fault or event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
-        if event.text().isalpha():
-            self._complete()
-
-    def _complete(self) -> None:
-        """Complete the beginning of the text for the lowest value; what was added is selected."""
         typed = self.text()
         word = self.specialValueText()
-        if typed and word.startswith(typed):
+        if event.text().isalpha() and typed and word.startswith(typed):
+            # The beginning of the text for the lowest value; what is added is selected.
             self.setValue(self.minimum())
             self.lineEdit().setSelection(len(typed), len(word))
             self._validate()

@@ -191,17 +191,15 @@ class PlotCanvas(QWidget):
         self._stale = True
         if is_seen(self) and not self.busy:
             since = (time.monotonic() - self._last) * 1000.0
-            self._timer.start(max(0, round(self._least_interval_ms() - since)))
+            # The longer one takes, the longer is the time between two.
+            rest = max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds)
+            self._timer.start(max(0, round(min(rest, MOST_REST * REST_MS) - since)))
 
     def wipe(self) -> None:
         """Show “Drawing…” instead of the image until the next one, as it is of another plot."""
         self.wiped = True
         self._before = self._coming
         self.update()
-
-    def _least_interval_ms(self) -> float:
-        """Return the least time between two drawings, in ms: longer, the longer one takes."""
-        return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
     def fill(self) -> None:
         """Start a drawing; later, if one is going on or the widget has been hidden meanwhile."""
