@@ -136,7 +136,14 @@ class ToolBar(QToolBar):
         self.addSeparator()
         self._add("undo", "redo")
         self.addSeparator()
-        self._add_color(window.store)
+        self.addWidget(QLabel(" Color by "))
+        tip = "What the colors of the view show; the panel Display has their range."
+        self.color = Choice(labels(COLOR_BY), tip, "color_by")
+        self.color.chosen.connect(
+            lambda value: window.store.change(changes.set_view, color_by=value)
+        )
+        self.color.setFixedWidth(self.color.fontMetrics().horizontalAdvance("m" * 16))
+        self.addWidget(self.color)
         menu = actions.menus["colors"]
         self.range = tool_button(
             menu.menuAction().statusTip(), image="colors", menu=menu, name="color_range"
@@ -156,14 +163,6 @@ class ToolBar(QToolBar):
 
     def _add(self, *names: str) -> None:
         self.addActions([self._actions.by_name[name] for name in names])
-
-    def _add_color(self, store: Store) -> None:
-        self.addWidget(QLabel(" Color by "))
-        tip = "What the colors of the view show; the panel Display has their range."
-        self.color = Choice(labels(COLOR_BY), tip, "color_by")
-        self.color.chosen.connect(lambda value: store.change(changes.set_view, color_by=value))
-        self.color.setFixedWidth(self.color.fontMetrics().horizontalAdvance("m" * 16))
-        self.addWidget(self.color)
 
     def sync(self, now: CommandState) -> None:
         session: Session = now.session

@@ -87,7 +87,13 @@ class FlatScene:
             self._place(cut, only, section, session)
         cells = self._shown.polygons.cells
         self._shown.color(self.stage.values_of(session, cells, frame) if by_value else None)
-        self._style(section)
+        prop = self._shown.actor.prop
+        prop.color = plain_color(self.stage.scheme)
+        prop.lighting = section.whole_cells
+        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole_cells else (1.0, 0.0)
+        prop.line_width = 1.0
+        view = self.session.view
+        self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
         self._draw_undeformed(section)
         self._draw_neighbours(section)
         marked = None if session.lacks_cells else session.view.marked_cell
@@ -128,15 +134,6 @@ class FlatScene:
             points = session.mesh.points[self.cuts.cutter(session.mesh).used]
             self._level = key, section.ahead(points)
         return self._level[1]
-
-    def _style(self, section: Section) -> None:
-        prop = self._shown.actor.prop
-        prop.color = plain_color(self.stage.scheme)
-        prop.lighting = section.whole_cells
-        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole_cells else (1.0, 0.0)
-        prop.line_width = 1.0
-        view = self.session.view
-        self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
 
     def _draw_neighbours(self, section: Section) -> None:
         by_passage: dict[int, FloatArray] = {}

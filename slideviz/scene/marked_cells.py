@@ -54,8 +54,9 @@ class PointLayer(Layer):
         if key != self._key:
             self._key = key
             self._fill(self._seen(typed, new), new)
-        elif old is None or old.frame is not new.frame:
-            self._place(new)
+        elif self._shape is not None and (old is None or old.frame is not new.frame):
+            self._shape.points[:] = self._at(new, self._drawn.nodes)
+            self._shape.GetPoints().Modified()
 
     def _seen(self, typed: TypedNodes, session: Session) -> TypedNodes:
         """Return those of the nodes that are on a visible boundary."""
@@ -95,11 +96,6 @@ class PointLayer(Layer):
         # A depth offset, so that faces and edges do not cut into the points.
         actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
         actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
-
-    def _place(self, session: Session) -> None:
-        if self._shape is not None:
-            self._shape.points[:] = self._at(session, self._drawn.nodes)
-            self._shape.GetPoints().Modified()
 
     def _at(self, session: Session, nodes: IntArray) -> Any:
         assert session.mesh is not None

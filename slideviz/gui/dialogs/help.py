@@ -414,7 +414,13 @@ class ManualDialog(SearchDialog):
         self.tree = QTreeWidget()
         self.tree.setHeaderHidden(True)
         self.tree.setIndentation(14)
-        self._fill(folder)
+        above: list[QTreeWidget | QTreeWidgetItem] = [self.tree]
+        for level, path in manual_pages(folder):
+            del above[level + 1 :]
+            item = QTreeWidgetItem(above[level], [page_title(path)])
+            item.setData(0, PATH, str(path))
+            above.append(item)
+        self.tree.expandAll()
         self.tree.currentItemChanged.connect(lambda item, _: self._show(item))
         self.pages.sourceChanged.connect(self._select)
         back = push_button("Back", "The page before.", self.pages.backward)
@@ -426,15 +432,6 @@ class ManualDialog(SearchDialog):
         split.setSizes([300, 820])
         self.lay_out(split, back)
         self.pages.show_page(folder / "index.md")
-
-    def _fill(self, folder: Path) -> None:
-        above: list[QTreeWidget | QTreeWidgetItem] = [self.tree]
-        for level, path in manual_pages(folder):
-            del above[level + 1 :]
-            item = QTreeWidgetItem(above[level], [page_title(path)])
-            item.setData(0, PATH, str(path))
-            above.append(item)
-        self.tree.expandAll()
 
     def _show(self, item: QTreeWidgetItem | None) -> None:
         if item is not None:

@@ -440,7 +440,23 @@ class FilmForm(PixelFields, QWidget):
         self.kind = Choice(FILM_KINDS)
         self.kind.chosen.connect(self._kind_chosen)
         self._make_pixels(SIZE_WORDS)
-        self._make_pace()
+        self.fps = decimal_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
+        self.hold = decimal_box(
+            0.0,
+            60.0,
+            FilmOptions().hold,
+            self._changed,
+            unit=" s",
+            tip="How long the last image stays before the film ends or begins again.",
+        )
+        self.between = number_box(
+            0,
+            100,
+            # With few steps, a film of about three seconds needs images in between.
+            0 if self.frames > 15 else round(3 * FPS / self.frames) - 1,
+            self._changed,
+            tip="Images between two steps, with the nodes on straight lines from one to the next.",
+        )
         self.white = check_box("White background", "Without it, the background of the view.")
         self.white.setChecked(True)
         self.fill = check_box(
@@ -462,25 +478,6 @@ class FilmForm(PixelFields, QWidget):
             form.addRow("", option)
         form.setRowVisible(self.mark, renderer.session.view.marked_cell is not None)
         self._kind_chosen(self.kind.currentData())
-
-    def _make_pace(self) -> None:
-        self.fps = decimal_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
-        self.hold = decimal_box(
-            0.0,
-            60.0,
-            FilmOptions().hold,
-            self._changed,
-            unit=" s",
-            tip="How long the last image stays before the film ends or begins again.",
-        )
-        self.between = number_box(
-            0,
-            100,
-            # With few steps, a film of about three seconds needs images in between.
-            0 if self.frames > 15 else round(3 * FPS / self.frames) - 1,
-            self._changed,
-            tip="Images between two steps, with the nodes on straight lines from one to the next.",
-        )
 
     # What was chosen -------------------------------------------------------------------
     @property

@@ -448,7 +448,12 @@ class DesignsPanel(Panel):
             on=self,
             margins=(6, 4, 6, 4),
         )
-        self._connect()
+        self.rows.model.edited = self._edited
+        self.rows.view.clicked.connect(lambda index: self.show_design(index.row() + 1))
+        self.rows.view.activated.connect(lambda index: self.show_design(index.row() + 1))
+        self.plot.picked = self._design_clicked
+        self.job.results_arrived.connect(self._results_arrived)
+        self.job.progressed.connect(self._progressed)
         self.follow(lambda session: session.mesh, self._clear)
         self.follow(lambda session: (session.mesh, session.case))
         self.follow(_end_shown, self._say_shown)
@@ -475,14 +480,6 @@ class DesignsPanel(Panel):
         self.status = WideLabel(lines=3)
         files = (self.load, self.remove, self.save, self.plot.save)
         return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
-
-    def _connect(self) -> None:
-        self.rows.model.edited = self._edited
-        self.rows.view.clicked.connect(lambda index: self.show_design(index.row() + 1))
-        self.rows.view.activated.connect(lambda index: self.show_design(index.row() + 1))
-        self.plot.picked = self._design_clicked
-        self.job.results_arrived.connect(self._results_arrived)
-        self.job.progressed.connect(self._progressed)
 
     # State to widgets ------------------------------------------------------------------
     def _clear(self, _session: Session) -> None:

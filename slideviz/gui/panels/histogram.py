@@ -83,7 +83,10 @@ class BrushCanvas(PlotCanvas):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._pressed is None:
-            self._show_cursor(event.position().x())
+            ends = (self.band or ()) if self.figure.axes else ()
+            near = any(abs(event.position().x() - self.pixel_of(value)) <= END_PX for value in ends)
+            shape = Qt.CursorShape.SizeHorCursor if near else Qt.CursorShape.CrossCursor
+            self.setCursor(shape)
             return
         here = self.value_at(event.position().x())
         self._moved = self._moved or abs(self.pixel_of(self._pressed) - event.position().x()) > 3
@@ -100,12 +103,6 @@ class BrushCanvas(PlotCanvas):
 
     def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
         self.brushed.emit(None)
-
-    def _show_cursor(self, x: float) -> None:
-        ends = (self.band or ()) if self.figure.axes else ()
-        near = any(abs(x - self.pixel_of(value)) <= END_PX for value in ends)
-        shape = Qt.CursorShape.SizeHorCursor if near else Qt.CursorShape.CrossCursor
-        self.setCursor(shape)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

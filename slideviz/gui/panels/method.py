@@ -239,16 +239,6 @@ class MethodPanel(Panel):
         # The largest prescribed displacement, and the mesh, roles and motions that it is of.
         self._largest: tuple[tuple[object, ...], float] = ((), 0.0)
         self._support: tuple[tuple[object, ...], float] = ((), 0.0)
-        self._add_hints()
-        parts = (self.form, self.idle_reasons, self.more, None)
-        in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
-        self._connect()
-        self.watch = FieldWatch(self, store, "method")
-        self.follow(lambda session: session.mesh, self._set_mesh)
-        self.follow()
-
-    def _add_hints(self) -> None:
-        """Add hints: the period that was found, and what part of the extent the tolerance is."""
         form = self.form
         fields = self.form.fields
         row, _ = _position(form, fields["origin"])
@@ -259,14 +249,17 @@ class MethodPanel(Panel):
         self._tolerance_row = as_widget(in_row(wide, self.tolerance_hint, wide=[wide]))
         form.setWidget(row, role, self._tolerance_row)
         form.insertRow(row + 1, "", self.tolerance_warning)
-
-    def _connect(self) -> None:
+        parts = (self.form, self.idle_reasons, self.more, None)
+        in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
         self.form.changed.connect(self._set)
         self.more.changed.connect(self._set)
         self.more.button.toggled.connect(
             # In the next turn of the event loop the form is laid out.
             lambda on: on and QTimer.singleShot(0, self, self._show_more)
         )
+        self.watch = FieldWatch(self, store, "method")
+        self.follow(lambda session: session.mesh, self._set_mesh)
+        self.follow()
 
     def _show_more(self) -> None:
         self.area.widget().adjustSize()

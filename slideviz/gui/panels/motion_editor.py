@@ -273,7 +273,10 @@ class MotionEditor(QWidget):
         self.setVisible(motion is not None)
         if motion is None:
             return
-        self._sync_targets(motion, targets)
+        self._targets = targets = tuple(dict.fromkeys((*targets, motion.marker)))
+        # The item's data is an index: Qt would turn a tuple of names into a list.
+        self.marker.offer({k: target_words(target) for k, target in enumerate(targets)})
+        self.marker.show_value(targets.index(motion.marker))
         self.walls.show_for(named(motion.marker))
         for kind in KINDS:
             self.kind.set_item_enabled(kind, dim == 3 or not kind.only_3d)
@@ -365,12 +368,6 @@ class MotionEditor(QWidget):
         axis, origin = self.machine
         about = getattr(motion, "axis", None), getattr(motion, "point", None)
         return about == (axis, origin[: self._dim])
-
-    def _sync_targets(self, motion: Motion, targets: tuple[Target, ...]) -> None:
-        self._targets = targets = tuple(dict.fromkeys((*targets, motion.marker)))
-        # The item's data is an index: Qt would turn a tuple of names into a list.
-        self.marker.offer({k: target_words(target) for k, target in enumerate(targets)})
-        self.marker.show_value(targets.index(motion.marker))
 
     def _kind_chosen(self, kind: type[Motion]) -> None:
         if self._motion is not None and self._motion.kind_term != kind.kind_term:

@@ -272,16 +272,6 @@ class RunsPanel(Panel):
         for name, button in self.buttons.items():
             button.setObjectName(f"runs_{name}")
             button.setIconSize(QSize(18, 18))
-        self._connect()
-        every = list(self.buttons.values())
-        left = 1 + RUN_COMMANDS.index(None)
-        row = WrappingRow(every[:left], every[left:], spacing=2)
-        parts = (self.empty, self.tree, row)
-        in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
-        self.follow(lambda one: (one.runs, one.shown, one.view.beside), self._fill)
-        self.follow()
-
-    def _connect(self) -> None:
         self.tree.session = lambda: self.session
         self.tree.currentItemChanged.connect(self._chosen)
         self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
@@ -290,6 +280,13 @@ class RunsPanel(Panel):
             lambda number, name: self.change(changes.rename_run, number, name)
         )
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
+        every = list(self.buttons.values())
+        left = 1 + RUN_COMMANDS.index(None)
+        row = WrappingRow(every[:left], every[left:], spacing=2)
+        parts = (self.empty, self.tree, row)
+        in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
+        self.follow(lambda one: (one.runs, one.shown, one.view.beside), self._fill)
+        self.follow()
 
     def take_theme(self, _scheme: ColorScheme) -> None:
         self._fill(self.session)
@@ -301,7 +298,12 @@ class RunsPanel(Panel):
             self._select(session)
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
-        self._sync_buttons(session)
+        run = session.run_shown
+        self.buttons["compare"].setEnabled(run is not None and run.last is not None)
+        for command in filter(None, RUN_COMMANDS):
+            able = run is not None and command.enabled(run)
+            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
+            self.buttons[command.name].setEnabled(able and selected)
 
     def _select(self, session: Session) -> None:
         """Select the row of the shown run, or that of the undeformed mesh at its step 0."""
@@ -389,15 +391,6 @@ class RunsPanel(Panel):
         menu.popup(self.tree.viewport().mapToGlobal(where))
 
     # Actions, of the selected run or that with a number --------------------------------
-    def _sync_buttons(self, session: Session) -> None:
-        """Enable the buttons of the actions that the shown run allows, or the undeformed mesh."""
-        run = session.run_shown
-        self.buttons["compare"].setEnabled(run is not None and run.last is not None)
-        for command in filter(None, RUN_COMMANDS):
-            able = run is not None and command.enabled(run)
-            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
-            self.buttons[command.name].setEnabled(able and selected)
-
     def menu(self, number: int) -> QMenu:
         session = self.session
         menu = QMenu(self)

@@ -145,10 +145,6 @@ class View3D(QtInteractor):
         """Return whether actors still wait for their first drawing (see `unveil`)."""
         return bool(self._veiled)
 
-    def _veil(self) -> None:
-        for actor in chain(*self._veiled):
-            actor.SetVisibility(False)
-
     def _unveil_next(self) -> None:
         if not self._veiled:
             return
@@ -163,7 +159,8 @@ class View3D(QtInteractor):
         if self._resizing:
             return
         # A change of the scene meanwhile may have shown veiled actors.
-        self._veil()
+        for actor in chain(*self._veiled):
+            actor.SetVisibility(False)
         self._Iren.EnableRenderOn()
         try:
             super().paintGL()

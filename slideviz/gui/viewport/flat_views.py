@@ -365,11 +365,6 @@ class FlatView(_SectionView):
         self._partner: FlatView | None = None
         self._fitted: tuple[object, ...] = ()
         self._ranges: tuple[object, ...] = ()
-        self._place()
-        self._connect(store)
-        self.set_scheme(scheme)
-
-    def _place(self) -> None:
         grid = QGridLayout()
         grid.setSpacing(0)
         grid.addWidget(self.upright, 0, 0)
@@ -378,8 +373,6 @@ class FlatView(_SectionView):
         grid.setColumnStretch(1, 1)
         grid.setRowStretch(0, 1)
         in_column(self.title, self.facts, grid, wide=[grid], spacing=0, on=self)
-
-    def _connect(self, store: Store) -> None:
         self.view.signals.zoomed.connect(self._zoomed)
         self.view.signals.resized.connect(self._resized)
         self._refit = single_shot(self, self.fit)
@@ -387,6 +380,7 @@ class FlatView(_SectionView):
         # The rulers follow the camera, whether the mouse or the program moves it.
         moved = self._camera_moved
         self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: moved())
+        self.set_scheme(scheme)
 
     def link(self, other: FlatView | None) -> None:
         """Link the camera with that of another flat view; None ends the link."""

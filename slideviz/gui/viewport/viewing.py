@@ -80,18 +80,15 @@ class CellMouse(QObject):
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            self._show_tooltip(event)
+            cell = self.scene.pick_cell(*self.view.to_pixels(event.pos()))
+            if cell is None:
+                QToolTip.hideText()
+            else:
+                QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
             return True
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
             return event.key() == Qt.Key.Key_Escape and self._escape()
         return False
-
-    def _show_tooltip(self, event: QHelpEvent) -> None:
-        cell = self.scene.pick_cell(*self.view.to_pixels(event.pos()))
-        if cell is None:
-            QToolTip.hideText()
-        else:
-            QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
 
     def mark(self, where: QPoint) -> None:
         """Mark the cell at a position in the view; clear the mark if there is none, or the same."""
