@@ -15,7 +15,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.responsiveness.threads import import_numerics, prepare_drawing, tune_interpreter
 from slideviz.gui.responsiveness.timers import READ_MS, WARM_UP_MS
 from slideviz.gui.widgets.error_reporter import caught, crash_log
-from slideviz.gui.widgets.icons import logo
+from slideviz.gui.widgets.theme import logo
 from slideviz.gui.window import MainWindow
 from slideviz.system.cleanup import private_file, private_folder
 

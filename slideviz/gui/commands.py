@@ -18,7 +18,7 @@ from qtpy.QtWidgets import QMenu
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 from slideviz.gui.widgets.build import wrapped
-from slideviz.gui.widgets.icons import NAMES, set_icon
+from slideviz.gui.widgets.theme import NAMES, set_icon
 from slideviz.session import changes
 from slideviz.session.colors import fit_colors, usual_range
 from slideviz.session.motions import box_names, wheel_passages

@@ -34,7 +34,7 @@ from slideviz.gui.widgets.build import (
     rich_label,
     wrapped,
 )
-from slideviz.gui.widgets.icons import icon, logo, svg_pixmap
+from slideviz.gui.widgets.theme import icon, logo, svg_pixmap
 from slideviz.session.jobs import JobProgress
 
 WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read

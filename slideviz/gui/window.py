@@ -48,9 +48,9 @@ from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.build import Choice, in_column, plain_labels, reveal, tool_button, wrapped
 from slideviz.gui.widgets.error_reporter import ErrorReporter
-from slideviz.gui.widgets.icons import redraw_icons
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
+from slideviz.gui.widgets.theme import redraw_icons
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes, jobs
 from slideviz.session.colors import not_drawable

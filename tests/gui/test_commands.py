@@ -6,7 +6,7 @@ import pytest
 from qtpy.QtGui import QKeySequence
 
 from slideviz.gui.commands import COMMANDS, MENUS, CommandState
-from slideviz.gui.widgets.icons import NAMES
+from slideviz.gui.widgets.theme import NAMES
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.terms import SHOWN

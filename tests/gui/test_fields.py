@@ -9,8 +9,7 @@ from qtpy.QtWidgets import QApplication, QToolTip
 from slideviz.case.motions.rigid import Rotate, Scale
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.build import Choice
-from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, short_text
-from slideviz.gui.widgets.vector_field import VectorField
+from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, VectorField, short_text
 
 pytestmark = pytest.mark.window("shared")
 

@@ -6,8 +6,7 @@ from qtpy.QtTest import QTest
 from slideviz.case.keys import KEYS, REDUCTION
 from slideviz.gui.panels.method import Switch
 from slideviz.gui.widgets.build import Choice
-from slideviz.gui.widgets.fields import NumberBox, NumberField
-from slideviz.gui.widgets.vector_field import VectorField
+from slideviz.gui.widgets.fields import NumberBox, NumberField, VectorField
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 

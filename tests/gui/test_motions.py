@@ -17,7 +17,7 @@ from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.panels.motions import TableDialog
 from slideviz.gui.widgets.build import wrapped
-from slideviz.gui.widgets.vector_field import control_point_problem
+from slideviz.gui.widgets.fields import control_point_problem
 from slideviz.samples.table import write_sample
 from slideviz.session import changes, jobs
 from slideviz.session.motions import Ghosts, TableRows, largest_prescribed

@@ -39,8 +39,8 @@ from slideviz.gui.widgets.build import (
     push_button,
 )
 from slideviz.gui.widgets.error_reporter import versions
-from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.services import Services
+from slideviz.gui.widgets.theme import logo
 
 LOG_LINES = 40  # number of the log's last lines in a bug report
 CLOSE = QDialogButtonBox.StandardButton.Close

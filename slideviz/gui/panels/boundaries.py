@@ -17,8 +17,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.build import Choice, hint_label, in_column, in_row, push_button, wrapped
-from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.theme import role_icon
 from slideviz.mesh.zones import marker_zones
 from slideviz.session import changes
 from slideviz.session.run_messages import idle_text

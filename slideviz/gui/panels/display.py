@@ -23,10 +23,9 @@ from slideviz.gui.widgets.build import (
     push_button,
     wrapped,
 )
-from slideviz.gui.widgets.fields import NumberBox, number_text
+from slideviz.gui.widgets.fields import NumberBox, VectorField, number_text
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
-from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.colors import usual_range

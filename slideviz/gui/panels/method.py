@@ -33,9 +33,14 @@ from slideviz.gui.widgets.build import (
     tool_button,
     wrapped,
 )
-from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
+from slideviz.gui.widgets.fields import (
+    NumberBox,
+    NumberField,
+    VectorField,
+    a_direction,
+    number_text,
+)
 from slideviz.gui.widgets.panel import FieldWatch, Panel
-from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes
 from slideviz.session.motions import (

@@ -23,10 +23,17 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.motions.span import curve_text, read_curve
 from slideviz.gui.widgets.build import Choice, as_widget, grow_fields, in_row, push_button
-from slideviz.gui.widgets.fields import CheckedText, NumberField, TextField, unless
+from slideviz.gui.widgets.fields import (
+    CheckedText,
+    NumberField,
+    TextField,
+    VectorField,
+    a_direction,
+    control_point_problem,
+    unless,
+)
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.gui.widgets.span_walls import SpanWalls
-from slideviz.gui.widgets.vector_field import VectorField, a_direction, control_point_problem
 from slideviz.session.motions import radial
 from slideviz.terms import SIDES, SPAN_KINDS
 

@@ -19,9 +19,9 @@ from slideviz.gui.widgets.build import (
     set_style,
     wrapped,
 )
-from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
+from slideviz.gui.widgets.theme import icon
 from slideviz.session import changes
 from slideviz.session.jobs import JobProgress
 from slideviz.session.reach import reach_run

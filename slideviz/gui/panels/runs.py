@@ -32,10 +32,10 @@ from slideviz.gui.widgets.build import (
     tool_button,
     wrapped,
 )
-from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.services import main_window
+from slideviz.gui.widgets.theme import icon
 from slideviz.session import changes
 from slideviz.session.runs_words import (
     QUALITY_FORMAT,

@@ -38,12 +38,11 @@ from slideviz.gui.widgets.build import (
     tool_button,
     wrapped,
 )
-from slideviz.gui.widgets.fields import NumberField
-from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.span_walls import SpanWalls
-from slideviz.gui.widgets.vector_field import VectorField
+from slideviz.gui.widgets.theme import set_icon
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.section_picture import SectionStyle
 from slideviz.sections.model import Section, Triple

@@ -11,8 +11,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QTo
 from slideviz.gui.commands import STEPS
 from slideviz.gui.responsiveness.timers import TICK_MS
 from slideviz.gui.widgets.build import tool_button
-from slideviz.gui.widgets.icons import set_icon
-from slideviz.gui.widgets.theme import alarm
+from slideviz.gui.widgets.theme import alarm, set_icon
 from slideviz.session import changes
 from slideviz.session.run_messages import stopped_words
 from slideviz.session.state import Session

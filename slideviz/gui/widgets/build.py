@@ -58,7 +58,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.theme import set_icon
 
 
 def rich_label(text: str) -> QLabel:
