@@ -232,15 +232,10 @@ class FlatScene:
         width, height = self.stage.plotter.window_size
         extent = np.maximum(high - low, 1e-300)
         half = max(extent[1], extent[0] * height / max(width, 1)) / 2.0 / FILL
-        centre = (low + high) / 2.0
-        camera = self.stage.plotter.camera
+        x, y = (low + high) / 2.0
         away = 10.0 * float(extent.max())
-        camera.focal_point = (*centre, 0.0)
-        camera.position = (*centre, away)
-        camera.up = (0.0, 1.0, 0.0)
-        camera.parallel_projection = True
-        camera.parallel_scale = half
-        self.stage.plotter.renderer.ResetCameraClippingRange()
+        self.stage.plotter.camera.parallel_projection = True
+        self.camera.move_to((x, y, away, x, y, 0.0, 0.0, 1.0, 0.0, half))
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the ranges of both axes that the view shows: left to right, bottom to top."""

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class DesignTable:
 
     columns: tuple[str, ...] = ()  # their names, as `slideviz.sweep` takes them
     rows: tuple[tuple[str, ...], ...] = ()  # the values of each design, a text for each column
-    results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
+    results: Mapping[int, DesignRow] = field(default_factory=dict)
     """By the number of the design, from 1."""
 
     def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
@@ -71,7 +70,7 @@ class DesignTable:
         cells[column] = text.strip()
         rows = (*self.rows[:row], tuple(cells), *self.rows[row + 1 :])
         results = {number: one for number, one in self.results.items() if number != row + 1}
-        return replace(self, rows=rows, results=MappingProxyType(results))
+        return replace(self, rows=rows, results=results)
 
     def without(self, rows: Iterable[int]) -> DesignTable:
         """Return the table without some rows; results move with their designs."""
@@ -83,12 +82,12 @@ class DesignTable:
             if old + 1 in self.results
         }
         kept = tuple(self.rows[at] for at in left)
-        return DesignTable(self.columns if kept else (), kept, MappingProxyType(results))
+        return DesignTable(self.columns if kept else (), kept, results)
 
     def with_results(self, rows: Iterable[DesignRow]) -> DesignTable:
         """Return the table with added results; ``rows`` have the numbers of their designs."""
         more = {row.design: row for row in rows}
-        return replace(self, results=MappingProxyType({**self.results, **more}))
+        return replace(self, results={**self.results, **more})
 
     def keeping(self, other: DesignTable) -> DesignTable:
         """Return the table with the results that ``other`` has of designs with the same values."""
@@ -123,7 +122,7 @@ class DesignTable:
 
     def without_results(self) -> DesignTable:
         """Return the table without any result."""
-        return replace(self, results=MappingProxyType({}))
+        return replace(self, results={})
 
     def left(self, case: Case | None, now: Case | None) -> DesignTable:
         """Return the table without the results that are to be computed again.

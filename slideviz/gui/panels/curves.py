@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from qtpy.QtCore import QPointF, Qt
 from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
-from qtpy.QtWidgets import QHBoxLayout, QWidget
 
 from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.errors import SlidevizError
@@ -106,13 +105,6 @@ class CurvesPanel(Panel):
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
-        head = self._make_head()
-        span = self._make_span()
-        in_column(head, self.area, span, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self.follow(lambda session: session.mesh, self._offer_coordinates)
-        self.follow(_shown)
-
-    def _make_head(self) -> QHBoxLayout:
         self.kind = Choice(KINDS, name="curve_kind")
         self.kind.setMinimumContentsLength(4)
         self.kind.set_tips(TIPS)
@@ -124,9 +116,7 @@ class CurvesPanel(Panel):
             lambda _: self.canvas.request_draw(),
             "whole_quality",
         )
-        return in_row(self.kind, self.whole, self.save, wide=[self.kind])
-
-    def _make_span(self) -> QWidget:
+        head = in_row(self.kind, self.whole, self.save, wide=[self.kind])
         self.what = Choice(WHAT, "The lowest or the mean quality of each layer.")
         self.coordinate = Choice(
             {},
@@ -137,7 +127,10 @@ class CurvesPanel(Panel):
         for choice in both:
             choice.chosen.connect(lambda _: self._other_plot())
         self.span_row = as_widget(in_row(*both, wide=both))
-        return self.span_row
+        parts = (head, self.area, self.span_row)
+        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
+        self.follow(lambda session: session.mesh, self._offer_coordinates)
+        self.follow(_shown)
 
     def focus_requirement(self, _missing: Requirement) -> None:
         """Show how far the motion of the shown run may go."""

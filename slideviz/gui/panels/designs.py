@@ -207,16 +207,6 @@ class DesignRows(QWidget):
         )
         self.add.setMaximumWidth(64)
         self.model = DesignsModel()
-        self.view = self._make_view()
-        self.hint = hint_label(ABOUT, Qt.AlignmentFlag.AlignTop)
-        self.hint.setMargin(6)
-        self._stack = QStackedWidget()
-        self._stack.addWidget(self.hint)
-        self._stack.addWidget(self.view)
-        fill = in_row(self.values, self.add, wide=[self.values], spacing=4)
-        in_column(self.column, fill, self._stack, wide=[self._stack], spacing=4, on=self)
-
-    def _make_view(self) -> QTableView:
         view = QTableView()
         view.setObjectName("designs_table")
         view.setModel(self.model)
@@ -229,7 +219,14 @@ class DesignRows(QWidget):
         heads = view.horizontalHeader()
         heads.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         heads.setResizeContentsPrecision(50)
-        return view
+        self.view = view
+        self.hint = hint_label(ABOUT, Qt.AlignmentFlag.AlignTop)
+        self.hint.setMargin(6)
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self.hint)
+        self._stack.addWidget(self.view)
+        fill = in_row(self.values, self.add, wide=[self.values], spacing=4)
+        in_column(self.column, fill, self._stack, wide=[self._stack], spacing=4, on=self)
 
     def show_columns(self, case: Case, mesh: Mesh | None) -> None:
         """Offer the numbers of a case that can vary; keep a choice unless the mesh is another.

@@ -353,7 +353,10 @@ class WorstPanel(Panel):
         self.model = WorstModel()
         # The model's signals keep the panel alive: as its child, the model is deleted with it.
         self.model.setParent(self)
-        self.table = self._make_table()
+        self.table = WorstTable(self.model)
+        self.table.row_activated.connect(self._fly_to_row)
+        self.table.clicked.connect(self._clicked)
+        self.model.modelReset.connect(lambda: self._sync_mark(self.session))
         self.words = words_label()
         self.info = QLabel()
         self.info.setObjectName("cell_info")
@@ -387,13 +390,6 @@ class WorstPanel(Panel):
             shortcut.activated.connect(function)
         self.follow(seen=True)
         self.follow(_listed, self._fill, seen=True, rests=True)
-
-    def _make_table(self) -> WorstTable:
-        table = WorstTable(self.model)
-        table.row_activated.connect(self._fly_to_row)
-        table.clicked.connect(self._clicked)
-        self.model.modelReset.connect(lambda: self._sync_mark(self.session))
-        return table
 
     # State to widgets ------------------------------------------------------------------
     def take_theme(self, _scheme: ColorScheme) -> None:

@@ -17,7 +17,7 @@ from datetime import datetime
 from functools import partial
 from importlib import metadata
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
@@ -25,6 +25,9 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
 from slideviz.system.cleanup import is_alive, private_file, private_folder
+
+if TYPE_CHECKING:
+    from slideviz.gui.widgets.banner import Banner
 
 REST_S = 5.0
 """Seconds without an error after which the same error is shown anew rather than counted."""
@@ -53,16 +56,6 @@ _LEVELS = {
 log = logging.getLogger("slideviz")
 
 
-class Notice(Protocol):
-    """A widget that shows an error, and how often it occurred."""
-
-    def show_error(self, error: BaseException) -> None:
-        """Show an error."""
-
-    def count(self, times: int) -> None:
-        """Show how often the error occurred."""
-
-
 class ErrorReporter(QObject):
     """Receives the unexpected errors of a window: shows each once in its banner, then counts it."""
 
@@ -70,7 +63,7 @@ class ErrorReporter(QObject):
 
     def __init__(
         self,
-        banner: Notice,
+        banner: Banner,
         parent: QObject | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:

@@ -1,4 +1,4 @@
-"""Input fields for numbers, alone or in twos and threes, checked as they are typed."""
+"""Input fields for texts and numbers, alone or in twos and threes, checked as they are typed."""
 
 from __future__ import annotations
 

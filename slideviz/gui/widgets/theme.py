@@ -1,4 +1,4 @@
-"""The light and the dark theme, in Qt's Fusion style: colors of widgets and texts, and the icons."""
+"""The light and the dark theme in Qt's Fusion style: colors of widgets and texts, icons."""
 
 from __future__ import annotations
 
