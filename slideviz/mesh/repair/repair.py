@@ -31,6 +31,10 @@ from slideviz.terms import SkewMetric
 
 RINGS = 3, 5, 8, 13, 21  # rings of cells around bad ones; a patch that fails grows to the next
 
+SHARES = 1.0, 1.0, 0.2, 0.5, 0.2
+"""Epsilon over the depth of the deepest fold, in patches of each size: the larger, the better the
+cells that it ends with, and the sooner it is stuck."""
+
 FEW = 5000  # most cells of a patch that grows to the last two
 
 POOR = 2  # number of sizes that are tried for patches whose cells are all proved, but some too low
@@ -44,7 +48,7 @@ make it so, before a patch grows."""
 ITERATIONS = 200
 DECREASE = 5e-3
 ENOUGH = 0.01
-POLISH = 1e-4
+POLISH = 1e-3
 """Most iterations of a descent, and the least relative decrease of the energy in ten of them: while
 a cell is folded, when none is, and in the last descent, which brings cells near their targets."""
 
@@ -141,6 +145,7 @@ class _Work:
     """`hopeless`, `bad` (m,): cells that cannot be mended, which no energy counts, and those that
     were bad before the first round."""
     wanted: float  # the limit of the last round
+    share: float  # of the depth of the deepest fold: the next epsilon
     pool: ThreadPoolExecutor
 
 
@@ -300,6 +305,7 @@ class _Rounds:
                 hopeless=hopeless,
                 bad=np.isin(region.cells, self.before),
                 wanted=self.below,
+                share=SHARES[stage],
                 pool=self.pool,
             )
             _mend_patches(work, wanted, RINGS[stage], points)
@@ -520,7 +526,7 @@ class _Mending:
             deepest = min(deepest, depth)
             if self.best.proved == 0 or stuck >= STUCK:
                 break
-            epsilon = float(np.hypot(1e-6, 0.2 * depth))
+            epsilon = float(np.hypot(1e-6, self.work.share * depth))
 
     def _descended(self, patch: Patch, epsilon: float, least: float | None = None) -> FloatArray:
         """Return points (k, d) of lower energy; ``least`` is the decrease that ends it."""
