@@ -721,15 +721,14 @@ METHOD_ROWS = (
     ),
     _method_setting(
         "RELAX",
-        "Relax the mesh after the last step: a few iterations of an elastic body whose cells go "
-        "back to their undeformed shapes, turned as they are. Cells are better in the mean, and "
-        "boundary layers keep their heights and angles. AUTO does so up to a million cells in "
-        "memory.",
+        "Relax the mesh after the last step, to the least distortion of all cells: they go back "
+        "to their undeformed shapes, turned as they are, and none folds. Cells are better in the "
+        "mean, and boundary layers nearly keep their heights and angles. AUTO does so up to a "
+        "million cells in memory.",
         label="Relaxation",
         form="main",
-        tip="Whether cells then go back towards their undeformed shapes, turned as they are, like "
-        "an elastic body: better in the mean, and boundary layers keep their heights. A safeguard "
-        "keeps the worst cells.",
+        tip="Whether cells then go back towards their undeformed shapes, turned as they are: "
+        "better in the mean, boundary layers nearly keep their heights, and no cell folds.",
         run_label="relaxation {}",
         idle_reason=lambda case: "" if case.relax == "yes" else other_method(case, "rbf"),
     ),

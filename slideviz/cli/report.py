@@ -475,9 +475,7 @@ def _print_run(
         chosen = " (AUTO)" if radius["automatic"] else ""
         rows.append((f"support radius{chosen}", radius["used"]))
     if (relax := report["relax"]) is not None:
-        words = f"{relax['rounds']} rounds, residual {relax['residual']:.2g}"
-        if relax["limited"]:
-            words += f", held back at {counted(relax['limited'], 'node')}"
+        words = f"{counted(relax['rounds'], 'iteration')}, to {relax['residual']:.1g}"
         rows.append(("relaxation", words))
     if (mended := report["repair"]) is not None and mended["cells_before"]:
         counts = "; ".join(

@@ -489,9 +489,6 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""
 
-RELAXING = ("alpha", "beta", "theta")
-"""How the names of relaxation's coefficients begin among the choices."""
-
 Report = Callable[[Progress], None]
 
 
@@ -657,8 +654,6 @@ class Deformer:
         self._as_run = None if refined or left_out else points
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
-        if setup.relaxation is not None and not targets[0].any():
-            self._relax_from_rest(targets)
         facets = facets_of(setup, value(states[-1].coords))
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
@@ -800,17 +795,6 @@ class Deformer:
         if name == "min":
             return Constraint(slope.minimum, slope.of_minimum, start, end)
         return Constraint(slope.mean, slope.of_mean, start, end)
-
-    def _relax_from_rest(self, targets: list[FloatArray]) -> None:
-        """Take the coefficients of relaxation from the second design: the first one has none."""
-        *before, last = self._steps
-        if len(targets) > 1:
-            last.forget(RELAXING)
-            self._run(targets[1])
-            return
-        self._steps = (*before, replace(last, setup=last.setup.at_step(False)))
-        text = "nothing is relaxed: the reference has no displacement; give `displacements`"
-        self.messages += (note(text),)
 
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.

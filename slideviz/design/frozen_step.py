@@ -656,11 +656,6 @@ class FrozenStep:
             self.last.items["at"] = coords.copy(), kept
         return kept
 
-    def forget(self, names: tuple[str, ...]) -> None:
-        """Make the choices whose names begin with one of ``names`` anew when the step runs next."""
-        for name in [name for name in self.choices.items if name.startswith(names)]:
-            del self.choices.items[name]
-
     def run(self, before: StepState, target: Array) -> StepState:
         """Return the state after this step.
 

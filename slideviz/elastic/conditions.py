@@ -39,7 +39,9 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
     prescribed[first] = value(data)
     place, turn = unknowns(problem, body, first)
     known = np.where(np.isin(same, first)[:, None], prescribed[same], 0.0)
-    free = _projections(problem, body, place, int(place.max(initial=-1)) + 1)
+    free = np.tile(np.eye(value(problem.coords).shape[1]), (int(place.max(initial=-1)) + 1, 1, 1))
+    blocks, own = projections(problem, body, held_rows(problem, body, place))
+    free[blocks] = own
     return held(place, turn, free, _cartesian(problem, body.frame, known))
 
 
@@ -136,18 +138,18 @@ def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
     return HeldRows(across, images, back, rows, at, np.arange(len(at)) - np.searchsorted(at, at))
 
 
-def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
-    """Return the projections P_k (count, d, d) on the directions in which unknowns may move."""
+def projections(problem: Problem, body: Body, held: HeldRows) -> tuple[IntArray, FloatArray]:
+    """Return the blocks (h,) that are not free in all directions, and their P_k (h, d, d)."""
     nodes = problem.normal_nodes
-    held = held_rows(problem, body, place)
     own = cartesian_normals(body.frame, value(problem.coords)[nodes], value(problem.normals))
     normals = np.concatenate([own, held.axis])
     normals[held.images] = np.einsum("mij,mj->mi", held.back, normals[held.images])
     normals = normals[held.order]
-    free = np.tile(np.eye(value(problem.coords).shape[1]), (count, 1, 1))
+    blocks, rows = np.unique(held.place, return_inverse=True)
+    free = np.tile(np.eye(value(problem.coords).shape[1]), (len(blocks), 1, 1))
     # The first constraint of each block, then the second of each, and so on.
     for k in range(int(held.turn.max(initial=-1)) + 1):
-        here = held.place[held.turn == k]
+        here = rows[held.turn == k]
         normal = normals[held.turn == k]
         left = np.einsum("mij,mj->mi", free[here], normal)
         length = np.linalg.norm(left, axis=1)
@@ -155,7 +157,7 @@ def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> F
         new = length > RANK_TOLERANCE
         unit = left[new] / length[new, None]
         free[here[new]] -= unit[:, :, None] * unit[:, None, :]
-    return free
+    return blocks, free
 
 
 def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> FloatArray:

@@ -27,10 +27,11 @@ from pyamg.aggregation import standard_aggregation
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
-from slideviz.elastic.corotated import Corotated
+from slideviz.elastic.distortion import Distortion, Part, write_laplacians
 from slideviz.elastic.multigrid import RIDGE
-from slideviz.elastic.stiffness import ShapeBlock, by_node, shape_gradients
-from slideviz.mesh.model import FloatArray, IntArray, sealed
+from slideviz.elastic.stiffness import by_node
+from slideviz.mesh.jacobians import CORNERS
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import transform, value
@@ -41,7 +42,12 @@ COARSE = 300  # largest number of unknowns of the coarsest level, which has a de
 
 HELD = 1e60  # on the diagonal of the coarsest matrix, in rows of nothing
 
-PART = 4096  # rows that are smoothed one after the other
+PART = 16384  # rows that are smoothed one after the other
+
+SPARE = 0.5
+"""What couples a row to other parts may be this part of its diagonal before that grows by half of
+the rest: with D the diagonal and O these couplings, the sweep converges where D + 2 growth - O is
+positive definite."""
 
 CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
@@ -81,7 +87,7 @@ class LaplacianCycle:
 
     @classmethod
     def of(
-        cls, body: Corotated, place: IntArray, held: np.ndarray, axes: FloatArray
+        cls, body: Distortion, place: IntArray, held: np.ndarray, axes: FloatArray
     ) -> LaplacianCycle:
         """Return the cycle of an elastic body.
 
@@ -227,7 +233,7 @@ def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:
     return indptr, indices, data
 
 
-def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
+def laplacian(body: Distortion, place: IntArray, count: int) -> Sparse:
     """Return the matrix (count, count) of the Laplacian; ``place`` as of `LaplacianCycle.of`.
 
     Each row has its diagonal, which is less the sum of the others and of those of known nodes:
@@ -236,11 +242,11 @@ def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
     sizes = np.array([part.nodes.shape for part in body.parts], np.int64).reshape(-1, 2)
     entries = np.empty(int((sizes[:, 0] * sizes[:, 1] ** 2).sum()), np.float32)
     first = 0
-    for part, modulus in zip(body.parts, body.moduli, strict=True):
+    for part in body.parts:
         m, a = part.nodes.shape
         mine = entries[first : first + m * a * a].reshape(m, a, a)
         first += m * a * a
-        in_parts(partial(_gradients_part, sealed(body.points), part, modulus, mine), m)
+        in_parts(partial(_write_part, body.points, part, mine), m)
     corners = np.concatenate([place[part.nodes].ravel() for part in body.parts]).astype(np.int32)
     starts, order = by_node(corners + 1, count + 1)
     graph = starts[1:], order, corners, sizes
@@ -254,13 +260,8 @@ def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
     return indptr, indices, data
 
 
-def _gradients_part(
-    points: FloatArray, part: ShapeBlock, modulus: FloatArray, out: np.ndarray, s: slice
-) -> None:
-    shape = part.shape
-    elements = sealed(points), sealed(part.nodes[s]), shape.gradients, shape.weights
-    gradients(elements, modulus[s], out[s])
-    out[s][~np.isfinite(out[s])] = 0.0  # parts of cells without volume do not spoil the others
+def _write_part(points: FloatArray, part: Part, out: np.ndarray, rows: slice) -> None:
+    write_laplacians(points, part.nodes[rows], CORNERS[part.vtk], part.coupling[rows], out[rows])
 
 
 def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> LaplacianLevel:
@@ -272,32 +273,6 @@ def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> Laplac
 
 def _single(matrix: Sparse) -> Sparse:
     return matrix[0], matrix[1], matrix[2].astype(np.float32)
-
-
-@njit(**OPTIONS)
-def gradients(elements, modulus, out):  # type: ignore[no-untyped-def]
-    """Write the integrals of modulus * grad N_a . grad N_b of elements to ``out`` (m, a, a)."""
-    points, nodes, _, weights = elements
-    n = nodes.shape[1]
-    d = points.shape[1]
-    inverse = np.empty((3, 3))
-    x = np.empty((n, d))
-    slopes = np.empty((n, d))
-    total = np.empty((n, n))
-    for e in range(len(nodes)):
-        total[:] = 0.0
-        for q in range(len(weights)):
-            size = modulus[e] * shape_gradients(elements, e, q, x, inverse, slopes)
-            for a in range(n):
-                for b in range(a):
-                    one = 0.0
-                    for i in range(d):
-                        one += slopes[a, i] * slopes[b, i]
-                    total[a, b] += size * one
-        for a in range(n):
-            out[e, a, a] = 0.0
-            for b in range(a):
-                out[e, a, b] = out[e, b, a] = total[a, b]
 
 
 @njit(**PARALLEL)
@@ -415,13 +390,18 @@ def diagonals(matrix, free, middle, inverse):  # type: ignore[no-untyped-def]
     indptr, indices, data = matrix
     for row in range(len(middle)):
         middle[row] = indptr[row]
-        inverse[row] = 0.0
         for k in range(indptr[row], indptr[row + 1]):
             middle[row] += indices[k] < row
-            if indices[k] == row or indices[k] // PART != row // PART:
-                for g in range(free.shape[1]):
-                    inverse[row, g] += abs(data[k, min(g, data.shape[1] - 1)])
         for g in range(free.shape[1]):
+            own = 0.0
+            outside = 0.0
+            for k in range(indptr[row], indptr[row + 1]):
+                size = abs(data[k, min(g, data.shape[1] - 1)])
+                if indices[k] == row:
+                    own = size
+                elif indices[k] // PART != row // PART:
+                    outside += size
+            inverse[row, g] = own + 0.5 * max(0.0, outside - SPARE * own)
             used = free[row, g] and inverse[row, g] > 0.0
             inverse[row, g] = 1.0 / inverse[row, g] if used else 0.0
 

@@ -1,79 +1,119 @@
-"""Relaxation: a few iterations of corotated elasticity after radial basis functions.
+"""Relaxation: the mesh goes to the least distortion energy, from what radial functions give.
 
 Radial functions give the large scales and the boundary; what they leave is local and stiff. The
-mesh becomes an elastic body whose undeformed shape is without forces however its cells are turned
-(`slideviz.elastic.corotated`), and goes towards its equilibrium by nonlinear conjugate gradients
-(Polak and Ribiere), preconditioned by one multigrid cycle (`slideviz.elastic.laplacian`):
+energy (`slideviz.elastic.distortion`) is zero for cells that are only turned, and infinite where
+one folds; L-BFGS minimises it, preconditioned by one multigrid cycle of the undeformed Laplacian
+(`slideviz.elastic.laplacian`). Moving and fixed nodes stay, sliding ones move along their boundary
+(projected after each step, where it is curved), periodic images move as one.
 
-    r = -f(x),   p = C r + beta p,   x <- x + alpha s p,   f <- f + alpha (f(x + s p) - f),
+Derivatives are those of the minimum, whatever way led to it: where the gradient g(x) of the
+unknowns vanishes, a change t of the start, of which the unknowns keep nothing, changes x by
 
-with the constant s, and alpha such that the energy is least along p if rotations stay; so one
-evaluation of f gives step and next forces. (Where nodes slide on curved boundaries, they are
-projected after each step, and f is evaluated there.)
+    t - T (T' H T)^-1 T' H t,
 
-Moving and fixed nodes stay, sliding ones move along their boundary, periodic images as one. A
-safeguard goes back, in part, where cells would become worse. Steps alpha and beta, tangents and the
-part of the safeguard are choices, so that a frozen step is a chain of forces and linear maps.
+with the Hessian H and the maps T from unknowns to nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.sparse import block_array, csr_array
-from scipy.sparse.csgraph import dijkstra
 
-from slideviz.elastic.conditions import Body, conditions
-from slideviz.elastic.corotated import Corotated
+from slideviz.elastic.conditions import Body, HeldRows, held_rows, projections, unknowns
+from slideviz.elastic.distortion import WORST, Distortion
 from slideviz.elastic.laplacian import LaplacianCycle
 from slideviz.elastic.multigrid import MAKING, while_ticking
-from slideviz.elastic.stiffness import Conditions
-from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import INVERTED, VALID
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
-from slideviz.mesh.quality import Quality, quality
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.repair.descent import Memory, dot, line_search
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.operations import difference_from, each_of, points
 from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
-from slideviz.rbf.tape import Array, add_at, multiply, put, recorded, take, transform, value
-from slideviz.terms import SkewMetric
+from slideviz.rbf.tape import Array, multiply, put, recorded, take, value
 
-ITERATIONS = 6  # enough to come to the mean quality of the equilibrium within 0.001 to 0.003
+NEAR = 0.15
 
-SIZE = 1.5
-"""The step, as a part of the direction, at which the energy's slope is found for the best step."""
+RESIDUAL = 1e-2
+SMALL = 5000
+LOOSE = 0.1
+"""The residual, the root of twice the energy that a step could still gain over the energy, at which
+a run ends: that of meshes of up to so many cells; it grows with the root of their number, up to the
+last, since the time does, and what could be gained concerns fewer and fewer of them. `NEAR`: the
+one at which the term for the worst cells joins."""
 
-TRIES = 20
-SLOWER = 0.85
-"""How often the safeguard changes the parts of the relaxation that it leaves, and how much slower
-they grow each time."""
+CLOSE = 1e-3
+NEWTON = 12
+STILL = 1e-14
+"""The residual from which Newton's method goes on where derivatives are wanted; its most steps, and
+the step, as a part of the extent, that ends it."""
 
-LEAST = 0.2  # a part below this becomes zero where cells are still worse
+BEND = 1e-6  # step, as a part of the extent, by which changes of walls are found
 
-STRAINS = 0.6, 0.15
-"""Along an edge, the part may grow by so much that the edge is strained by this: the first is
-better for most meshes, the second for some."""
+FORCING = 1e-3  # residual of its linear systems
 
-PARTS = 0.5, 0.25  # parts of the relaxation that are tried everywhere
+PAIRS = 6  # of steps and changes of the gradient that are remembered
 
-TINY = 1e-9  # growth along edges of no length, and between periodic images
+ITERATIONS = 300
+UNFOLDING = 40
+"""Most iterations, and most of them with one regularisation of folded cells."""
 
-WORSE = 0.9
-ENOUGH = 0.3
-"""The lowest quality may become ``WORSE`` times what it was, or ``ENOUGH`` if that is less."""
+ROUNDS = 10  # most regularisations
+
+AT_REST = 1e-20  # energy of a cell that counts as nothing
+
+SOLVED = 1e-13
+PRODUCTS = 2000
+"""Residual of the linear systems of derivatives, and most products with the Hessian."""
 
 Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
 """Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
 
+Projection = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
+"""Takes coordinates (n, d), sliding nodes (m,) and their displacements (m, d) in the frame; returns
+the displacements (m, d) with which they are on their boundary."""
 
-_MADE: WeakKeyDictionary[Mesh, tuple[Corotated, IntArray, np.ndarray, LaplacianCycle]]
-_MADE = WeakKeyDictionary()
-"""Of each mesh its forces, and the last preconditioner with the conditions that it was made for:
-the unknowns (n,) of the nodes, and which of their components are held, (k, d)."""
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The boundaries on which nodes slide."""
+
+    constraints: Constraints
+    project: Projection
+
+
+@dataclass(frozen=True, eq=False)
+class FlatWalls:
+    """Planes and lines, one for each sliding node: a `Projection`."""
+
+    anchor: FloatArray  # (m, d): a point of each, in the frame
+    matrix: FloatArray  # (m, d, d): the projections on their directions
+
+    def __call__(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
+        """Return the displacements (m, d) of all sliding nodes on their walls."""
+        away = coords[nodes] + free - self.anchor
+        return self.anchor + np.einsum("mij,mj->mi", self.matrix, away) - coords[nodes]
+
+
+def _given(rows: tuple[IntArray, FloatArray], _coords: FloatArray) -> tuple[IntArray, FloatArray]:
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What is kept of a mesh: its energy, and its last preconditioner."""
+
+    energy: Distortion
+    wanted: tuple[IntArray, np.ndarray, FloatArray]
+    """The conditions that the preconditioner was made for: the unknowns (n,) of the nodes, which of
+    their components are held, (k, d), and their axes."""
+    cycle: LaplacianCycle
+
+
+_MADE: WeakKeyDictionary[Mesh, _Prepared] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +123,6 @@ class Relaxation:
     mesh: Mesh  # undeformed, with its halo
     domain: Mesh  # undeformed, without the halo
     body: Body
-    metric: SkewMetric  # of the quality that the safeguard keeps
 
     def relaxed(
         self,
@@ -91,6 +130,7 @@ class Relaxation:
         displacement: Array,
         rigid: IntArray,
         constraints: Constraints,
+        project: Projection,
         tie: Callable[[Array], Array],
         timer: PhaseTimer,
     ) -> tuple[Array, Relaxed | None]:
@@ -104,221 +144,291 @@ class Relaxation:
         if problem.frozen is None and not value(displacement).any():
             return displacement, None  # at rest, where rounding is all that would move
         with timer.phase("relax") as tick:
-            at = value(problem.coords) + value(displacement)
+            if self.body.axis.any():
+                off_axis = np.ones(self.mesh.points.shape)
+                off_axis[self.body.axis, :2] = 0.0
+                displacement = multiply(displacement, off_axis)
             held = np.concatenate([problem.known, rigid])
-            given: Conditions = problem.choose(
-                "conditions", lambda: self._conditions(problem, at, held, constraints)
-            )
-            if not len(given.free):
+            walls = Walls(constraints, project)
+            unknowns = Unknowns.of(problem, self.body, held)
+            if not len(unknowns.owner):
                 return displacement, None
-            start = self.body.frame.coords(self.mesh.points)
-            free = self._conditions(problem, start, held, constraints).free
-            body = self._prepared(problem, given.place, free, tick)
-            moved, residual = self._iterated(problem, displacement, *body, given, tie, tick)
-            theta: FloatArray = problem.choose(
-                "theta", lambda: self._kept_part(problem, displacement, moved, tie)
+            made = self._prepared(unknowns, constraints, tick)
+
+            def way_on(walls: Walls) -> _Way:
+                return _Way(self, problem, value(displacement), made, unknowns, walls)
+
+            if problem.frozen is not None and problem.curved:
+                walls = problem.choose("walls", lambda: way_on(walls).frozen_walls(tick))
+            way = way_on(walls)
+            way.go(tick, _residual(made.energy.count) if problem.frozen is None else CLOSE)
+            if problem.frozen is not None:
+                way.finish()
+            start = points(self.body.frame, problem.coords + displacement)
+            end = recorded(
+                way.x,
+                (start, partial(each_of, way.pushed), partial(each_of, way.pulled)),
             )
-            out = blended(problem, displacement, moved, theta, tie)
-        limited = int(np.count_nonzero(theta[given.place >= 0] < 1.0))
-        return out, Relaxed(ITERATIONS, residual, float(theta.min()), limited)
+            moved = displacement + difference_from(self.body.frame, start, end - start)
+            moved = tie(moved) if way.curved else _slid(problem, moved, tie)
+            return moved, Relaxed(way.iterations, way.residual)
 
-    def _conditions(
-        self, problem: Problem, at: FloatArray, held: IntArray, constraints: Constraints
-    ) -> Conditions:
-        """Return the conditions of the body at coordinates (n, d) if nodes ``held`` stay."""
-        nodes, normals = constraints(at)
-        there = replace(problem, coords=at, normal_nodes=nodes, normals=normals)
-        return conditions(there, self.body, held, np.zeros((len(held), at.shape[1])))
-
-    def _prepared(
-        self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick
-    ) -> tuple[Corotated, LaplacianCycle]:
-        """Return the forces of this mesh and the preconditioner for these conditions.
-
-        ``place`` (n,) and ``free`` (k, d, d) are those of undeformed conditions.
-        """
+    def _prepared(self, unknowns: Unknowns, constraints: Constraints, tick: Tick) -> _Prepared:
+        """Return the energy of this mesh, and the preconditioner for undeformed conditions."""
         x = self.mesh.points
         frame = self.body.frame
-        made = _MADE.get(self.mesh)
+        start = frame.coords(x)
+        undeformed = unknowns.on(constraints, start)
         axes = np.eye(x.shape[1])
         if frame.cylindrical:
-            start = frame.coords(x)
-            owner = np.zeros(len(free), np.int64)
-            owner[place[place >= 0]] = problem.same_as[place >= 0]
-            each = [frame.turned_back(start[owner], np.tile(row, (len(free), 1))) for row in axes]
-            axes = np.stack(each, axis=2)
-        held = _held(axes @ free @ np.swapaxes(axes, -1, -2))
-        wanted = place, held, axes
-        if made is None or not all(map(np.array_equal, (*made[1:3], made[3].axes), wanted)):
-            forces = Corotated.of(x, self.body.parts) if made is None else made[0]
-            cycle = while_ticking(partial(LaplacianCycle.of, forces, *wanted), tick)
-            made = _MADE[self.mesh] = forces, place, held, cycle
-        return made[0], made[3]
+            shape = len(unknowns.owner), 1
+            at = start[unknowns.owner]
+            axes = np.stack([frame.turned_back(at, np.tile(row, shape)) for row in axes], axis=2)
+        wanted = unknowns.place, _held(axes, undeformed), axes
+        made = _MADE.get(self.mesh)
+        if made is not None and all(map(np.array_equal, made.wanted, wanted)):
+            return made
+        energy = Distortion.of(x, self.domain.cells) if made is None else made.energy
+        cycle = while_ticking(partial(LaplacianCycle.of, energy, *wanted), tick)
+        made = _MADE[self.mesh] = _Prepared(energy, wanted, cycle)
+        return made
 
-    def _iterated(
+
+class _Way:
+    """The way of a mesh to its least energy, with the derivative of where it ends."""
+
+    def __init__(
         self,
+        relaxation: Relaxation,
         problem: Problem,
-        moved: Array,
-        forces: Corotated,
-        cycle: LaplacianCycle,
-        given: Conditions,
-        tie: Callable[[Array], Array],
-        tick: Tick,
-    ) -> tuple[Array, float]:
-        """Return the relaxed displacement, and the last residual over the first."""
-        frame = self.body.frame
-        unknowns = _Unknowns.of(given)
-        start = points(frame, problem.coords + moved)
-        at = start
-        force = unknowns.collected(_force(forces, start))
-        along: Array = np.zeros_like(value(force))
-        before = value(force)
-        energies = list[float]()
-        for k in range(ITERATIONS):
-            tick(MAKING + (1.0 - MAKING) * k / (ITERATIONS + 1))
-            steep = unknowns.within(_preconditioned(cycle, -force))
-            energies.append(-_inner(force, steep))
-            if k:
-                last = max(energies[-2], 1e-300)
-                turned = max(0.0, (energies[-1] + _inner(before, steep)) / last)
-                steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
-            along = steep
-            before = value(force)
-            step = unknowns.moved(along * SIZE)
-            there = unknowns.collected(_force(forces, at + step))
-            size = partial(_size, _inner(along, force), _inner(along, there))
-            part = problem.choose(f"alpha {k}", size)
-            if problem.curved:
-                moved = moved + difference_from(frame, at, multiply(step, part))
-                moved = _slid(problem, moved, tie)
-                at = points(frame, problem.coords + moved)
-                force = unknowns.collected(_force(forces, at))
-            else:
-                at = at + multiply(step, part)
-                force = force + multiply(there - force, part)
-        if not problem.curved:
-            moved = _slid(problem, moved + difference_from(frame, start, at - start), tie)
-        residual = float(np.sqrt(max(0.0, energies[-1]) / max(energies[0], 1e-300)))
-        return moved, residual
+        displacement: FloatArray,
+        made: _Prepared,
+        unknowns: Unknowns,
+        walls: Walls,
+    ) -> None:
+        self._frame = relaxation.body.frame
+        self._energy = made.energy
+        self._cycle = made.cycle
+        self._walls = walls
+        self._extent = relaxation.mesh.extent
+        self._sliding = np.concatenate([problem.edge, problem.surface])
+        self._coords = value(problem.coords)
+        self._at = self._coords + displacement  # of sliding nodes as they are, of others at first
+        self._begin = self._frame.points(self._at)
+        self._start = displacement
+        self._unknowns = unknowns.on(walls.constraints, self._at)
+        self.curved = len(self._sliding) > 0 and (problem.curved or self._frame.cylindrical)
+        self._slid, self._leader = _copies(problem, self._sliding)
+        self._bends: FloatArray | None = None
+        count = len(unknowns.owner) * self._at.shape[1]
+        self._memory = Memory(count, self._preconditioned, PAIRS)
+        self.x = self._begin  # (n, d): Cartesian positions
+        self.iterations = 0
+        self.residual = 0.0
 
-    def _kept_part(
-        self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
-    ) -> FloatArray:
-        """Return the parts (n, 1) of the relaxation that make no cell worse.
+    def go(self, tick: Tick, residual: float) -> None:
+        """Go to the least energy, with regularisation as long as corners are folded."""
+        least = self._energy.slopes(self.x, 0.0, 1.0)[2]
+        folded = np.count_nonzero(least <= 0.0)
+        for _ in range(ROUNDS):
+            if least.min() > 0.0:
+                break
+            epsilon = float(np.hypot(1e-6, 0.2 * least.min()))
+            self._descend(tick, residual, 0.0, epsilon)
+            least = self._energy.slopes(self.x, 0.0, epsilon)[2]
+        if least.min() > 0.0:
+            self._descend(tick, NEAR, 0.0)
+            self._descend(tick, residual, WORST)
+        elif np.count_nonzero(least <= 0.0) > folded:
+            self._go_to(self._begin)
 
-        All of it if possible. Else the one with the best mean of `PARTS` of it everywhere, and of
-        parts that are smaller near the cells that would be worse; zero if none is better.
+    def frozen_walls(self, tick: Tick) -> Walls:
+        """Return the walls of sliding nodes, flat as they are where these come to lie."""
+        self.go(tick, CLOSE)
+        self.finish()
+        nodes = self._sliding
+        end = self._coords_of(self.x, nodes) - self._coords[nodes]
+        d = end.shape[1]
+        length = BEND * self._extent
+        matrix = np.empty((len(nodes), d, d))
+        for axis in range(d):
+            by = length * np.eye(d)[axis]
+            ahead = self._walls.project(self._coords, nodes, end + by)
+            behind = self._walls.project(self._coords, nodes, end - by)
+            matrix[:, :, axis] = (ahead - behind) / (2.0 * length)
+        size, vectors = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, 1, 2)))
+        free = np.where(size[:, None, :] > 0.5, vectors, 0.0)
+        row, column = np.nonzero(size <= 0.5)
+        others, normals = self._walls.constraints(self._at)
+        more = ~np.isin(others, nodes)
+        rows = (
+            np.concatenate([nodes[row], others[more]]),
+            np.concatenate([vectors[row, :, column], normals[more]]),
+        )
+        anchor = self._coords[nodes] + end
+        return Walls(partial(_given, rows), FlatWalls(anchor, free @ np.swapaxes(free, 1, 2)))
+
+    def finish(self) -> None:
+        """Go on by Newton's method, until rounding is all that moves."""
+        for _ in range(NEWTON):
+            right = self._collected(self._energy.slopes(self.x)[1])
+            step = self._unknowns.moved(self._solved(right, FORCING))
+            self._go_to(self._placed(self.x - step))
+            if np.abs(step).max() <= STILL * self._extent:
+                break
+
+    def _go_to(self, x: FloatArray) -> None:
+        """Take positions (n, d), and the directions in which nodes slide there."""
+        self.x = x
+        self._bends = None
+        if self.curved:
+            self._unknowns = self._unknowns_at(x)
+
+    def _unknowns_at(self, x: FloatArray) -> Unknowns:
+        self._at[self._slid] = self._coords_of(x, self._slid)
+        return self._unknowns.on(self._walls.constraints, self._at)
+
+    def _coords_of(self, x: FloatArray, nodes: IntArray) -> FloatArray:
+        """Return the coordinates (m, d) of nodes (m,) at positions x (n, d)."""
+        begin = self._begin[nodes]
+        by = self._frame.difference(begin, x[nodes] - begin)
+        return self._coords[nodes] + self._start[nodes] + by
+
+    def _descend(self, tick: Tick, residual: float, worst: float, epsilon: float = 0.0) -> None:
+        """Minimise the energy with one ``worst`` (kappa) and one regularisation of folded cells."""
+        now, slopes, _ = self._energy.slopes(self.x, worst, epsilon)
+        gradient = self._collected(slopes)
+        memory = self._memory
+        memory.change_function()
+
+        def along(step: FloatArray) -> tuple[float, FloatArray]:
+            there = self._placed(self.x + self._unknowns.moved(step))
+            energy, slopes, _ = self._energy.slopes(there, worst, epsilon)
+            return energy, self._collected(slopes)
+
+        nothing = AT_REST * self._energy.count
+        for k in range(UNFOLDING if epsilon else ITERATIONS):
+            tick(MAKING + (1.0 - MAKING) * k / (k + 10.0))
+            direction = -memory.inverse_times(gradient)
+            gain = -dot(gradient.ravel(), direction.ravel())
+            self.residual = float(np.sqrt(max(gain, 0.0) / max(now, nothing)))
+            if self.residual <= residual:
+                break
+            found = line_search(along, np.zeros_like(direction), now, direction, -gain, np.inf)
+            if found is None:
+                break
+            length, now, slopes = found
+            step = length * direction
+            self._go_to(self._placed(self.x + self._unknowns.moved(step)))
+            if self.curved:
+                slopes = self._unknowns.within(slopes)
+            memory.add(step, slopes - gradient, slopes)
+            gradient = slopes
+            self.iterations += 1
+
+    def _placed(self, x: FloatArray) -> FloatArray:
+        """Return positions (n, d), written over, with sliding nodes on their curved boundary."""
+        if self.curved:
+            nodes = self._sliding
+            by = self._coords_of(x, nodes) - self._coords[nodes]
+            on = self._walls.project(self._coords, nodes, by)
+            x[self._slid] = self._frame.points(self._coords[self._slid] + on[self._leader])
+        return x
+
+    def _collected(self, slopes: FloatArray) -> FloatArray:
+        return self._unknowns.within(self._unknowns.collected(slopes))
+
+    def _preconditioned(self, gradient: FloatArray) -> FloatArray:
+        within = self._unknowns.within
+        return within(self._cycle(within(gradient)))
+
+    def pushed(self, t: FloatArray) -> FloatArray:
+        """Return how positions at the least energy change as those at the start do by t (n, d)."""
+        known = np.where(self._unknowns.place[:, None] < 0, t, 0.0)
+        right = self._collected(self._energy.product(self.x, known))
+        return known - self._unknowns.moved(self._solved(right))
+
+    def pulled(self, g: FloatArray) -> FloatArray:
+        """Return the transpose of `pushed`, times g (n, d)."""
+        left = self._unknowns.moved(self._solved(self._collected(g)))
+        out = g - self._energy.product(self.x, left)
+        return np.where(self._unknowns.place[:, None] < 0, out, 0.0)
+
+    def _bent(self) -> FloatArray:
+        """Return how the slopes change as unknowns move along curved boundaries, (k, d, d).
+
+        With the projection P on the free directions of an unknown, which changes with its position,
+        and the gradient g, that is P dP g, by central differences.
         """
-        first = self._quality(problem, before)
-        n = len(self.mesh.points)
+        count = len(self._unknowns.owner)
+        d = self.x.shape[1]
+        out = np.zeros((count, d, d))
+        if not self.curved:
+            return out
+        slopes = self._energy.slopes(self.x)[1]
+        length = BEND * self._extent
+        for axis in range(d):
+            along = self._unknowns.moved(np.tile(length * np.eye(d)[axis], (count, 1)))
+            ahead = self._unknowns_at(self.x + along).collected(slopes)
+            behind = self._unknowns_at(self.x - along).collected(slopes)
+            out[:, :, axis] = self._unknowns.within((ahead - behind) / (2.0 * length))
+        return out
 
-        def tried(theta: FloatArray) -> tuple[np.ndarray, float]:
-            now = self._quality(problem, blended(problem, before, after, theta, tie))
-            return np.flatnonzero(spoiled(first, now)), now.mean
+    def _hessian(self, step: FloatArray) -> FloatArray:
+        """Return the Hessian of the unknowns times a step (k, d)."""
+        if self._bends is None:
+            self._bends = self._bent()
+        change = self._collected(self._energy.product(self.x, self._unknowns.moved(step)))
+        return change + np.einsum("kij,kj->ki", self._bends, self._unknowns.within(step))
 
-        found = [(first.mean, np.zeros((n, 1)))]
-        bad, mean = tried(np.ones((n, 1)))
-        if not len(bad):
-            return np.full((n, 1), float(mean >= first.mean))
-        graph = self._graph(problem, value(before), value(after))
-        for part in PARTS:
-            worse, mean = tried(np.full((n, 1), part))
-            if not len(worse):
-                found.append((mean, np.full((n, 1), part)))
-        for strain in STRAINS:
-            found += self._held_back(graph, strain, bad, tried)
-        return max(found, key=lambda each: each[0])[1]
-
-    def _held_back(
-        self,
-        graph: csr_array,
-        strain: float,
-        bad: np.ndarray,
-        tried: Callable[[FloatArray], tuple[np.ndarray, float]],
-    ) -> Iterator[tuple[float, FloatArray]]:
-        """Yield the mean quality, and the parts (n, 1) that make no cell worse; nothing if none do.
-
-        At worse cells (``bad``; ``tried`` returns those of a part, and the mean) the part is
-        halved, up to zero, and grows from there as far as that strains cells by ``strain``.
-        """
-        theta = np.ones(graph.shape[0])
-        cap = np.full(graph.shape[0], np.inf)
-        for k in range(1, TRIES):
-            nodes = np.unique(self.domain.cells.take(bad).nodes)
-            cap[nodes] = np.where(theta[nodes] > LEAST, 0.5 * theta[nodes], 0.0)
-            apart = SLOWER**k * np.clip(strain * graph.data, TINY, 2.0)
-            theta = _grown(csr_array((apart, graph.indices, graph.indptr), graph.shape), cap)
-            bad, mean = tried(theta[:, None])
-            if not len(bad):
-                yield mean, theta[:, None]
-                return
-
-    def _graph(self, problem: Problem, before: FloatArray, after: FloatArray) -> csr_array:
-        """Return the length of each edge of the mesh over how far its nodes are relaxed, (n, n)."""
-        frame = self.body.frame
-        n = len(self.mesh.points)
-        coords = value(problem.coords)
-        shift = frame.points(coords + after) - frame.points(coords + before)
-        size = np.linalg.norm(shift, axis=1)
-        pairs = [
-            nodes[:, ELEMENTS[vtk].edges].reshape(-1, 2)
-            for vtk, (_, nodes) in self.domain.cells.by_type.items()
-        ]
-        low, high = np.sort(np.concatenate(pairs), axis=1).T
-        ends = np.stack(np.divmod(np.unique(low * n + high), n), axis=1)
-        length = np.linalg.norm(np.diff(self.mesh.points[ends], axis=1)[:, 0], axis=1)
-        far = np.maximum(size[ends].max(axis=1), TINY * length + 1e-300)
-        images = np.flatnonzero(problem.same_as != np.arange(n))
-        rows = np.concatenate([ends[:, 0], images])
-        columns = np.concatenate([ends[:, 1], problem.same_as[images]])
-        apart = np.concatenate([length / far, np.zeros(len(images))])
-        return csr_array((apart, (rows, columns)), shape=(n, n))
-
-    def _quality(self, problem: Problem, displacement: Array) -> Quality:
-        at = self.body.frame.points(value(problem.coords) + value(displacement))
-        return quality(self.domain.with_points(sealed(at)), self.domain, self.metric)
+    def _solved(self, right: FloatArray, residual: float = SOLVED) -> FloatArray:
+        """Return the solution (k, d) of the Hessian of the unknowns, by conjugate gradients."""
+        found = np.zeros_like(right)
+        left = right.copy()
+        steep = self._preconditioned(left)
+        along = steep
+        size = dot(left.ravel(), steep.ravel())
+        first = size
+        for _ in range(PRODUCTS):
+            if size <= residual**2 * first:
+                return found
+            change = self._hessian(along)
+            length = size / dot(along.ravel(), change.ravel())
+            found += length * along
+            left -= length * change
+            steep = self._preconditioned(left)
+            before = size
+            size = dot(left.ravel(), steep.ravel())
+            along = steep + size / before * along
+        raise DeformError("the derivative of the relaxed mesh does not converge; use RELAX= NO")
 
 
-def _grown(graph: csr_array, cap: FloatArray) -> FloatArray:
-    """Return the largest parts (n,), up to 1, below ``cap`` (n,) that grow as the graph allows."""
-    rows = np.flatnonzero(np.isfinite(cap))
-    n = len(cap)
-    to = csr_array((np.maximum(cap[rows], TINY), (np.zeros(len(rows), int), rows)), shape=(1, n))
-    whole = csr_array(block_array([[graph, None], [to, csr_array((1, 1))]], format="csr"))
-    far = dijkstra(whole, directed=False, indices=np.array([n]), limit=1.0)[0, :n]  # type: ignore[arg-type]
-    return np.where(far > LEAST / 4, np.minimum(far, 1.0), 0.0)
+def _residual(cells: int) -> float:
+    return float(np.clip(RESIDUAL * np.sqrt(cells / SMALL), RESIDUAL, LOOSE))
 
 
-def blended(
-    problem: Problem, before: Array, after: Array, theta: FloatArray, tie: Callable[[Array], Array]
-) -> Array:
-    """Return the displacement that is the parts (n, 1) of the way from ``before`` to ``after``."""
-    if (theta == 1.0).all() or (theta == 0.0).all():
-        return after if theta.all() else before
-    return _slid(problem, before + multiply(after - before, theta), tie)
-
-
-def spoiled(before: Quality, after: Quality) -> np.ndarray:
-    """Return which cells (c,) are worse than before by the rules of the safeguard.
-
-    They are inverted or unproved and were not, or their quality is below `WORSE` times the lowest
-    before, and `ENOUGH`.
-    """
-    low = min(WORSE * before.min, ENOUGH)
-    bad = (after.status != VALID) & (before.status == VALID)
-    bad |= (after.status == INVERTED) & (before.status != INVERTED)
-    return np.asarray(bad | (after.values < low))
-
-
-def _held(free: FloatArray) -> np.ndarray:
-    """Return which components (k, d) stay zero where unknowns are free as projections (k, d, d).
+def _held(axes: FloatArray, unknowns: Unknowns) -> np.ndarray:
+    """Return which components (k, d), along ``axes`` (d, d) or (k, d, d), stay zero.
 
     As many as are not free, those along which an unknown moves least.
     """
+    out = np.zeros((len(unknowns.owner), axes.shape[-1]), bool)
+    axes = axes[unknowns.blocks] if axes.ndim == 3 else axes
+    free = axes @ unknowns.free @ np.swapaxes(axes, -1, -2)
     along = np.einsum("kii->ki", free)
     count = np.rint(along.sum(axis=1)).astype(int)
     rank = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1, kind="stable")
-    return np.asarray(rank >= count[:, None])
+    out[unknowns.blocks] = rank >= count[:, None]
+    return out
+
+
+def _copies(problem: Problem, nodes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the nodes (m,) that coincide with nodes (q,) or are their images, and which (m,)."""
+    row = np.full(len(problem.same_as), -1)
+    row[problem.same_as[nodes]] = np.arange(len(nodes))
+    leader = row[problem.same_as]
+    copies = np.flatnonzero(leader >= 0)
+    return copies, leader[copies]
 
 
 def _slid(problem: Problem, displacement: Array, tie: Callable[[Array], Array]) -> Array:
@@ -330,80 +440,70 @@ def _slid(problem: Problem, displacement: Array, tie: Callable[[Array], Array]) 
     return tie(put(displacement, sliding, on))
 
 
-def _force(forces: Corotated, at: Array) -> Array:
-    """Return the forces (n, d) on all nodes."""
-    x = value(at)
-    turns = forces.rotations(x)
-    return recorded(
-        forces.forces(x, turns),
-        (
-            at,
-            partial(each_of, lambda t: forces.pushed(x, t, turns)),
-            partial(each_of, lambda g: forces.pulled(x, g, turns)),
-        ),
-    )
-
-
-def _preconditioned(cycle: LaplacianCycle, right: Array) -> Array:
-    apply = partial(each_of, cycle)
-    return recorded(apply(value(right)), (right, apply, apply))
-
-
-def _inner(a: Array, b: Array) -> float:
-    """Return the sum of all products, with the same bits for any number of threads."""
-    return float((value(a) * value(b)).sum())
-
-
-def _one(number: float) -> FloatArray:
-    return np.array([[number]])
-
-
-def _size(slope: float, there: float) -> FloatArray:
-    """Return the part of a step to the least energy, whose slope is as given before and after it.
-
-    (1, 1); all of it where the energy is not convex along the step.
-    """
-    return _one(slope / (slope - there) if slope < min(there, 0.0) else 1.0)
-
-
 @dataclass(frozen=True, eq=False)
-class _Unknowns:
-    """Maps between unknowns (k, d) and vectors of nodes (n, d), as conditions have them."""
+class Unknowns:
+    """Maps between unknowns (k, d) and vectors of nodes (n, d).
 
-    conditions: Conditions
+    Each block of unknowns is the displacement of a node; those that coincide with it, and periodic
+    images, have the same one, turned.
+    """
+
+    problem: Problem
+    body: Body
+    place: IntArray  # (n,): number of each node's block; -1 for known nodes
     inside: IntArray  # nodes with unknowns
-    owner: IntArray  # (k,): a node of each block of unknowns
-    others: IntArray  # further nodes with the same unknowns as another
+    owner: IntArray  # (k,): the node of each block
+    others: IntArray  # further nodes with the block of another
     turned: IntArray
-    held: IntArray
-    """`turned`, `held`: nodes whose displacement is not just their unknowns, and blocks that are
-    not free in all directions."""
+    turn: FloatArray  # `turned`, `turn` (t,), (t, d, d): nodes that are turned, and how
+    rows: HeldRows
+    blocks: IntArray
+    free: FloatArray
+    """`blocks`, `free` (h,), (h, d, d): those that are not free in all directions, and the
+    projections on the directions in which they are."""
 
     @classmethod
-    def of(cls, given: Conditions) -> _Unknowns:
-        inside = np.flatnonzero(given.place >= 0)
-        owner = np.zeros(len(given.free), np.int64)
-        owner[given.place[inside[::-1]]] = inside[::-1]
-        others = inside[owner[given.place[inside]] != inside]
-        plain = np.all(given.free == np.eye(given.free.shape[1]), axis=(1, 2))
-        turned = inside[~given.plain[inside]]
-        return cls(given, inside, owner, others, turned, np.flatnonzero(~plain))
+    def of(cls, problem: Problem, body: Body, held: IntArray) -> Unknowns:
+        """Return the unknowns where nodes ``held`` (m,) stay, all of them free."""
+        place, turn = unknowns(problem, body, np.unique(problem.same_as[held]))
+        inside = np.flatnonzero(place >= 0)
+        owner = np.zeros(int(place.max(initial=-1)) + 1, np.int64)
+        owner[place[inside[::-1]]] = inside[::-1]
+        others = inside[owner[place[inside]] != inside]
+        turned = inside[~np.all(turn[inside] == np.eye(turn.shape[1]), axis=(1, 2))]
+        rows = held_rows(problem, body, place)
+        none = np.empty(0, np.int64)
+        return cls(
+            problem, body, place, inside, owner, others, turned, turn[turned], rows, none, turn[:0]
+        )
 
-    def within(self, unknown: Array) -> Array:
+    def on(self, constraints: Constraints, at: FloatArray) -> Unknowns:
+        """Return the unknowns of sliding nodes at coordinates (n, d)."""
+        nodes, normals = constraints(at)
+        there = replace(self.problem, coords=at, normal_nodes=nodes, normals=normals)
+        rows = self.rows
+        if not np.array_equal(nodes, self.problem.normal_nodes):
+            rows = held_rows(there, self.body, self.place)
+        blocks, free = projections(there, self.body, rows)
+        return replace(self, problem=there, rows=rows, blocks=blocks, free=free)
+
+    def within(self, unknown: FloatArray) -> FloatArray:
         """Return unknowns (k, d) without their part in directions that are held."""
-        free = transform(self.conditions.free[self.held], take(unknown, self.held))
-        return put(unknown, self.held, free)
+        out = unknown.copy()
+        out[self.blocks] = np.einsum("kij,kj->ki", self.free, unknown[self.blocks])
+        return out
 
-    def moved(self, unknown: Array) -> Array:
+    def moved(self, unknown: FloatArray) -> FloatArray:
         """Return the Cartesian displacement (n, d) of unknowns (k, d); zero for known nodes."""
-        given = self.conditions
-        nothing = np.zeros_like(given.known)
-        out = put(nothing, self.inside, take(unknown, given.place[self.inside]), overwrite=True)
-        return put(out, self.turned, transform(given.turn[self.turned], take(out, self.turned)))
+        out = np.zeros((len(self.place), unknown.shape[1]))
+        out[self.inside] = self.within(unknown)[self.place[self.inside]]
+        out[self.turned] = np.einsum("nij,nj->ni", self.turn, out[self.turned])
+        return out
 
-    def collected(self, forces: Array) -> Array:
-        """Return the forces (k, d) on the unknowns, of forces (n, d) on nodes."""
-        given = self.conditions
-        back = np.swapaxes(given.turn[self.turned], 1, 2)
-        forces = put(forces, self.turned, transform(back, take(forces, self.turned)))
-        return add_at(take(forces, self.owner), given.place[self.others], take(forces, self.others))
+    def collected(self, slopes: FloatArray) -> FloatArray:
+        """Return the slopes (k, d) by the unknowns, of slopes (n, d) by the nodes."""
+        own = slopes.copy()
+        own[self.turned] = np.einsum("nji,nj->ni", self.turn, slopes[self.turned])
+        out = own[self.owner]
+        np.add.at(out, self.place[self.others], own[self.others])
+        return self.within(out)

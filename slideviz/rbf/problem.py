@@ -191,9 +191,7 @@ class Relaxed:
     """How a step was relaxed (`slideviz.elastic.relaxation`)."""
 
     rounds: int  # iterations
-    residual: float  # last residual over the first, in the norm of the preconditioner
-    theta: float  # the smallest part of the relaxation that the safeguard left anywhere, 0 to 1
-    limited: int  # nodes where it left less than all
+    residual: float  # the root of twice the energy that was left to gain, over the energy
 
     @classmethod
     def joined(cls, several: Sequence[Relaxed]) -> Relaxed | None:
@@ -203,8 +201,6 @@ class Relaxed:
         return cls(
             sum(one.rounds for one in several),
             max(one.residual for one in several),
-            min(one.theta for one in several),
-            max(one.limited for one in several),
         )
 
 

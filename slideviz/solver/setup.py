@@ -191,8 +191,7 @@ class Setup(Domain):
     def at_step(self, is_last: bool) -> Setup:
         """Return the setup of a step: only the last one is relaxed.
 
-        So relaxation starts from what radial functions make of all steps, and its safeguard holds
-        for the result: over several relaxed steps small losses of the worst cells would add up.
+        Where its energy is least does not depend on the way, so relaxing once is enough.
         """
         return self if is_last or self.relaxation is None else replace(self, relaxation=None)
 
@@ -417,7 +416,7 @@ def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Rel
     from slideviz.elastic.relaxation import Relaxation
 
     body = elastic_body(mesh, frame, axis)
-    return Relaxation(mesh, without_halo(mesh)[0], body, case.quality_metric)
+    return Relaxation(mesh, without_halo(mesh)[0], body)
 
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:

@@ -310,7 +310,7 @@ def one_step(
     relaxed = None
     if setup.relaxation is not None:
         displacement, relaxed = setup.relaxation.relaxed(
-            problem, displacement, setup.rigid, setup.constraints, tie, timer
+            problem, displacement, setup.rigid, setup.constraints, setup.project, tie, timer
         )
     return replace(solution, displacement=displacement, relaxed=relaxed)
 
@@ -442,9 +442,6 @@ def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Findi
     others: list[Remark] = [f"step {step.index}: {text}" for text in solution.warnings]
     if step.repaired is not None:
         others += step.repaired.warnings
-    if solution.relaxed is not None and solution.relaxed.limited:
-        nodes = len(step.mesh.points)
-        others.append(_limited_note(solution.relaxed.limited, nodes, step.index))
     return _Finding(
         index=step.index,
         condition=solution.condition,
@@ -488,13 +485,6 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
         f"error of {solution.max_error:.3g}, above its tolerance of "
         f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
         "their displacement, but the mesh near them follows only through the correction"
-    )
-
-
-def _limited_note(limited: int, nodes: int, index: int) -> Message:
-    return note(
-        f"step {index}: the relaxation was held back at {limited} of {nodes} nodes, where it would "
-        f"have made the worst cells worse{'; more STEPS may help' if index == 1 else ''}"
     )
 
 

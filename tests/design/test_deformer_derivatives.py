@@ -118,9 +118,7 @@ def test_flat_boundaries(frame, method, dim, steps, reduction):
 
 def check_relaxed(case, mesh):
     """As ``check``, of a deformer that relaxes; every design alone gives the bits of several."""
-    deformer = check(case.change(relax="yes"), mesh)
-    theta = deformer._steps[-1].choices.items.get("theta")
-    assert theta is None or theta.any()  # None: a mesh without free nodes is not relaxed
+    deformer = check(case.change(relax="yes"), mesh, 1e-2)
     designs = np.stack([deformer.displacement, 0.7 * deformer.displacement])
     np.testing.assert_array_equal(
         pickle.loads(pickle.dumps(deformer)).deform(designs),
@@ -241,15 +239,13 @@ def test_relaxation_with_halo_layers(tmp_path, name, layers):
     check_relaxed(case, mesh)
 
 
-def test_relaxation_that_is_held_back_at_some_nodes():
+def test_relaxation_of_a_severe_motion():
     mesh = builders.airfoil(40, 10, 1e-3)
     motion = (Rotate("airfoil", 60.0, (0.5, 0.0)), Translate("airfoil", (0.02, 0.1)))
-    deformer = check_relaxed(Case(roles={"airfoil": "moving"}, motions=motion), mesh)
-    theta = deformer._steps[-1].choices.items["theta"]
-    assert len(np.unique(theta)) > 2
+    check_relaxed(Case(roles={"airfoil": "moving"}, motions=motion), mesh)
 
 
-def test_a_deformer_made_at_rest_relaxes_by_the_steps_of_its_next_design():
+def test_a_deformer_made_at_rest_relaxes():
     mesh = builders.airfoil(40, 10, 1e-3)
     case = Case(roles={"airfoil": "moving"}, motions=(Rotate("airfoil", 10.0, (0.5, 0.0)),))
     turned = sv.Deformer(mesh, case).displacement
@@ -265,8 +261,7 @@ def test_a_deformer_made_at_rest_relaxes_by_the_steps_of_its_next_design():
     change = relaxed.deform(1e-4 * turned) - relaxed.deform(-1e-4 * turned)
     np.testing.assert_allclose(forward, change / 2e-4, rtol=0, atol=1e-6)
     alone = sv.Deformer(mesh, case.change(relax="yes"), designs[0])
-    assert alone.deform(turned).tobytes() == sv.Deformer(mesh, case).deform(turned).tobytes()
-    assert any("the reference has no displacement" in text for text in alone.warnings)
+    np.testing.assert_allclose(alone.deform(turned), relaxed.deform(turned), rtol=0, atol=1e-12)
 
 
 def test_every_way_of_sliding_has_a_function():

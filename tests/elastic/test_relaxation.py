@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 from dataclasses import replace
 
 import numba
@@ -15,10 +16,10 @@ from threadpoolctl import threadpool_limits
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.elastic import relaxation
-from slideviz.elastic.corotated import Corotated
+from slideviz.elastic.distortion import Distortion
 from slideviz.elastic.laplacian import PART, LaplacianCycle, laplacian
-from slideviz.elastic.stiffness import blocks
 from slideviz.errors import DeformError
+from slideviz.mesh.jacobians import CORNERS
 from slideviz.session.opening import guess_case, guess_roles
 from slideviz.solver.setup import RELAXED_CELLS
 from tests import builders
@@ -50,8 +51,8 @@ def test_cells_go_back_to_their_shapes():
     found = [sv.quality(step.mesh, mesh).mean for step in (plain, relaxed)]
     assert found[1] > found[0] + 0.004
     assert plain.relaxed is None
-    assert relaxed.relaxed.theta > 0.0
-    assert 0.0 < relaxed.relaxed.residual < 0.2
+    assert 0.0 < relaxed.relaxed.residual <= relaxation.RESIDUAL
+    assert relaxed.relaxed.rounds < 40
 
 
 def test_a_turned_mesh_is_at_rest():
@@ -73,7 +74,6 @@ def test_a_turned_mesh_is_at_rest():
 def test_sliding_nodes_stay_on_curved_walls_and_images_together():
     mesh, case = passage(relax="yes")
     step = last(case, mesh)
-    assert step.relaxed.theta > 0.0
     r = np.linalg.norm(step.mesh.points[:, :2], axis=1)
     start = np.linalg.norm(mesh.points[:, :2], axis=1)
     plain = np.linalg.norm(last(case.change(relax="no"), mesh).mesh.points[:, :2], axis=1)
@@ -95,19 +95,14 @@ def test_a_cell_without_area_does_not_stop_the_others():
     points[two], points[three] = points[one], points[four]
     flat = mesh.with_points(points)
     before, after = (last(case.change(relax=relax), flat) for relax in ("no", "yes"))
-    assert 0.0 < after.relaxed.residual < 0.2
+    assert 0.0 < after.relaxed.residual <= relaxation.RESIDUAL
     assert sv.quality(after.mesh, flat).mean > sv.quality(before.mesh, flat).mean
 
 
 @pytest.mark.parametrize("sliding", ["ps", "ds"])
 @pytest.mark.parametrize("steps", [1, 3])
-@pytest.mark.parametrize("held_back", [False, True])
-def test_sliding_nodes_are_on_the_facets_of_their_curved_wall(
-    sliding, steps, held_back, monkeypatch
-):
-    mesh, part = builders.annulus(24, 5), np.linspace(0.3, 1.0, 144)[:, None]
-    if held_back:
-        monkeypatch.setattr(relaxation.Relaxation, "_kept_part", lambda *_: part)
+def test_sliding_nodes_are_on_the_facets_of_their_curved_wall(sliding, steps):
+    mesh = builders.annulus(24, 5)
     motions = (sv.Rotate("wall", 20.0, (0.1, 0.0)),)
     case = sv.Case(roles={"wall": "moving", "far0": "sliding"}, motions=motions, sliding=sliding)
     plain, relaxed = (
@@ -163,7 +158,7 @@ def test_the_bits_do_not_depend_on_threads_nor_on_what_was_kept(monkeypatch):
 
 def test_the_preconditioner_is_symmetric_positive_and_holds_components():
     mesh = builders.grid((20, 20))
-    body, place = Corotated.of(mesh.points, blocks(mesh.cells)), np.arange(len(mesh.points))
+    body, place = Distortion.of(mesh.points, mesh.cells), np.arange(len(mesh.points))
     place[mesh.marker("x_m").nodes] = -1
     place[place >= 0] = np.arange((place >= 0).sum())
     count = int(place.max()) + 1
@@ -182,21 +177,23 @@ def test_the_preconditioner_is_symmetric_positive_and_holds_components():
 
 
 @pytest.mark.parametrize("kind", ["plain", "prism", "pyramid", "tetra"])
-def test_the_laplacian_is_the_sum_of_that_of_its_elements(kind):
+def test_the_laplacian_is_the_sum_over_corners(kind):
     mesh = builders.cube(3, kind)
-    body = Corotated.of(mesh.points, blocks(mesh.cells))
+    body = Distortion.of(mesh.points, mesh.cells)
     place = np.arange(len(mesh.points)) // 2 - 3  # images in and across elements, known nodes
     count = int(place.max()) + 1
     place[:6], dense = -1, np.zeros((count, count))
-    for part, modulus in zip(body.parts, body.moduli, strict=True):
-        shape = part.shape
-        for nodes, stiff in zip(part.nodes, modulus, strict=True):
-            for slopes, weight in zip(shape.gradients, shape.weights, strict=True):
-                jacobian = slopes.T @ mesh.points[nodes]
-                real = np.linalg.solve(jacobian, slopes.T)
-                one = stiff * weight * abs(np.linalg.det(jacobian)) * real.T @ real
-                at = place[nodes]
-                use = np.ix_(at >= 0, at >= 0)
+    for part in body.parts:
+        for nodes, coupling in zip(part.nodes, part.coupling, strict=True):
+            table = CORNERS[part.vtk]
+            at = place[nodes]
+            use = np.ix_(at >= 0, at >= 0)
+            for o, *others in table:
+                edges = mesh.points[nodes[others]] - mesh.points[nodes[o]]
+                slopes = np.zeros((3, len(nodes)))
+                slopes[:, others] = np.linalg.inv(edges)
+                slopes[:, o] = -slopes.sum(axis=1)
+                one = (1.0 + coupling) / len(table) * slopes.T @ slopes
                 np.add.at(dense, np.ix_(at[at >= 0], at[at >= 0]), one[use])
     indptr, indices, data = laplacian(body, place, count)
     assert all(np.all(np.diff(indices[a:b]) > 0) for a, b in itertools.pairwise(indptr))
@@ -207,7 +204,7 @@ def test_the_laplacian_is_the_sum_of_that_of_its_elements(kind):
 
 def test_the_cycle_in_several_parts_is_symmetric_with_the_same_bits_for_any_threads(monkeypatch):
     monkeypatch.setattr("slideviz.rbf.compiled.SMALL", 0)
-    body = Corotated.of((mesh := builders.grid((100, 100))).points, blocks(mesh.cells))
+    body = Distortion.of((mesh := builders.grid((200, 200))).points, mesh.cells)
     place = np.arange(len(mesh.points))
     held = np.zeros((len(place), 2), bool)
     held[mesh.marker("x_m").nodes], held[mesh.marker("y_m").nodes, 1] = True, True
@@ -235,46 +232,6 @@ def test_the_cycle_in_several_parts_is_symmetric_with_the_same_bits_for_any_thre
         with threadpool_limits(threads, "blas"):
             other = LaplacianCycle.of(body, place, held, np.eye(2))(v)
         np.testing.assert_array_equal(other, alone)
-
-
-def test_the_safeguard_keeps_the_worst_cells(monkeypatch):
-    mesh, case = airfoil(60.0)
-    plain = sv.quality(last(case, mesh).mesh, mesh)
-    step = last(case.change(relax="yes"), mesh)
-    after = sv.quality(step.mesh, mesh)
-    assert not relaxation.spoiled(plain, after).any()
-    assert plain.mean <= after.mean
-    monkeypatch.setattr(relaxation, "spoiled", lambda _, after: np.ones(len(after), bool))
-    step = last(case.change(relax="yes"), mesh)
-    np.testing.assert_array_equal(step.mesh.points, last(case, mesh).mesh.points)
-    assert step.relaxed.theta == 0.0
-    assert any("relaxation was held back" in text for text in step.warnings)
-
-
-def test_the_best_part_of_the_relaxation_that_spoils_no_cell_is_kept(monkeypatch):
-    mesh, case = airfoil(100.0, relax="yes")
-
-    def mean(strains, parts):
-        monkeypatch.setattr(relaxation, "STRAINS", strains)
-        monkeypatch.setattr(relaxation, "PARTS", parts)
-        step = last(case, mesh)
-        return sv.quality(step.mesh, mesh).mean, step.relaxed.theta
-
-    plain = sv.quality(last(case.change(relax="no"), mesh).mesh, mesh).mean
-    assert mean((), ()) == (plain, 0.0)
-    uniform, theta = mean((), (0.5, 0.25))  # half of it inverts a cell
-    assert theta == 0.25
-    best, slow = mean((0.6,), ())[0], mean((0.15,), ())[0]
-    assert plain + 0.01 < uniform < slow - 0.01 < best - 0.02
-    for strains, parts in (((0.6, 0.15), (0.25,)), ((0.15, 0.6), (0.25, 0.5))):
-        assert mean(strains, parts)[0] == best
-
-
-@pytest.mark.parametrize(("steps", "advised"), [(1, True), (3, False)])
-def test_more_steps_are_advised_only_where_they_may_help(steps, advised):
-    mesh, case = airfoil(100.0, relax="yes", steps=steps)
-    (note,) = (text for text in last(case, mesh).warnings if "was held back" in text)
-    assert ("more STEPS may help" in note) == advised
 
 
 def test_automatic_steps_are_chosen_before_relaxation(monkeypatch):
@@ -312,9 +269,9 @@ def test_the_report_says_how_the_mesh_was_relaxed(tmp_path, capsys):
     case.write(tmp_path / "c.cfg")
     assert "RELAX= yes" in (tmp_path / "c.cfg").read_text()
     assert run(["run", str(tmp_path / "c.cfg"), "--json", str(tmp_path / "r.json")]) == 0
-    assert f"{relaxation.ITERATIONS} rounds, residual" in capsys.readouterr().out
+    assert re.search(r"relaxation +\d+ iterations, to 0\.00", capsys.readouterr().out)
     report = json.loads((tmp_path / "r.json").read_text())["relax"]
-    assert set(report) == {"rounds", "residual", "theta", "limited"}
+    assert set(report) == {"rounds", "residual"}
 
 
 def test_relaxation_asks_for_memory_before_it_begins(monkeypatch):

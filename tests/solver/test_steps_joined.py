@@ -38,7 +38,7 @@ def test_every_field_of_a_step_survives_joining(tmp_path):
             tolerance=0.1 * k,
             layers=0.2 * k,
             part=0.5,
-            relaxed=Relaxed(k, 0.1 * k, 0.2 * k, k),
+            relaxed=Relaxed(k, 0.1 * k),
             repaired=replace(found, cells=np.array([k]), mesh=part.mesh),
             kept_layers=KeptLayers(((("BLOCK",), 0.1),), k),
             safe=SafeFraction(1.0 / k, cell=3),
@@ -58,7 +58,7 @@ def test_every_field_of_a_step_survives_joining(tmp_path):
     assert (done.history, done.tried, done.candidates) == ((1, 2), (1, 2), 3)
     assert done.control.tolist() == [1, 2 + points]
     assert (done.condition, done.tolerance, done.layers) == (20.0, 0.2, 0.4)
-    assert done.relaxed == Relaxed(3, 0.2, 0.2, 2)
+    assert done.relaxed == Relaxed(3, 0.2)
     assert done.repaired.cells.tolist() == [1, 2 + cells]
     assert done.kept_layers == KeptLayers(((("1:BLOCK",), 0.1), (("2:BLOCK",), 0.1)), 3)
     assert done.safe == SafeFraction(0.5, cell=3 + cells, zone=2)

@@ -17,6 +17,8 @@ WOLFE = 0.9
 """A step must bring this part of the decrease that the slope promises, and leave at most this part
 of the slope."""
 
+SHORTER = 0.25  # part of the interval that is tried after a step to where the value is infinite
+
 TRIES = 30  # most evaluations of a line search
 
 WINDOW = 10  # iterations over which the decrease of the value is looked at
@@ -46,15 +48,17 @@ def _add(factor, a, out):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _first_loop(steps, changes, products, order, out, factors):  # type: ignore[no-untyped-def]
-    """Take the newest pairs first from ``out`` (n,), with ``factors`` (c,): Nocedal's first loop.
+def _first_loop(steps, changes, smoothed, products, order, left, out, factors):  # type: ignore[no-untyped-def]
+    """Take the newest pairs first from ``left`` (n,), with ``factors`` (c,): Nocedal's first loop.
 
-    ``steps`` and ``changes`` are (c, n), ``products`` (c,); ``order`` (k,) has the oldest first.
+    And from ``out`` (n,), the preconditioned gradient. ``steps``, ``changes`` and ``smoothed`` are
+    (c, n), ``products`` (c,); ``order`` (k,) has the oldest first.
     """
     for i in range(len(order) - 1, -1, -1):
         k = order[i]
-        factors[k] = dot(steps[k], out) / products[k]
-        _add(-factors[k], changes[k], out)
+        factors[k] = dot(steps[k], left) / products[k]
+        _add(-factors[k], changes[k], left)
+        _add(-factors[k], smoothed[k], out)
 
 
 @njit(nogil=True, cache=True)
@@ -64,14 +68,24 @@ def _second_loop(steps, changes, products, order, out, factors):  # type: ignore
 
 
 class Memory:
-    """The last pairs of steps and changes of the gradient, and the inverse Hessian by them."""
+    """The last pairs of steps and changes of the gradient, and the inverse Hessian by them.
 
-    def __init__(self, count: int, precondition: Callable[[FloatArray], FloatArray]) -> None:
+    The preconditioner is linear: what it makes of a change is the difference of what it made of two
+    gradients, so that it is called once a gradient.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        precondition: Callable[[FloatArray], FloatArray],
+        pairs: int = CORRECTIONS,
+    ) -> None:
         self._precondition = precondition
-        self._steps, self._changes = np.empty((2, CORRECTIONS, count))
-        self._products, self._factors = np.empty((2, CORRECTIONS))
+        self._steps, self._changes, self._smoothed = np.empty((3, pairs, count))
+        self._products, self._factors = np.empty((2, pairs))
         self._order = np.empty(0, np.int64)
         self._scale = 1.0
+        self._before: FloatArray | None = None  # the last preconditioned gradient
 
     def __len__(self) -> int:
         return len(self._order)
@@ -80,26 +94,42 @@ class Memory:
         """Forget all pairs."""
         self._order = self._order[:0]
         self._scale = 1.0
+        self._before = None
 
-    def add(self, step: FloatArray, change: FloatArray) -> None:
-        """Take a pair (b, d), (b, d), in place of the oldest; none without positive curvature."""
+    def change_function(self) -> None:
+        """Keep the pairs for another function, whose Hessian is much the same."""
+        self._before = None
+
+    def add(self, step: FloatArray, change: FloatArray, gradient: FloatArray) -> None:
+        """Take a pair (b, d), (b, d), in place of the oldest; none without positive curvature.
+
+        ``gradient`` (b, d): after the step.
+        """
+        before = self._before
+        smooth = self._before = self._precondition(gradient)
         product = dot(step.ravel(), change.ravel())
-        if product > 0:
-            full = len(self) == CORRECTIONS
+        if product > 0 and before is not None:
+            full = len(self) == len(self._products)
             k = self._order[0] if full else len(self)
             self._order = np.append(self._order[1:] if full else self._order, k)
             self._steps[k] = step.ravel()
             self._changes[k] = change.ravel()
+            self._smoothed[k] = (smooth - before).ravel()
             self._products[k] = product
-            self._scale = product / dot(change.ravel(), self._precondition(change).ravel())
+            self._scale = product / dot(self._changes[k], self._smoothed[k])
 
     def inverse_times(self, gradient: FloatArray) -> FloatArray:
-        """Return the inverse Hessian times a gradient (b, d)."""
-        pairs = (self._steps, self._changes, self._products, self._order)
-        out = gradient.copy()
-        _first_loop(*pairs, out.ravel(), self._factors)
-        out = self._scale * self._precondition(out)
-        _second_loop(*pairs, out.ravel(), self._factors)
+        """Return the inverse Hessian times a gradient (b, d), that of the last pair."""
+        if self._before is None:
+            self._before = self._precondition(gradient)
+        left = gradient.ravel().copy()
+        out = self._before.copy()
+        smoothed = out.ravel()
+        pairs = self._steps, self._changes
+        last = self._products, self._order
+        _first_loop(*pairs, self._smoothed, *last, left, smoothed, self._factors)
+        smoothed *= self._scale
+        _second_loop(*pairs, *last, smoothed, self._factors)
         return out
 
 
@@ -135,7 +165,7 @@ def descend(
             if not slope < 0:
                 break
         most = longest(x, direction)
-        step = _search(function, x, value, direction, slope, most)
+        step = line_search(function, x, value, direction, slope, most)
         if step is None:
             if not len(memory):
                 break
@@ -143,7 +173,7 @@ def descend(
             continue
         length, new_value, new_gradient = step
         s = length * direction
-        memory.add(s, new_gradient - gradient)
+        memory.add(s, new_gradient - gradient, new_gradient)
         x = x + s
         value = new_value
         gradient = new_gradient
@@ -154,7 +184,7 @@ def descend(
     return x
 
 
-def _search(
+def line_search(
     function: Function,
     x: FloatArray,
     value: float,
@@ -179,7 +209,8 @@ def _search(
             if step >= most or dot(gradient.ravel(), direction.ravel()) >= WOLFE * slope:
                 break
             low = step
-        step = 0.5 * (low + high) if high < np.inf else 2.0 * step
+        part = 0.5 if new_value < np.inf else SHORTER
+        step = low + part * (high - low) if high < np.inf else 2.0 * step
         if best is not None and high - low < 1e-3 * high:
             break
     return best
