@@ -1031,6 +1031,7 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
         dialog.width_px.setValue(1280)
         dialog.height_px.setValue(800)
         dialog.background.show_value("transparent")
+        dialog.accept()
         return dialog.DialogCode.Accepted
 
     monkeypatch.setattr(PictureDialog, "exec", accept)
