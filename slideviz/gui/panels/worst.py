@@ -169,14 +169,19 @@ def columns_of(worst: WorstCells, around: Pair | None) -> list[Column]:
     return columns
 
 
+NONE = np.empty(0, np.int64)
+EMPTY = [Column(title, "", _RIGHT, [], NONE) for title in COLUMNS]
+"""The columns without a mesh: the header has its height from them."""
+
+
 class WorstModel(QAbstractTableModel):
     """The Qt model of the worst cells."""
 
     def __init__(self) -> None:
         super().__init__()
         self.worst: WorstCells | None = None
-        self.columns: list[Column] = []
-        self.order = np.empty(0, np.int64)
+        self.columns = EMPTY
+        self.order = NONE
         """(n,): the index in ``worst`` of the cell in each row."""
         self._by = QUALITY
         self._down = False
@@ -185,7 +190,7 @@ class WorstModel(QAbstractTableModel):
         """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst
-        self.columns = [] if worst is None else columns_of(worst, around)
+        self.columns = EMPTY if worst is None else columns_of(worst, around)
         self._sort_rows()
         self.endResetModel()
 
@@ -248,8 +253,7 @@ class WorstModel(QAbstractTableModel):
 
     def _sort_rows(self) -> None:
         """Sort the rows by the selected column; equal ones stay in the order of their quality."""
-        keys = [column.keys for column in self.columns] or [self.order[:0]]
-        key = keys[min(self._by, len(keys) - 1)]
+        key = self.columns[min(self._by, len(self.columns) - 1)].keys
         self.order = np.argsort(-key if self._down else key, kind="stable")
 
 
