@@ -303,7 +303,9 @@ def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
     window = opened.window
     window.dock_manager.bring_to_front("worst")
     panel = window.dock_manager.panels["worst"]
-    opened.qtbot.waitUntil(lambda: panel.model.rowCount() > 0 and panel.isVisible())
+    session = opened.session
+    wanted = worst_cells(session.frames, session.view.frame, "size-skew").cells.tolist()
+    opened.qtbot.waitUntil(lambda: cells(panel) == wanted and panel.isVisible())
     before = window.scene.camera.place
     click(panel, 2)
     cell = opened.session.view.marked_cell

@@ -67,7 +67,7 @@ def tube(columns, around, begin, holes=()):
 
 
 SECTOR, WHEEL = (12, 1.0), (24, 2.0 * np.pi)
-ONE, TWO = [(2, 6, 4, 6)], [(2, 6, 4, 6), (3, 5, 8, 9)]
+ONE, TWO = [(1, 7, 2, 7)], [(1, 7, 2, 7), (3, 5, 8, 9)]
 
 
 @pytest.mark.parametrize("begin", [0.2, np.pi - 0.4, np.pi - 0.6], ids=["", "branch", "between"])
