@@ -76,13 +76,15 @@ ONE, TWO = [(1, 7, 2, 7)], [(1, 7, 2, 7), (3, 5, 8, 9)]
 def test_the_holes_of_all_blades_are_closed_and_nothing_else(wall, holes, begin):
     columns, around = wall
     coords, facets = tube(columns, around, begin, holes)
-    _, closing = closed_wall(coords, facets, 1.0, around)
+    closed, closing = closed_wall(coords, facets, 1.0, around)
     flat = coords[closing[:, :3]][..., [0, 2]]
     flat[..., 1] -= 2.0 * np.pi * np.round((flat[..., 1] - flat[:, :1, 1]) / (2.0 * np.pi))
     (a, b), (c, d) = (np.moveaxis(flat[:, at] - flat[:, 0], -1, 0) for at in (1, 2))
     cells = sum((high - low) * (last - first) for low, high, first, last in holes)
     assert np.abs(a * d - b * c).sum() / 2.0 == pytest.approx(cells * around / columns / ROWS)
     assert (closing[:, 2] == closing[:, 3]).all()
+    # No facet is wider than the hole, where theta jumps by a turn either.
+    assert np.ptp(closed.corners[..., 2], axis=1).max() < 5.001 * around / columns
 
 
 @pytest.mark.parametrize("turn", np.radians([0.0, 40.0, 130.0, 250.0]))
