@@ -98,10 +98,6 @@ class FlatWalls:
         return self.anchor + np.einsum("mij,mj->mi", self.matrix, away) - coords[nodes]
 
 
-def _given(rows: tuple[IntArray, FloatArray], _coords: FloatArray) -> tuple[IntArray, FloatArray]:
-    return rows
-
-
 @dataclass(frozen=True, eq=False)
 class _Prepared:
     """What is kept of a mesh: its energy, and its last preconditioner."""
@@ -266,7 +262,7 @@ class _Way:
             np.concatenate([vectors[row, :, column], normals[more]]),
         )
         anchor = self._coords[nodes] + end
-        return Walls(partial(_given, rows), FlatWalls(anchor, free @ np.swapaxes(free, 1, 2)))
+        return Walls(lambda _: rows, FlatWalls(anchor, free @ np.swapaxes(free, 1, 2)))
 
     def finish(self) -> None:
         """Go on by Newton's method, until rounding is all that moves."""

@@ -218,12 +218,12 @@ def check_motion(case: Case, mesh: Mesh) -> tuple[str | None, Message | None]:
 def _before_run(case: Case, mesh: Mesh, moved: Displacements) -> Iterator[Message]:
     yield from motion_doubts(case, mesh)
 
-    def found() -> tuple[Domain, Rims] | None:
+    def domain_and_rims() -> tuple[Domain, Rims] | None:
         domain = find_domain(case, mesh)
         rims = _fixed_rims(case, mesh, domain)
         return None if rims is None else (domain, rims)  # a domain is large
 
-    known = _DOMAINS.of(mesh, rims_key(case), found)
+    known = _DOMAINS.of(mesh, rims_key(case), domain_and_rims)
     if known is not None:
         points = mesh.points.copy()
         points[moved.nodes] += moved.vectors
