@@ -35,15 +35,19 @@ from slideviz.rbf.operations import difference_from, each_of, points
 from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
 from slideviz.rbf.tape import Array, multiply, put, recorded, take, value
 
+WINDOW = 3
 NEAR = 0.15
 
 RESIDUAL = 1e-2
 SMALL = 5000
 LOOSE = 0.1
-"""The residual, the root of twice the energy that a step could still gain over the energy, at which
-a run ends: that of meshes of up to so many cells; it grows with the root of their number, up to the
-last, since the time does, and what could be gained concerns fewer and fewer of them. `NEAR`: the
-one at which the term for the worst cells joins."""
+"""The residual at which a run ends: its square is the part of the energy that an iteration takes
+away, the mean over the last `WINDOW`. `RESIDUAL` is that of meshes of up to `SMALL` cells; it grows
+with the root of their number up to `LOOSE`, since the time grows, and what could be gained concerns
+fewer and fewer of them. `NEAR`: the one at which the term for the worst cells joins."""
+
+SURE = 0.1
+"""An iteration that promises to take away less than this part of that is the last one."""
 
 CLOSE = 1e-3
 NEWTON = 12
@@ -303,17 +307,21 @@ class _Way:
             return energy, self._collected(slopes)
 
         nothing = AT_REST * self._energy.count
+        values = [now]
         for k in range(UNFOLDING if epsilon else ITERATIONS):
             tick(MAKING + (1.0 - MAKING) * k / (k + 10.0))
             direction = -memory.inverse_times(gradient)
             gain = -dot(gradient.ravel(), direction.ravel())
-            self.residual = float(np.sqrt(max(gain, 0.0) / max(now, nothing)))
+            lately = values[-1 - WINDOW] - now if len(values) > WINDOW else np.inf
+            left = min(gain / SURE, lately / WINDOW)
+            self.residual = float(np.sqrt(max(left, 0.0) / max(now, nothing)))
             if self.residual <= residual:
                 break
             found = line_search(along, np.zeros_like(direction), now, direction, -gain, np.inf)
             if found is None:
                 break
             length, now, slopes = found
+            values.append(now)
             step = length * direction
             self._go_to(self._placed(self.x + self._unknowns.moved(step)))
             if self.curved:

@@ -191,7 +191,7 @@ class Relaxed:
     """How a step was relaxed (`slideviz.elastic.relaxation`)."""
 
     rounds: int  # iterations
-    residual: float  # the root of twice the energy that was left to gain, over the energy
+    residual: float  # the root of the part of the energy that the last iterations took, each
 
     @classmethod
     def joined(cls, several: Sequence[Relaxed]) -> Relaxed | None:
