@@ -334,7 +334,7 @@ def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out,
                 chi = 0.5 * (j + root) if j > 0.0 else 0.5 * epsilon * epsilon / (root - j)
                 low[c] = min(low[c], j)
                 if not chi > 0.0:
-                    values[first] = np.inf
+                    values[0] = np.inf
                     return
                 lam = coupling[first + c]
                 log = np.log(chi) if lam > 0.0 else 0.0

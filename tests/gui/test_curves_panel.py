@@ -88,8 +88,8 @@ def test_a_click_in_the_plot_goes_to_that_step(full):
 def safe(full, qtbot):
     """The panel with the curve of a run of the sample square whose case has a motion to scale."""
     session = full.store.session
-    moves = {"roles": {"BLOCK": "moving"}, "motions": (Translate("BLOCK", (0.0, 0.1)),)}
-    session = changes.set_case(session, **moves, steps=1)
+    moves = {"roles": {"BLOCK": "moving"}, "motions": (Translate("BLOCK", (0.0, 0.2)),)}
+    session = changes.set_case(session, **moves, steps=1, relax="no")
     found = []
     jobs.compute(session.case, session.mesh, found.append, lambda: False)
     frames = [one for one in found if isinstance(one, StepFrame)]
@@ -109,16 +109,16 @@ def test_how_far_the_motion_may_go_and_a_drag_scales_it(safe, qtbot):
     canvas, y = safe.canvas, safe.canvas.height() // 2
     start, end = (QPoint(round(canvas.to_pixel(at)), y) for at in (100 * found.fraction, 50))
     QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=end)
-    assert safe.store.session.case.motions[0].vector == (0.0, 0.1)  # a click scales nothing
+    assert safe.store.session.case.motions[0].vector == (0.0, 0.2)  # a click scales nothing
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=start)
     drag(canvas, end)
     with qtbot.waitSignal(canvas.drawn):
         QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=end)
-    assert safe.store.session.case.motions[0].vector[1] == pytest.approx(0.05, abs=2e-3)
+    assert safe.store.session.case.motions[0].vector[1] == pytest.approx(0.1, abs=4e-3)
     qtbot.waitUntil(lambda: not canvas.busy)
     assert lines(safe)["typed"].get_xdata()[0] == pytest.approx(50, abs=2)
     safe.store.undo()
-    assert safe.store.session.case.motions[0].vector == (0.0, 0.1)
+    assert safe.store.session.case.motions[0].vector == (0.0, 0.2)
 
 
 def drag(widget, to):
