@@ -179,7 +179,7 @@ def test_a_signal_ends_it_and_resume_goes_on(folder, number):
         _, err = child.communicate(timeout=60)
     assert child.returncode == 128 + number
     assert "of 400 designs, and --resume continues" in err
-    assert err.count("\n") == 1
+    assert len([line for line in err.splitlines() if "compiling loops" not in line]) == 1
 
 
 def test_limits_are_a_column_and_designs_that_miss_one_are_grouped(folder, in_threads, capsys):

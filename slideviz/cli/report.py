@@ -542,8 +542,6 @@ def _advice(case: Case, done: RunResult, limits: Sequence[Mapping[str, Any]]) ->
     every = [r.keys for r in remedies(case, beside, pitch, last, found.inverted > 0)]
     if not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
-        if case.relax == "no":
-            every.insert(0, "RELAX= YES")
         if walls and case.layers == "no":
             every.insert(0, "LAYERS= AUTO")
     ideas = "; ".join(every)

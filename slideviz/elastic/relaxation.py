@@ -239,7 +239,9 @@ class _Way:
         if least.min() > 0.0:
             self._descend(tick, NEAR, 0.0)
             self._descend(tick, residual, WORST)
-        elif np.count_nonzero(least <= 0.0) > folded:
+            return
+        self.residual = 1.0
+        if np.count_nonzero(least <= 0.0) > folded:
             self._go_to(self._begin)
 
     def frozen_walls(self, tick: Tick) -> Walls:
@@ -404,7 +406,10 @@ class _Way:
             before = size
             size = dot(left.ravel(), steep.ravel())
             along = steep + size / before * along
-        raise DeformError("the derivative of the relaxed mesh does not converge; use RELAX= NO")
+        raise DeformError(
+            "the relaxed mesh does not converge to where its energy is least, which derivatives "
+            "need; use a smaller motion, or RELAX= NO"
+        )
 
 
 def _residual(cells: int) -> float:

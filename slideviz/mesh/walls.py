@@ -391,7 +391,8 @@ class Walls:
 
 def _ratio_badness(ratio: FloatArray) -> FloatArray:
     """Return how far ratios (k,) are from 1; those of a height that changed its sign most."""
-    return np.where(ratio > 0, np.abs(np.log(np.abs(ratio))), np.inf)
+    grown = ratio > 0
+    return np.where(grown, np.abs(np.log(np.where(grown, ratio, 1.0))), np.inf)
 
 
 BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {

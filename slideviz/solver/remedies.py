@@ -80,6 +80,9 @@ def remedies(
         found.append(Remedy(f"SLIDING_MODE= {SLIDES}", "sliding boundary nodes"))
     if "periodic" in roles and case.sliding != "none" and case.periodic in ("none", "periodic"):
         found.append(Remedy("PERIODIC_MODE= moving", "periodicity with moving vertices"))
+    streamed = step is not None and isinstance(step.mesh, Skin)
+    if case.relax == "no" and case.method == "rbf" and not streamed:
+        found.append(Remedy("RELAX= YES", "relaxation"))
     if case.steps:
         found.append(Remedy("more STEPS, or STEPS= auto", "more steps, or automatic steps"))
     if folded and case.repair == "no" and not pitch:

@@ -38,6 +38,7 @@ from slideviz.solver.steps import Progress, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
 
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
+ENDED = 0.1  # the residual above which relaxation did not come to its end
 ALIKE = 1.1  # a shorter step may go farther than the straight paths of a longer one by this factor
 
 
@@ -442,6 +443,12 @@ def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Findi
     others: list[Remark] = [f"step {step.index}: {text}" for text in solution.warnings]
     if step.repaired is not None:
         others += step.repaired.warnings
+    if solution.relaxed is not None and solution.relaxed.residual > ENDED:
+        others.append(
+            f"step {step.index}: relaxation ended before the energy of the cells was least (after "
+            f"{solution.relaxed.rounds} iterations, to {solution.relaxed.residual:.1g}); more "
+            "STEPS or a smaller motion may help"
+        )
     return _Finding(
         index=step.index,
         condition=solution.condition,

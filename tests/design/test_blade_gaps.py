@@ -155,7 +155,9 @@ def test_the_command_without_motions_or_with_nothing_to_do(files, capsys):
     roles = {"blade": "moving"}
     case.change(mesh_file=files / "full.su2", motions=(), roles=roles).write("one.cfg")
     assert run(["gap", "one.cfg"]) == 1
-    assert "nothing to measure; name boundaries, e.g. --between blade,hub" in capsys.readouterr().err
+    assert (
+        "nothing to measure; name boundaries, e.g. --between blade,hub" in capsys.readouterr().err
+    )
     assert run(["gap", "one.cfg", "--between", "blade"]) == 2
     assert "'blade': expected two boundaries, e.g. BLADE,HUB" in capsys.readouterr().err
     flat = sector()

@@ -111,7 +111,7 @@ def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_name
     of_fixed = replace(run, case=case.change(roles=fixed), frames=frames)
     text = remedy_for(of_fixed, mesh)
     assert text.startswith("Step 1 of 2 is the last without any. What may help: the role “slid")
-    assert "“sliding” for outflow beside these cells, and a sliding method; more steps" in text
+    assert "“sliding” for outflow beside these cells, and a sliding method; relaxation" in text
     assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; more" in (
         advice_for(of_fixed.case, None, mesh, bad)
     )
