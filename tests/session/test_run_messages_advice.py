@@ -112,7 +112,7 @@ def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_name
     text = remedy_for(of_fixed, mesh)
     assert text.startswith("Step 1 of 2 is the last without any. What may help: the role “slid")
     assert "“sliding” for outflow beside these cells, and a sliding method; relaxation" in text
-    assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; more" in (
+    assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; RELAX" in (
         advice_for(of_fixed.case, None, mesh, bad)
     )
     without = replace(of_fixed, frames=frames[1:])
