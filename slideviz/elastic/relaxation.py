@@ -29,7 +29,7 @@ from slideviz.elastic.laplacian import LaplacianCycle
 from slideviz.elastic.multigrid import MAKING, while_ticking
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.repair.descent import Memory, dot, line_search
+from slideviz.mesh.repair.descent import Function, Memory, dot, line_search
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.operations import difference_from, each_of, points
 from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
@@ -50,10 +50,12 @@ SURE = 0.1
 """An iteration that promises to take away less than this part of that is the last one."""
 
 CLOSE = 1e-3
-NEWTON = 12
+NEWTON = 40
 STILL = 1e-14
-"""The residual from which Newton's method goes on where derivatives are wanted; its most steps, and
-the step, as a part of the extent, that ends it."""
+SEEN = 1e-6
+"""The residual from which Newton's method goes on where derivatives are wanted; its most steps; the
+step, as a part of the extent, that ends it; and that from which on energies differ by more than
+rounding, so that the step is searched."""
 
 BEND = 1e-6  # step, as a part of the extent, by which changes of walls are found
 
@@ -70,8 +72,10 @@ ROUNDS = 10  # most regularisations
 AT_REST = 1e-20  # energy of a cell that counts as nothing
 
 SOLVED = 1e-13
-PRODUCTS = 2000
-"""Residual of the linear systems of derivatives, and most products with the Hessian."""
+PRODUCTS = 5000
+STEPS = 300
+"""Residual of the linear systems of derivatives, most products with the Hessian, and most of a step
+of Newton's method."""
 
 Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
 """Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
@@ -273,11 +277,30 @@ class _Way:
     def finish(self) -> None:
         """Go on by Newton's method, until rounding is all that moves."""
         for _ in range(NEWTON):
-            right = self._collected(self._energy.slopes(self.x)[1])
-            step = self._unknowns.moved(self._solved(right, FORCING))
-            self._go_to(self._placed(self.x - step))
-            if np.abs(step).max() <= STILL * self._extent:
+            now, slopes, _ = self._energy.slopes(self.x)
+            gradient = self._collected(slopes)
+            step = -self._solved(gradient, FORCING)
+            farthest = np.abs(self._unknowns.moved(step)).max()
+            if farthest > SEEN * self._extent:
+                slope = dot(gradient.ravel(), step.ravel())
+                along = self._function(WORST, 0.0)
+                found = line_search(along, np.zeros_like(step), now, step, slope, 1.0)
+                if found is None:
+                    break
+                step *= found[0]
+            self._go_to(self._placed(self.x + self._unknowns.moved(step)))
+            if farthest <= STILL * self._extent:
                 break
+
+    def _function(self, worst: float, epsilon: float) -> Function:
+        """Return the energy and its slopes by the unknowns, after a step of these (k, d)."""
+
+        def along(step: FloatArray) -> tuple[float, FloatArray]:
+            there = self._placed(self.x + self._unknowns.moved(step))
+            energy, slopes, _ = self._energy.slopes(there, worst, epsilon)
+            return energy, self._collected(slopes)
+
+        return along
 
     def _go_to(self, x: FloatArray) -> None:
         """Take positions (n, d), and the directions in which nodes slide there."""
@@ -303,11 +326,7 @@ class _Way:
         memory = self._memory
         memory.change_function()
 
-        def along(step: FloatArray) -> tuple[float, FloatArray]:
-            there = self._placed(self.x + self._unknowns.moved(step))
-            energy, slopes, _ = self._energy.slopes(there, worst, epsilon)
-            return energy, self._collected(slopes)
-
+        along = self._function(worst, epsilon)
         nothing = AT_REST * self._energy.count
         values = [now]
         for k in range(UNFOLDING if epsilon else ITERATIONS):
@@ -388,24 +407,33 @@ class _Way:
         return change + np.einsum("kij,kj->ki", self._bends, self._unknowns.within(step))
 
     def _solved(self, right: FloatArray, residual: float = SOLVED) -> FloatArray:
-        """Return the solution (k, d) of the Hessian of the unknowns, by conjugate gradients."""
+        """Return the solution (k, d) of the Hessian of the unknowns, by conjugate gradients.
+
+        A step of Newton's method ends where the energy is not convex (Steihaug 1983).
+        """
         found = np.zeros_like(right)
         left = right.copy()
         steep = self._preconditioned(left)
         along = steep
         size = dot(left.ravel(), steep.ravel())
         first = size
-        for _ in range(PRODUCTS):
+        newton = residual > SOLVED
+        for _ in range(STEPS if newton else PRODUCTS):
             if size <= residual**2 * first:
                 return found
             change = self._hessian(along)
-            length = size / dot(along.ravel(), change.ravel())
+            curvature = dot(along.ravel(), change.ravel())
+            if curvature <= 0.0 and newton:
+                return found if found.any() else along
+            length = size / curvature
             found += length * along
             left -= length * change
             steep = self._preconditioned(left)
             before = size
             size = dot(left.ravel(), steep.ravel())
             along = steep + size / before * along
+        if newton:
+            return found
         raise DeformError(
             "the relaxed mesh does not converge to where its energy is least, which derivatives "
             "need; use a smaller motion, or RELAX= NO"

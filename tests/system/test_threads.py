@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -40,12 +42,19 @@ def test_what_is_raised_ends_the_work(monkeypatch, cores):
         in_parts(fail, 1000)
     assert len(done) <= cores
 
+    stopped = threading.Event()
+
     def stop(fraction):
+        stopped.set()
         raise KeyboardInterrupt
+
+    def work(part):  # other threads would take all parts while the first one waits for its turn
+        assert stopped.wait(60)
+        done.append(part.start)
 
     done.clear()
     with pytest.raises(KeyboardInterrupt):
-        in_parts(lambda part: done.append(part.start), 300_000, stop)
+        in_parts(work, 300_000, stop)
     assert len(done) < 299_999  # the part of the thread that stops is not done anyway
 
 
