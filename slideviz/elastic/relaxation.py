@@ -224,25 +224,24 @@ class _Way:
         self.curved = len(self._sliding) > 0 and (problem.curved or self._frame.cylindrical)
         self._slid, self._leader = _copies(problem, self._sliding)
         self._bends: FloatArray | None = None
-        count = len(unknowns.owner) * self._at.shape[1]
-        self._memory = Memory(count, self._preconditioned, PAIRS)
         self.x = self._begin  # (n, d): Cartesian positions
         self.iterations = 0
         self.residual = 0.0
 
     def go(self, tick: Tick, residual: float) -> None:
         """Go to the least energy, with regularisation as long as corners are folded."""
+        memory = Memory(len(self._unknowns.owner) * self.x.shape[1], self._preconditioned, PAIRS)
         least = self._energy.slopes(self.x, 0.0, 1.0)[2]
         folded = np.count_nonzero(least <= 0.0)
         for _ in range(ROUNDS):
             if least.min() > 0.0:
                 break
             epsilon = float(np.hypot(1e-6, 0.2 * least.min()))
-            self._descend(tick, residual, 0.0, epsilon)
+            self._descend(memory, tick, residual, 0.0, epsilon)
             least = self._energy.slopes(self.x, 0.0, epsilon)[2]
         if least.min() > 0.0:
-            self._descend(tick, NEAR, 0.0)
-            self._descend(tick, residual, WORST)
+            self._descend(memory, tick, NEAR, 0.0)
+            self._descend(memory, tick, residual, WORST)
             return
         self.residual = 1.0
         if np.count_nonzero(least <= 0.0) > folded:
@@ -319,11 +318,17 @@ class _Way:
         by = self._frame.difference(begin, x[nodes] - begin)
         return self._coords[nodes] + self._start[nodes] + by
 
-    def _descend(self, tick: Tick, residual: float, worst: float, epsilon: float = 0.0) -> None:
+    def _descend(
+        self,
+        memory: Memory,
+        tick: Tick,
+        residual: float,
+        worst: float,
+        epsilon: float = 0.0,
+    ) -> None:
         """Minimise the energy with one ``worst`` (kappa) and one regularisation of folded cells."""
         now, slopes, _ = self._energy.slopes(self.x, worst, epsilon)
         gradient = self._collected(slopes)
-        memory = self._memory
         memory.change_function()
 
         along = self._function(worst, epsilon)
