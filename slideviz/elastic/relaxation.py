@@ -277,7 +277,7 @@ class _Way:
         """Go on by Newton's method, until rounding is all that moves."""
         for _ in range(NEWTON):
             now, slopes, _ = self._energy.slopes(self.x)
-            gradient = self._collected(slopes)
+            gradient = self._unknowns.collected(slopes)
             step = -self._solved(gradient, FORCING)
             farthest = np.abs(self._unknowns.moved(step)).max()
             if farthest > SEEN * self._extent:
@@ -297,7 +297,7 @@ class _Way:
         def along(step: FloatArray) -> tuple[float, FloatArray]:
             there = self._placed(self.x + self._unknowns.moved(step))
             energy, slopes, _ = self._energy.slopes(there, worst, epsilon)
-            return energy, self._collected(slopes)
+            return energy, self._unknowns.collected(slopes)
 
         return along
 
@@ -328,9 +328,8 @@ class _Way:
     ) -> None:
         """Minimise the energy with one ``worst`` (kappa) and one regularisation of folded cells."""
         now, slopes, _ = self._energy.slopes(self.x, worst, epsilon)
-        gradient = self._collected(slopes)
+        gradient = self._unknowns.collected(slopes)
         memory.change_function()
-
         along = self._function(worst, epsilon)
         nothing = AT_REST * self._energy.count
         values = [now]
@@ -365,9 +364,6 @@ class _Way:
             x[self._slid] = self._frame.points(self._coords[self._slid] + on[self._leader])
         return x
 
-    def _collected(self, slopes: FloatArray) -> FloatArray:
-        return self._unknowns.within(self._unknowns.collected(slopes))
-
     def _preconditioned(self, gradient: FloatArray) -> FloatArray:
         within = self._unknowns.within
         return within(self._cycle(within(gradient)))
@@ -375,12 +371,12 @@ class _Way:
     def pushed(self, t: FloatArray) -> FloatArray:
         """Return how positions at the least energy change as those at the start do by t (n, d)."""
         known = np.where(self._unknowns.place[:, None] < 0, t, 0.0)
-        right = self._collected(self._energy.product(self.x, known))
+        right = self._unknowns.collected(self._energy.product(self.x, known))
         return known - self._unknowns.moved(self._solved(right))
 
     def pulled(self, g: FloatArray) -> FloatArray:
         """Return the transpose of `pushed`, times g (n, d)."""
-        left = self._unknowns.moved(self._solved(self._collected(g)))
+        left = self._unknowns.moved(self._solved(self._unknowns.collected(g)))
         out = g - self._energy.product(self.x, left)
         return np.where(self._unknowns.place[:, None] < 0, out, 0.0)
 
@@ -408,7 +404,7 @@ class _Way:
         """Return the Hessian of the unknowns times a step (k, d)."""
         if self._bends is None:
             self._bends = self._bent()
-        change = self._collected(self._energy.product(self.x, self._unknowns.moved(step)))
+        change = self._unknowns.collected(self._energy.product(self.x, self._unknowns.moved(step)))
         return change + np.einsum("kij,kj->ki", self._bends, self._unknowns.within(step))
 
     def _solved(self, right: FloatArray, residual: float = SOLVED) -> FloatArray:
@@ -428,6 +424,8 @@ class _Way:
                 return found
             change = self._hessian(along)
             curvature = dot(along.ravel(), change.ravel())
+            if not np.isfinite(curvature):  # of a cell that is folded still
+                break
             if curvature <= 0.0 and newton:
                 return found if found.any() else along
             length = size / curvature
