@@ -115,7 +115,10 @@ class Panel(QWidget):
         def catch_up(session: Session) -> None:
             nonlocal shown, last_s
             now = select(session)
-            if now == shown or (seen and not is_seen(self)):
+            if now == shown:
+                return
+            if seen and not is_seen(self):
+                shown = None  # it would keep another mesh alive
                 return
             wait_ms = 1000.0 * (last_s - time.monotonic()) + REST_MS
             if rests and wait_ms > 0:
