@@ -300,7 +300,6 @@ class PictureDialog(PixelFields, PreviewDialog):
         with suppress(TypeError, ValueError):  # none, or of another version
             known = dict(json.loads(kept))
             self._restore_choices({name: known[name] for name in known.keys() - self._passing})
-        self.changed()
 
     # Parts -----------------------------------------------------------------------------
     def _make_size(self) -> None:
