@@ -111,7 +111,7 @@ class AboutAxis(Section):
 
     @abstractmethod
     def places(self, points: FloatArray) -> FloatArray:
-        """Return unrolled points (p, 3) laid flat; see `Section.flatten`."""
+        """Return the places (n, 2) of points (n, 3): angles, and lengths along the surface."""
 
     @abstractmethod
     def surface(self, places: FloatArray, size: float) -> FloatArray:
