@@ -350,9 +350,8 @@ _FILE = Menu("file", "&File", entries=(
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
             call("exports.wheel"), enabled=in_memory(has_wheel),
-            why_not="The mesh is not a passage of a wheel: two "
-                            "boundaries of its only zone must be periodic, by a whole part of a "
-                            "turn."),
+            why_not="The mesh is not a passage of a wheel: two boundaries of its only zone must be "
+            "periodic, by a whole part of a turn."),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
             call("files.save_case"), ("Ctrl+Shift+S",), "case", has_mesh),
@@ -388,8 +387,8 @@ _RUN = Menu("run", "&Run", entries=(
             "Mend the inverted and poor cells of the last step of the run that is shown, or of the "
             "mesh: by moving nodes near them, never nodes of moving and fixed boundaries.",
             call("running.repair"), ("F7",), enabled=needs_repair,
-            why_not="No cell needs repair: all are proved valid, and their "
-                            "quality is above the limit in the method panel."),
+            why_not="No cell needs repair: all are proved valid, and their quality is above the "
+            "limit in the method panel."),
     None,
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "
