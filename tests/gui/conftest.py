@@ -211,6 +211,9 @@ def close_unsaved(window):
 
 def reset(window, qtbot):
     """Bring a window to the state of a new one: no mesh, no dialog, no job, the first layout."""
+    # Of one that waits for its deletion, `findChildren` would keep the Python object, with all that
+    # it has, for good.
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     for dialog in window.findChildren(QDialog):
         dialog.close()
     window.running.cancel()

@@ -99,7 +99,6 @@ def test_the_usual_picture_is_white_without_clutter(opened, answers, tmp_path):
     assert "SVG" in asked[0][2]
 
 
-@pytest.mark.window("own")
 def test_a_cancelled_picture_asks_for_no_name_and_one_that_cannot_be_written_is_told(
     opened, answers, tmp_path
 ):
@@ -505,7 +504,6 @@ def test_all_steps_are_saved_with_numbers(ran, answers, tmp_path):
     assert not ran.session.unsaved_mesh
 
 
-@pytest.mark.window("own")
 def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_path):
     mesh, roles = passage((2, 6, 6), 40.0), {"blade": "moving", "per1": "periodic"}
     case = Case(roles=roles | {"per2": "periodic"}, periodic_type="rotational")
