@@ -70,9 +70,8 @@ def _problems_of_zones(case: Case, mesh: Mesh) -> Iterator[Message]:
     yield from _zone_problems(case, mesh)
     if not case.markers_with("periodic"):
         yield from _periodic_problems(case, mesh)
-    if unmoved := _without_motion(
-        case, mesh
-    ):  # which zones have without the numbers of their names
+    # Each zone would say this too, of names without the zone's number.
+    if unmoved := _without_motion(case, mesh):
         yield from unmoved
         return
     try:

@@ -230,9 +230,8 @@ class Checks:
         if not len(setup.images):
             return
         gaps = misfits(setup.frame, setup.coords, points, setup.images)
-        if not gaps.max() <= FAR * largest_coordinate(
-            self.mesh.points
-        ):  # else it is rounding, without a closer look
+        # Below this it is rounding, without a closer look; not <=, so that NaN is looked at.
+        if not gaps.max() <= FAR * largest_coordinate(self.mesh.points):
             largest_misfit(setup.frame, setup.coords, points, setup.images)
 
     def off_track(self, coords: FloatArray) -> FloatArray:
