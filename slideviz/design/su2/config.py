@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import chain
-from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -522,7 +521,7 @@ CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "U
 VALUES: dict[str, tuple[Callable[[str], Any], str]] = {
     "DV_SENSITIVITY_FORMAT": (_supported("SU2_NATIVE", "UNORDERED_ASCII"), "SU2_NATIVE"),
     "OBJECTIVE_FUNCTION": (str, "DRAG"),
-    "OPT_RELAX_FACTOR": (_above(-inf), "1.0"),
+    "OPT_RELAX_FACTOR": (number, "1.0"),
     "READ_BINARY_RESTART": (lambda text: text.upper() == "YES", "YES"),
     "FFD_CONTINUITY": (_supported("", *CONTINUITIES), ""),
     "FFD_SYMMETRY_PLANE": (_yes, "NO"),
