@@ -403,10 +403,10 @@ class KnownNodeMap:
         images, or copies in a halo and their originals, are displaced differently.
         """
         setup = self.setup
-        overwrite = take(vectors, self.rows)
+        shift = take(vectors, self.rows)
         if self.turn is not None:
-            overwrite = transform(self.turn, overwrite)
-        moved = difference_from(setup.frame, self.points, overwrite)
+            shift = transform(self.turn, shift)
+        moved = difference_from(setup.frame, self.points, shift)
         self._require_alike(value(vectors), value(moved))
         shape = (len(setup.known), self.mesh.dim)
         return put(np.zeros(shape), self.known, take(moved, self.source))
@@ -420,8 +420,8 @@ class KnownNodeMap:
         setup = self.setup
         mesh = self.mesh
         if len(self.others):
-            overwrite = vectors[..., self.others, :]
-            follow = difference_from(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
+            shift = vectors[..., self.others, :]
+            follow = difference_from(setup.frame, mesh.points[self.nodes[self.others]], shift)
             gap = np.abs(value(follow) - moved[..., self.followed, :])
             largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
