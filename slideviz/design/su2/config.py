@@ -494,13 +494,10 @@ def _yes(text: str) -> bool:
     return _supported("YES", "NO")(text) == "YES"
 
 
-def _above(least: float) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        if (value := number(text)) <= least:
-            raise CaseError(f"{shown(text)} is not a number above {least:g}")
-        return value
-
-    return read
+def _positive(text: str) -> float:
+    if (value := number(text)) <= 0.0:
+        raise CaseError(f"{shown(text)} is not a number above 0")
+    return value
 
 
 def _count(text: str) -> int:
@@ -532,8 +529,8 @@ VALUES: dict[str, tuple[Callable[[str], Any], str]] = {
     "CONVEXITY_CHECK": (_yes, "NO"),
     "CONVEXITY_CHECK_ITER": (_count, "10"),
     "CONVEXITY_CHECK_DEPTH": (_count, "3"),
-    "OPT_LINE_SEARCH_BOUND": (_above(0.0), "1E6"),
-    "REF_LENGTH": (_above(0.0), "1.0"),
+    "OPT_LINE_SEARCH_BOUND": (_positive, "1E6"),
+    "REF_LENGTH": (_positive, "1.0"),
     "MULTIZONE_MESH": (_yes, "YES"),
 }
 """Other keys of one value or list: how each is read, and SU2's default; except FFD_CONTINUITY,
