@@ -159,8 +159,13 @@ class Section:
     """The kind of 3D handle: a plane to push and turn, or a ball that pulls the size."""
 
     def __new__(cls, kind: str = "", *_: object, **__: object) -> Self:
-        """Return a section of the class of the shape ``kind``."""
-        return object.__new__(SHAPES.get(kind, cls))  # type: ignore[return-value]
+        """Return a section of the class of the shape ``kind``; raises CaseError if of another."""
+        shape = SHAPES.get(kind, cls)
+        if not issubclass(shape, cls):  # it would have the default numbers
+            raise CaseError(
+                f"{kind} section: a {cls.terms.value} cannot become one; make a new one"
+            )
+        return object.__new__(shape)
 
     def __init_subclass__(cls) -> None:
         if "terms" in vars(cls):

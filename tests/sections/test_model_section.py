@@ -361,3 +361,9 @@ def test_an_unknown_shape_is_refused_and_lists_become_tuples():
     made = Section("plane", [0.5, 0.0, 0.0], np.array([1.0, 0.0, 0.0]))
     assert made == Section("plane", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
     assert hash(made)
+
+
+def test_a_section_keeps_its_shape():
+    plane = Section("plane", (1.0, 2.0, 3.0))
+    with pytest.raises(CaseError, match="cylinder section: a plane cannot become one"):
+        replace(plane, kind="cylinder", radius=2.0)
