@@ -410,13 +410,18 @@ def _begin() -> None:
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     for ending in (lambda: signal.sigwait({signal.SIGTERM}), _wait_for_parent):
-        threading.Thread(target=lambda ending=ending: (ending(), _leave()), daemon=True).start()
+        threading.Thread(target=_leave_after, args=(ending,), daemon=True).start()
 
 
 def _wait_for_parent() -> None:
     parent = parent_process()
     assert parent is not None
     parent.join()
+
+
+def _leave_after(ending: Callable[[], object]) -> NoReturn:
+    ending()
+    _leave()
 
 
 def _leave() -> NoReturn:
