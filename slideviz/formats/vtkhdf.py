@@ -17,7 +17,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -28,9 +27,6 @@ from slideviz.formats.table import WriteOptions
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.system.threads import cuts
-
-if TYPE_CHECKING:
-    import h5py
 
 _VERSION = (2, 1)  # version of the format
 _VOLUME = "volume"  # name of the block with the cells

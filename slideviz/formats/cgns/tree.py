@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -20,9 +19,6 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, path_error, printable
 from slideviz.mesh.model import IntArray
-
-if TYPE_CHECKING:
-    import h5py
 
 _ADF = b"ADF Database"  # in the first ``_HEAD_BYTES`` of a CGNS file of the old kind
 _HEAD_BYTES = 32

@@ -31,8 +31,6 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
 if TYPE_CHECKING:
     import h5py
-    import meshio
-
 
 # The streams are redirected for the whole process, so two threads must not do it at once.
 _STREAMS = threading.Lock()

@@ -9,7 +9,6 @@ import shutil
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import meshio
@@ -24,10 +23,6 @@ from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import draft
-
-if TYPE_CHECKING:
-    import meshio
-
 
 _NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
 """meshio's name of an element type by VTK identifier."""
