@@ -27,7 +27,7 @@ Function = Callable[[FloatArray], tuple[float, FloatArray]]
 """Returns value and gradient (b, d) at unknowns (b, d)."""
 
 
-@njit(nogil=True, cache=True)
+@njit
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return the sum of products of (n,); its bits do not depend on a number of threads."""
     part = np.zeros(LANES)
@@ -41,13 +41,13 @@ def dot(a, b):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _add(factor, a, out):  # type: ignore[no-untyped-def]
     for k in range(len(out)):
         out[k] += factor * a[k]
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _first_loop(steps, changes, smoothed, products, order, left, out, factors):  # type: ignore[no-untyped-def]
     """Take the newest pairs first from ``left`` (n,), with ``factors`` (c,): Nocedal's first loop.
 
@@ -61,7 +61,7 @@ def _first_loop(steps, changes, smoothed, products, order, left, out, factors): 
         _add(-factors[k], smoothed[k], out)
 
 
-@njit(nogil=True, cache=True)
+@njit
 def _second_loop(steps, changes, products, order, out, factors):  # type: ignore[no-untyped-def]
     for k in order:
         _add(factors[k] - dot(changes[k], out) / products[k], steps[k], out)
