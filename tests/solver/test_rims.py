@@ -21,6 +21,7 @@ from slideviz.session.state import Run, StepFrame
 from slideviz.solver.growth import wall_warnings
 from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.prepare import prepare
+from slideviz.solver.rims import rims_key
 from slideviz.solver.setup import make_setup
 from slideviz.streaming.run import stream
 from tests import builders
@@ -209,6 +210,13 @@ def test_a_blade_that_moves_over_the_span_is_on_hub_and_shroud_by_its_motion():
     both = case.change(motions=(lean, sv.Translate("blade", (0.0, 0.02, 0.0))))
     rim = radii(last(both, mesh).mesh.points, mesh, "shroud")
     np.testing.assert_allclose(rim, 1.0, rtol=0, atol=1e-12)
+
+
+def test_rims_are_found_again_where_the_span_goes_the_other_way():
+    lean = sv.SpanMotion("blade", "lean", (0.0, 1.0), (0.0, 0.02))
+    case = case_of(blade(builders.passage()), [lean], periodic="moving")
+    assert rims_key(case) == rims_key(case.change(steps=2))
+    assert rims_key(case) != rims_key(case.change(span=("shroud", "hub")))
 
 
 def test_a_wall_that_a_moving_boundary_divides_is_one():
