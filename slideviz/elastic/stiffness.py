@@ -369,16 +369,6 @@ def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def shape_gradients(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
-    """Write grad N_a (a, d) at integration point q of element e to ``slopes``; return |det J| w."""
-    points, nodes, gradients, weights = elements
-    _gather(points, nodes, e, x)
-    size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
-    _slopes(gradients[q], inverse, slopes)
-    return size
-
-
-@njit(**OPTIONS)
 def _slopes(gradients, inverse, slopes):  # type: ignore[no-untyped-def]
     """Write grad N_a to ``slopes`` (a, d), from that in the reference element."""
     n, d = slopes.shape
