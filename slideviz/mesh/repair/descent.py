@@ -160,7 +160,7 @@ def descend(
         slope = dot(gradient.ravel(), direction.ravel())
         if not slope < 0:  # by rounding only
             memory.clear()
-            direction = -precondition(gradient)
+            direction = -memory.inverse_times(gradient)
             slope = dot(gradient.ravel(), direction.ravel())
             if not slope < 0:
                 break
