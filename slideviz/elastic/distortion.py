@@ -21,7 +21,7 @@ import numpy as np
 from slideviz.elastic.stiffness import by_node
 from slideviz.mesh.jacobians import CORNERS, LANES, cross3, dot3, edge, gather
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 COUPLING = 1.5
@@ -165,7 +165,7 @@ def _coupling(corners: FloatArray) -> FloatArray:
     return COUPLING * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
 
 
-@njit(**OPTIONS)
+@njit
 def add_by_node(indptr, entries, each, out):  # type: ignore[no-untyped-def]
     """Write the sums of rows ``entries`` of each (m, d) to out (n, d)."""
     for row in range(len(out)):
@@ -176,7 +176,7 @@ def add_by_node(indptr, entries, each, out):  # type: ignore[no-untyped-def]
             out[row, i] = total
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _edges(points, nodes, e, corner, out):  # type: ignore[no-untyped-def]
     """Write the edges that leave a corner as columns of out (3, 3)."""
     d = points.shape[1]
@@ -191,7 +191,7 @@ def _edges(points, nodes, e, corner, out):  # type: ignore[no-untyped-def]
             out[i, k] = points[other, i] - points[o, i]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _cofactors(f, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         j = (i + 1) % 3
@@ -203,14 +203,14 @@ def _cofactors(f, out):  # type: ignore[no-untyped-def]
     return f[0, 0] * out[0, 0] + f[0, 1] * out[0, 1] + f[0, 2] * out[0, 2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _times(a, b, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         for j in range(3):
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _gram(a, b, out):  # type: ignore[no-untyped-def]
     """Write a^T b."""
     for i in range(3):
@@ -218,7 +218,7 @@ def _gram(a, b, out):  # type: ignore[no-untyped-def]
             out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _dot(a, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(3):
@@ -227,7 +227,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _inverse(points, nodes, e, corner, edges, inverse):  # type: ignore[no-untyped-def]
     _edges(points, nodes, e, corner, edges)
     cof = np.empty((3, 3))
@@ -243,7 +243,7 @@ def _inverse(points, nodes, e, corner, edges, inverse):  # type: ignore[no-untyp
     return True
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always")
 def _mixed(h, a, b, c):  # type: ignore[no-untyped-def]
     """Return h_0 a + h_1 b + h_2 c, of triples."""
     return (
@@ -253,7 +253,7 @@ def _mixed(h, a, b, c):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**OPTIONS)
+@njit
 def _write_maps(start, at, corner, d, count, duals, maps, jacobian, squares, cofactors):  # type: ignore[no-untyped-def]
     """Write the dual edges of undeformed corners, (3, 3, LANES), and the maps F, by columns.
 
@@ -305,7 +305,7 @@ def _write_maps(start, at, corner, d, count, duals, maps, jacobian, squares, cof
         cofactors[c] = dot3(p, p) + dot3(q, q) + dot3(r, r)
 
 
-@njit(**OPTIONS)
+@njit
 def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out, least):  # type: ignore[no-untyped-def]
     """Write the energies of cells (m,), their slopes (m, n, d) by nodes, and least J (m,).
 
@@ -359,7 +359,7 @@ def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out,
                     out[first + c, j, axis] = slope[axis, j, c]
 
 
-@njit(**OPTIONS)
+@njit
 def _add_slopes(corner, d, count, duals, maps, squares, one, two, three, slope):  # type: ignore[no-untyped-def]
     """Add the slopes of a corner to slope (3, n, LANES).
 
@@ -401,7 +401,7 @@ def _add_slopes(corner, d, count, duals, maps, squares, one, two, three, slope):
                 slope[axis, o, c] -= last[axis]
 
 
-@njit(**OPTIONS)
+@njit
 def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ignore[no-untyped-def]
     """Write the Hessians of cells times t (n, d), (m, n, d) by nodes."""
     d = points.shape[1]
@@ -492,7 +492,7 @@ def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ig
                     out[e, table[k, 0], i] -= pull
 
 
-@njit(**OPTIONS)
+@njit
 def write_laplacians(points, nodes, table, coupling, out):  # type: ignore[no-untyped-def]
     """Write ``1 + lam`` times the mean over corners of grad N_a . grad N_b to ``out`` (m, n, n)."""
     d = points.shape[1]

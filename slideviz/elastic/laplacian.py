@@ -35,7 +35,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import transform, value
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 COARSE = 300  # largest number of unknowns of the coarsest level, which has a dense factor
@@ -53,7 +53,6 @@ CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
 OMEGA = 4.0 / 3.0  # damping of the Jacobi step that smooths prolongations, by row sums
 
-PARALLEL: dict[str, Any] = {"parallel": True, "error_model": "python"}
 
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 """indptr, indices and data (k, w) of a sparse matrix; w = 1, or a number for each group of
@@ -275,7 +274,7 @@ def _single(matrix: Sparse) -> Sparse:
     return matrix[0], matrix[1], matrix[2].astype(np.float32)
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-def]
     """Write the rows of the Laplacian, sorted; where ``indices`` is empty, count their entries.
 
@@ -340,7 +339,7 @@ def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-
                 data[at, 0] = entry
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def add_rows(one, two, columns, indptr, indices, data):  # type: ignore[no-untyped-def]
     """Write the product of two sparse matrices; where ``indices`` is empty, count its entries.
 
@@ -372,7 +371,7 @@ def add_rows(one, two, columns, indptr, indices, data):  # type: ignore[no-untyp
                 indptr[row + 1] = stop - base
 
 
-@njit(**OPTIONS)
+@njit
 def absolute_sums(matrix, free, out):  # type: ignore[no-untyped-def]
     """Write the sums of absolute values of a matrix in columns that are free to out (k, w)."""
     indptr, indices, data = matrix
@@ -384,7 +383,7 @@ def absolute_sums(matrix, free, out):  # type: ignore[no-untyped-def]
                     out[row, g] += abs(data[k, min(g, data.shape[1] - 1)])
 
 
-@njit(**OPTIONS)
+@njit
 def diagonals(matrix, free, middle, inverse):  # type: ignore[no-untyped-def]
     """Write ``middle`` and ``inverse`` of a `LaplacianLevel`; ``free`` (k, w): what is not held."""
     indptr, indices, data = matrix
@@ -406,7 +405,7 @@ def diagonals(matrix, free, middle, inverse):  # type: ignore[no-untyped-def]
             inverse[row, g] = 1.0 / inverse[row, g] if used else 0.0
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-untyped-def]
     """Write what a Gauss-Seidel sweep from zero makes of ``right`` (k, 3) to x (k, 3).
 
@@ -439,7 +438,7 @@ def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-
             x[row, 2] = s2 * inverse[row, g2]
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def residual(matrix, middle, group, x, left):  # type: ignore[no-untyped-def]
     """Subtract from ``left`` (k, 3), as `forward` left it, what it did not yet."""
     indptr, indices, data = matrix
@@ -466,7 +465,7 @@ def residual(matrix, middle, group, x, left):  # type: ignore[no-untyped-def]
             left[row, 2] = s2
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def backward(matrix, inverse, group, right, x, out):  # type: ignore[no-untyped-def]
     """Write what a backward sweep makes of x (k, 3) to out (k, 3): the transpose of `forward`."""
     indptr, indices, data = matrix
@@ -498,7 +497,7 @@ def backward(matrix, inverse, group, right, x, out):  # type: ignore[no-untyped-
             out[row, 2] = x[row, 2] + s2 * inverse[row, g2]
 
 
-@njit(**PARALLEL)
+@njit(parallel=True)
 def add_product(matrix, group, x, out):  # type: ignore[no-untyped-def]
     """Add the product of a sparse matrix with x (k, 3) to out (m, 3); sums keep their order."""
     indptr, indices, data = matrix

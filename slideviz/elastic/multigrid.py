@@ -365,7 +365,7 @@ def sweep(indptr, indices, data, inverse, right, x, backward):  # type: ignore[n
             x[row, i] = total
 
 
-@njit(parallel=True, nogil=True, cache=True)
+@njit(parallel=True)
 def product(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
     """Write the product of a matrix in blocks with x (m, b) to out (m, b).
 

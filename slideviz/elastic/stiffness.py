@@ -30,7 +30,7 @@ from scipy.spatial import KDTree
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
-from slideviz.system.jit_cache import OPTIONS, njit
+from slideviz.system.jit_cache import njit
 from slideviz.terms import StiffnessType
 
 PYRAMID = 14
@@ -329,7 +329,7 @@ def _fill_held_diagonal(
     data[diagonal] += np.where(size > 0, size, 1.0)[:, None, None] * held[rows]
 
 
-@njit(**OPTIONS)
+@njit
 def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
     """Return det J of an element with corners x (a, d) at integration point q.
 
@@ -360,7 +360,7 @@ def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
     return det
 
 
-@njit(**OPTIONS)
+@njit
 def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
     """Write the corners (a, d) of an element; number by number, as rows take seconds to compile."""
     for a in range(x.shape[0]):
@@ -368,7 +368,7 @@ def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
             x[a, i] = points[nodes[e, a], i]
 
 
-@njit(**OPTIONS)
+@njit
 def _slopes(gradients, inverse, slopes):  # type: ignore[no-untyped-def]
     """Write grad N_a to ``slopes`` (a, d), from that in the reference element."""
     n, d = slopes.shape
@@ -380,7 +380,7 @@ def _slopes(gradients, inverse, slopes):  # type: ignore[no-untyped-def]
             slopes[a, i] = total
 
 
-@njit(**OPTIONS)
+@njit
 def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-def]
     """Write the volumes (areas) of elements to ``out`` (m,), positive for any orientation."""
     inverse = np.empty((3, 3))
@@ -392,7 +392,7 @@ def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-
             out[e] += weights[q] * abs(_jacobian(x, gradients, q, inverse))
 
 
-@njit(**OPTIONS)
+@njit
 def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-def]
     """Write the integrals of grad_i N_a grad_j N_b to m (a d, a d).
 
@@ -413,7 +413,7 @@ def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-
     return True
 
 
-@njit(**OPTIONS)
+@njit
 def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-untyped-def]
     """Add elements to the matrix blocks ``data``.
 
@@ -473,7 +473,7 @@ def add(elements, modulus, lame, conditions, pattern, data):  # type: ignore[no-
     return -1
 
 
-@njit(**OPTIONS)
+@njit
 def add_forces(elements, modulus, lame, moved, out):  # type: ignore[no-untyped-def]
     """Add the forces of a displacement (n, d) to ``out`` (n, d); parameters as of ``add``."""
     points, nodes, gradients, weights = elements
@@ -512,7 +512,7 @@ def add_forces(elements, modulus, lame, moved, out):  # type: ignore[no-untyped-
                 out[nodes[e, a], i] += f[a, i]
 
 
-@njit(**OPTIONS)
+@njit
 def _into(turn, block, half, left):  # type: ignore[no-untyped-def]
     """Replace a block (d, d) by T^T block (``left``) or block T, in place; ``half`` is scratch."""
     d = len(block)
@@ -536,7 +536,7 @@ def by_node(nodes: np.ndarray, count: int) -> tuple[IntArray, IntArray]:
     return indptr, out
 
 
-@njit(**OPTIONS)
+@njit
 def _invert(nodes, at, out):  # type: ignore[no-untyped-def]
     """Write the places of each node in ``nodes`` (m,) to out (m,), from ``at`` (n,) on."""
     for k in range(len(nodes)):
