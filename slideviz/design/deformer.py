@@ -51,7 +51,7 @@ from slideviz.rbf.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.solver.deform import Progress
 from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness, wall_warnings
 from slideviz.solver.interface_motion import InterfaceMotion
-from slideviz.solver.prepare import Prepared, prepare
+from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import AUTO_TOLERANCE, Setup, make_setup
 
@@ -608,7 +608,19 @@ class Deformer:
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         prepared = prepare(case, mesh)
+        with beginning_with(prepared.doubts):
+            self._choose(prepared, left_out, displacements, progress)
+
+    def _choose(
+        self,
+        prepared: Prepared,
+        left_out: tuple[Remark, ...],
+        displacements: FloatArray | None,
+        progress: Report | None,
+    ) -> None:
+        """Choose all that designs have in common; as the constructor."""
         case = prepared.case
+        mesh = prepared.mesh
         asked = moving_nodes(case, mesh)
         self.mesh = mesh
         self.case = case

@@ -46,7 +46,7 @@ def beginning_with(doubts: tuple[Doubt, ...]) -> Iterator[None]:
     try:
         yield
     except (CaseError, DeformError) as problem:
-        problem.args = *doubts, *problem.args
+        problem.args = tuple(dict.fromkeys((*doubts, *problem.args)))
         raise
 
 

@@ -424,6 +424,13 @@ def test_an_error_begins_with_the_doubt_that_may_be_its_cause(here):
         list(sv.deform(case, mesh))
 
 
+def test_an_error_of_a_deformer_begins_with_the_doubt_that_may_be_its_cause(here):
+    mesh = bent().with_points(120.0 * bent().points)
+    motion = sv.Cst("airfoil", 0.05, chord=(0.0, 0.001))
+    with pytest.raises(CaseError, match=r"\Amotion 1: the chord goes .*\n.* no node of 'airfoil'"):
+        sv.Deformer(mesh, sv.Case(roles={"airfoil": "moving"}, motions=(motion,)))
+
+
 def test_an_angle_of_attack_alone_moves_nothing_and_has_its_gradient(here, capsys):
     sv.write("mesh.su2", bent())
     text = SHAPES.partition("DATA_REDUCTION")[0] + (
