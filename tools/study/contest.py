@@ -15,20 +15,24 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.collections import LineCollection
 
 import slideviz as sv
 from slideviz.case.motions.motion import Motion
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
+from slideviz.plots.figure_io import empty_figure
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS, extruded, extruded_case
+from slideviz.session.reach import scaled
+from tools.shots import shrink
 from tools.study.flows import (
     SHAPES,
     c_mesh,
@@ -38,32 +42,62 @@ from tools.study.flows import (
     o_mesh,
     triangle_mesh,
 )
+from tools.study.rivals import inverse_distance, thin_plate
 from tools.study.vane_mesh import row_mesh
 
-METHODS: Mapping[str, Mapping[str, Any]] = {
-    "rbf": {"relax": "no", "layers": "no"},
-    "layers": {"relax": "no", "layers": "auto"},
-    "relax": {"relax": "yes", "layers": "no"},
-    "auto": {"relax": "auto", "layers": "auto"},
-    "elastic": {"method": "elastic", "relax": "no", "layers": "no", "steps": 1},
-    "elastic-10": {"method": "elastic", "relax": "no", "layers": "no", "steps": 10},
-    "su2": {
-        "method": "elastic",
-        "relax": "no",
-        "layers": "no",
-        "steps": 1,
-        "deform_stiffness_type": "SOLID_WALL_DISTANCE",
-        "deform_coeff": 1e6,
-    },
-}
-"""Settings of each method. Those of the first four keep the number of steps of the row; ``su2`` is
-linear elasticity with SU2's defaults, ``elastic`` with small cells stiff."""
+Method = Callable[[sv.Mesh, sv.Case], sv.Mesh]
+"""Returns the deformed mesh of a case."""
 
-LAYERED, BARE = (
-    ("rbf", "layers", "relax", "auto", "elastic", "elastic-10", "su2"),
-    ("rbf", "relax", "elastic", "su2"),
-)
-"""Methods for rows with boundary layers, and without."""
+_NOTHING = {"relax": "no", "layers": "no", "repair": "no"}
+
+
+def _with(**changes: Any) -> Method:
+    """Return the method of slideviz with these settings."""
+
+    def deformed(mesh: sv.Mesh, case: sv.Case) -> sv.Mesh:
+        *_, last = sv.deform(case.change(**{**_NOTHING, **changes}), mesh)
+        return last.mesh
+
+    return deformed
+
+
+def _elastic(stiffness: str, coefficient: float, steps: int = 1) -> Method:
+    return _with(
+        method="elastic",
+        steps=steps,
+        deform_stiffness_type=stiffness,
+        deform_coeff=coefficient,
+    )
+
+
+METHODS: Mapping[str, Method] = {
+    "rbf": _with(),
+    "layers": _with(layers="auto"),
+    "relax": _with(relax="yes"),
+    "auto": _with(relax="auto", layers="auto", repair="auto"),
+    "elastic": _elastic("INVERSE_VOLUME", 0.3),
+    "elastic-10": _elastic("INVERSE_VOLUME", 0.3, steps=10),
+    "wall-distance": _elastic("SOLID_WALL_DISTANCE", 0.3),
+    "su2": _elastic("SOLID_WALL_DISTANCE", 1e6),
+    "idwarp": inverse_distance,
+    "thin-plate": thin_plate,
+}
+"""``auto`` is what new cases of the window have; ``rbf``, ``layers`` and ``relax`` are parts of it,
+with the number of steps of the row. ``elastic`` is linear elasticity whose small cells are stiff,
+``su2`` that with SU2's defaults. ``idwarp`` and ``thin-plate`` hold all boundaries."""
+
+RIVALS = {
+    "rbf": "radial basis functions alone",
+    "su2": "SU2's default (elasticity, wall distance)",
+    "elastic": "elasticity, inverse volume",
+    "wall-distance": "elasticity, wall distance, ν = 0.3",
+    "idwarp": "IDWarp's weights",
+    "thin-plate": "SciPy's thin plate",
+}
+"""Methods that the picture has beside ``auto``, with their titles."""
+
+USUAL = ("auto", *RIVALS)
+"""Methods that run where none are named."""
 
 
 class Contest(NamedTuple):
@@ -88,6 +122,7 @@ class Outcome:
     height_max: float
     angle_deg: float
     seconds: float
+    factor: float = float("nan")  # of the motion, the largest without an inverted cell
     problem: str = ""
 
 
@@ -284,31 +319,67 @@ def _bare_rows() -> Iterator[Contest]:
             yield Contest(f"{name} {motion}", partial(_combined, mesh, _outer, body, motion), False)
 
 
-def run_row(row: Contest, methods: Sequence[str]) -> Iterator[Outcome]:
+def run_row(row: Contest, methods: Sequence[str], *, factor: bool = False) -> Iterator[Outcome]:
     """Yield the outcome of each method."""
     mesh, case = row.make()
     nan = float("nan")
     for method in methods:
         begin = time.perf_counter()
         try:
-            *_, last = sv.deform(case.change(**METHODS[method]), mesh)
+            deformed = METHODS[method](mesh, case)
         except SlidevizError as problem:
-            yield Outcome(row.name, method, nan, nan, 0, 0, nan, nan, nan, nan, str(problem))
+            refused = nan, nan, 0, 0, nan, nan, nan, nan, nan
+            yield Outcome(row.name, method, *refused, str(problem))
             continue
         seconds = time.perf_counter() - begin
-        found = sv.quality(last.mesh, mesh)
+        found = sv.quality(deformed, mesh)
         heights = (nan, nan, nan)
         if row.layered:
-            walls = sv.walls(last.mesh, mesh, case.markers_with("moving")).summary()
+            walls = sv.walls(deformed, mesh, case.markers_with("moving")).summary()
             ratios = [wall["first_height"]["ratio"] for wall in walls.values()]
             turned = max(wall["angle"]["change"]["max"] for wall in walls.values())
             heights = min(r["min"] for r in ratios), max(r["max"] for r in ratios), turned
         counts = found.inverted, found.unproven
-        yield Outcome(row.name, method, found.mean, found.min, *counts, *heights, seconds)
+        most = largest_factor(METHODS[method], mesh, case) if factor else nan
+        yield Outcome(row.name, method, found.mean, found.min, *counts, *heights, seconds, most)
+
+
+LARGEST = 4.0
+"""The largest factor of a motion that is tried."""
+
+
+def largest_factor(method: Method, mesh: sv.Mesh, case: sv.Case) -> float:
+    """Return how many times a motion may go without an inverted cell, to 5 %, up to `LARGEST`."""
+
+    def folds(part: float) -> bool:
+        motions = tuple(_scaled(motion, part) for motion in case.motions)
+        try:
+            deformed = method(mesh, case.change(motions=motions))
+        except SlidevizError:
+            return True
+        return sv.quality(deformed, mesh).inverted > 0
+
+    if not folds(LARGEST):
+        return LARGEST
+    low, high = 0.0, LARGEST
+    while high - low > 0.05 * high and high > 0.01:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if folds(middle) else (middle, high)
+    return low
+
+
+def _scaled(motion: Motion, part: float) -> Motion:
+    if isinstance(motion, sv.Prescribed):
+        return replace(motion, vectors=part * motion.vectors)
+    (found,) = scaled([motion], part) or (motion,)
+    return found
 
 
 EQUAL = 5e-4
 """Means that differ by less are equal."""
+
+MEAN_LESS, LOWEST_LESS = 0.003, 0.02
+"""How much less mean and lowest quality may be and still count as good."""
 
 HEAD = "| mesh and motion | method | mean | lowest | first heights | angle | seconds |"
 
@@ -328,7 +399,7 @@ def line(outcome: Outcome) -> str:
 def faults(row: Contest, found: Mapping[str, Outcome]) -> Iterator[str]:
     """Yield the laws of relaxation and layers that the outcomes of a row break, in words."""
     rbf = found.get("rbf")
-    ours = found.get("auto" if row.layered else "relax")
+    ours = found.get("auto")
     if ours is None or ours.problem:
         return
     if row.layered and not 0.99 <= ours.height_min <= ours.height_max <= 1.01:
@@ -345,7 +416,7 @@ def faults(row: Contest, found: Mapping[str, Outcome]) -> Iterator[str]:
     less = 0.003 if row.layered else EQUAL
     for name, most in (("elastic", less), ("su2", less), ("elastic-10", EQUAL)):
         other = found.get(name)
-        if other is None or other.problem:
+        if other is None or other.problem or other.inverted:
             continue
         if ours.mean < other.mean - most:
             yield f"mean {ours.mean:.4f}, of {name} {other.mean:.4f}"
@@ -359,7 +430,8 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--meshes", type=Path, metavar="DIR", help="SU2's folder TestCases")
     parser.add_argument("--rows", default="", metavar="REGEX", help="only rows with such a name")
     parser.add_argument("--methods", metavar="LIST", help=f"of {', '.join(METHODS)}")
-    parser.add_argument("-o", "--output", type=Path, metavar="NAME", help="write NAME.csv, NAME.md")
+    parser.add_argument("--factor", action="store_true", help="how far each motion may go, too")
+    parser.add_argument("-o", "--output", type=Path, metavar="NAME", help="NAME.csv, .md, .png")
     parser.add_argument("--list", action="store_true", help="print names of rows, and run nothing")
     arguments = parser.parse_args(argv)
     rows = [row for row in contests(arguments.meshes) if re.search(arguments.rows, row.name)]
@@ -369,27 +441,34 @@ def main(argv: Sequence[str]) -> int:
     say(HEAD + "\n" + "| --- " * HEAD.count(" | ") + "| --- |")
     outcomes, broken = [], []
     for row in rows:
-        usual = LAYERED if row.layered else BARE
-        methods = arguments.methods.split(",") if arguments.methods else usual
+        methods = arguments.methods.split(",") if arguments.methods else USUAL
         found = {}
-        for outcome in run_row(row, methods):
+        for outcome in run_row(row, methods, factor=arguments.factor):
             say(line(outcome))
             found[outcome.method] = outcome
         outcomes += found.values()
         broken += [f"{row.name}: {fault}" for fault in faults(row, found)]
         if arguments.output:
-            write(arguments.output, outcomes)
+            save(arguments.output, outcomes)
+    if arguments.output:
+        write(arguments.output, outcomes)
     say("\n" + ("\n".join(broken) or "no law is broken"))
     return 1 if broken else 0
 
 
-def write(name: Path, outcomes: Sequence[Outcome]) -> None:
-    """Write outcomes as ``name.csv``, and beside each other as ``name.md``."""
+def save(name: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write outcomes as ``name.csv``."""
     with name.with_suffix(".csv").open("w", encoding="utf-8") as file:
         table = csv.DictWriter(file, [f.name for f in fields(Outcome)], lineterminator="\n")
         table.writeheader()
         table.writerows(asdict(outcome) for outcome in outcomes)
-    name.with_suffix(".md").write_text("\n".join(beside(outcomes)) + "\n", encoding="utf-8")
+
+
+def write(name: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write the tables of outcomes as ``name.md``, and their picture as ``name.png``."""
+    lines = [*standing(outcomes), "", *beside(outcomes)]
+    name.with_suffix(".md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    draw(name.with_suffix(".png"), outcomes)
 
 
 def beside(outcomes: Sequence[Outcome]) -> Iterator[str]:
@@ -410,6 +489,63 @@ def beside(outcomes: Sequence[Outcome]) -> Iterator[str]:
             cells = [_short(found[m]) if m in found else "" for m in methods]
             yield f"| {name} | {' | '.join(cells)} |"
         yield ""
+
+
+def standing(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield the lines of a table: how ``auto`` stands beside each of `RIVALS`."""
+    yield (
+        "| beside | runs | mean as good | lowest as good | worst difference of the lowest "
+        "| inverted cells: theirs, ours | goes as far |"
+    )
+    yield "| --- " * 7 + "|"
+    for rival, title in RIVALS.items():
+        pairs = list(_pairs(outcomes, rival))
+        if not pairs:
+            continue
+        mean = sum(a.mean >= b.mean - MEAN_LESS or b.inverted > 0 for a, b in pairs)
+        lows = [_lowest(a) - _lowest(b) for a, b in pairs]
+        low = sum(one >= -LOWEST_LESS for one in lows)
+        folded = sum(b.inverted > 0 for _, b in pairs), sum(a.inverted > 0 for a, _ in pairs)
+        both = [(a.factor, b.factor) for a, b in pairs if a.factor >= 0 and b.factor >= 0]
+        far = f"{sum(a >= 0.95 * b for a, b in both)} of {len(both)}" if both else ""
+        yield (
+            f"| {title} | {len(pairs)} | {mean} | {low} | {min(lows):+.3f} "
+            f"| {folded[0]}, {folded[1]} | {far} |"
+        )
+
+
+def _pairs(outcomes: Sequence[Outcome], rival: str) -> Iterator[tuple[Outcome, Outcome]]:
+    """Yield ours and a rival's outcome of each row that both have."""
+    theirs = {o.row: o for o in outcomes if o.method == rival and not o.problem}
+    for ours in outcomes:
+        if ours.method == "auto" and not ours.problem and ours.row in theirs:
+            yield ours, theirs[ours.row]
+
+
+def _lowest(outcome: Outcome) -> float:
+    return 0.0 if outcome.inverted else outcome.lowest
+
+
+def draw(path: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write the picture: a dot for each run, its lowest over its mean quality; a panel a rival."""
+    figure = empty_figure((10.0, 7.0), 160, "constrained")
+    panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
+    for axes, (rival, title) in zip(panels, RIVALS.items(), strict=True):
+        pairs = list(_pairs(outcomes, rival))
+        ours = np.array([(a.mean, _lowest(a)) for a, _ in pairs]).reshape(-1, 2)
+        theirs = np.array([(b.mean, _lowest(b)) for _, b in pairs]).reshape(-1, 2)
+        between = LineCollection(np.stack([ours, theirs], axis=1), color="0.8", lw=0.6, zorder=1)
+        axes.add_collection(between)
+        axes.plot(*theirs.T, "o", color="tab:orange", ms=4, mew=0, label="named above", zorder=2)
+        axes.plot(*ours.T, "o", color="tab:blue", ms=4, mew=0, label="slideviz", zorder=3)
+        axes.set_title(title, fontsize=10)
+        axes.grid(visible=True, color="0.92")
+        axes.set_axisbelow(True)
+    figure.supxlabel("mean quality", fontsize=10)
+    figure.supylabel("lowest quality (0: inverted cells)", fontsize=10)
+    panels[0].legend(fontsize=9)
+    figure.savefig(path)
+    shrink(path)
 
 
 def _short(outcome: Outcome) -> str:
