@@ -8,6 +8,9 @@ with chi = (J + sqrt(eps^2 + J^2)) / 2. Where eps = 0, the second term is |F^-1|
 is infinite where a cell folds, and zero for rotations. A cell counts with the mean over its corners
 of e + kappa e^2, whatever its size: thin cells of boundary layers keep their shape. lam couples the
 lengths of a cell, but not where it is thin.
+
+Loops over ``LANES`` cells, a constant number of arrays of their own, are vectorised; in the last
+round some work on what the one before left. A cell in a plane has a third edge (0, 0, 1).
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from slideviz.elastic.stiffness import by_node
-from slideviz.mesh.jacobians import CORNERS, LANES, cross3, dot3, edge, gather
+from slideviz.mesh.jacobians import CORNERS, LANES, add3, cross3, dot3, edge, gather
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -177,132 +180,97 @@ def add_by_node(indptr, entries, each, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _edges(points, nodes, e, corner, out):  # type: ignore[no-untyped-def]
-    """Write the edges that leave a corner as columns of out (3, 3)."""
-    d = points.shape[1]
-    o = nodes[e, corner[0]]
-    for k in range(3):
-        for i in range(3):
-            out[i, k] = 0.0
-    out[2, 2] = 1.0
-    for k in range(d):
-        other = nodes[e, corner[1 + k]]
-        for i in range(d):
-            out[i, k] = points[other, i] - points[o, i]
-
-
-@njit(inline="always")
-def _cofactors(f, out):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        j = (i + 1) % 3
-        k = (i + 2) % 3
-        for a in range(3):
-            b = (a + 1) % 3
-            c = (a + 2) % 3
-            out[i, a] = f[j, b] * f[k, c] - f[j, c] * f[k, b]
-    return f[0, 0] * out[0, 0] + f[0, 1] * out[0, 1] + f[0, 2] * out[0, 2]
-
-
-@njit(inline="always")
-def _times(a, b, out):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-
-
-@njit(inline="always")
-def _gram(a, b, out):  # type: ignore[no-untyped-def]
-    """Write a^T b."""
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
-
-
-@njit(inline="always")
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for i in range(3):
-        for j in range(3):
-            total += a[i, j] * b[i, j]
-    return total
-
-
-@njit(inline="always")
-def _inverse(points, nodes, e, corner, edges, inverse):  # type: ignore[no-untyped-def]
-    _edges(points, nodes, e, corner, edges)
-    cof = np.empty((3, 3))
-    det = _cofactors(edges, cof)
-    size = 1.0
-    for k in range(3):
-        size *= np.sqrt(edges[0, k] ** 2 + edges[1, k] ** 2 + edges[2, k] ** 2)
-    if not abs(det) > FLAT * size:
-        return False
-    for i in range(3):
-        for j in range(3):
-            inverse[i, j] = cof[j, i] / det
-    return True
-
-
-@njit(inline="always")
-def _mixed(h, a, b, c):  # type: ignore[no-untyped-def]
-    """Return h_0 a + h_1 b + h_2 c, of triples."""
+def _mixed(s, a, t, b, u, c):  # type: ignore[no-untyped-def]
+    """Return s a + t b + u c, of triples a, b and c."""
     return (
-        h[0] * a[0] + h[1] * b[0] + h[2] * c[0],
-        h[0] * a[1] + h[1] * b[1] + h[2] * c[1],
-        h[0] * a[2] + h[1] * b[2] + h[2] * c[2],
+        s * a[0] + t * b[0] + u * c[0],
+        s * a[1] + t * b[1] + u * c[1],
+        s * a[2] + t * b[2] + u * c[2],
     )
 
 
-@njit
-def _write_maps(start, at, corner, d, count, duals, maps, jacobian, squares, cofactors):  # type: ignore[no-untyped-def]
-    """Write the dual edges of undeformed corners, (3, 3, LANES), and the maps F, by columns.
+@njit(inline="always")
+def _crosses(a, b, c, d):  # type: ignore[no-untyped-def]
+    return add3(cross3(a, b), cross3(c, d))
 
-    And of F the determinant, and the squares of F and of its cofactors, (LANES,).
-    """
-    o = corner[0]
-    i = corner[1]
-    j = corner[2]
-    k = corner[d] if d == 3 else corner[2]
-    up = 1.0 if d == 2 else 0.0
-    for c in range(count):
-        a = edge(start, o, i, c)
-        b = edge(start, o, j, c)
-        last = edge(start, o, k, c)
-        last = (last[0] * (1.0 - up), last[1] * (1.0 - up), last[2] + up)
-        x = cross3(b, last)
-        y = cross3(last, a)
-        z = cross3(a, b)
-        det = dot3(a, x)
+
+@njit(inline="always")
+def _ends(corner):  # type: ignore[no-untyped-def]
+    """Return the corner's node, those at the ends of its edges, and the third edge in a plane."""
+    flat = len(corner) == 3
+    return corner[0], corner[1], corner[2], corner[0 if flat else 3], 1.0 if flat else 0.0
+
+
+@njit(inline="always")
+def _edges(at, ends, up, c):  # type: ignore[no-untyped-def]
+    """Return the edges that leave a corner of cell ``c``; ``up`` is added to the third."""
+    o, i, j, k, _ = ends
+    last = edge(at, o, k, c)
+    return edge(at, o, i, c), edge(at, o, j, c), (last[0], last[1], last[2] + up)
+
+
+@njit(inline="always")
+def _duals(start, ends, scale, c):  # type: ignore[no-untyped-def]
+    """Return the dual edges of an undeformed corner; ``scale`` is one over its Jacobian."""
+    a, b, last = _edges(start, ends, ends[4], c)
+    x = cross3(b, last)
+    y = cross3(last, a)
+    z = cross3(a, b)
+    return (
+        (scale * x[0], scale * x[1], scale * x[2]),
+        (scale * y[0], scale * y[1], scale * y[2]),
+        (scale * z[0], scale * z[1], scale * z[2]),
+    )
+
+
+@njit(inline="always")
+def _map(duals, edges, flat):  # type: ignore[no-untyped-def]
+    """Return the columns of the map to ``edges``, plus ``flat`` times the identity."""
+    x, y, z = duals
+    a, b, last = edges
+    f = _mixed(x[0], a, y[0], b, z[0], last)
+    g = _mixed(x[1], a, y[1], b, z[1], last)
+    h = _mixed(x[2], a, y[2], b, z[2], last)
+    return (f[0] + flat, f[1], f[2]), (g[0], g[1] + flat, g[2]), (h[0], h[1], h[2] + flat)
+
+
+@njit(inline="always")
+def _write_scales(start, ends, scale):  # type: ignore[no-untyped-def]
+    """Write one over the Jacobian of an undeformed corner, (LANES,); 0 where it is flat."""
+    for c in range(LANES):
+        a, b, last = _edges(start, ends, ends[4], c)
+        det = dot3(a, cross3(b, last))
         size = np.sqrt(dot3(a, a) * dot3(b, b) * dot3(last, last))
-        solid = abs(det) > FLAT * size
-        scale = 1.0 / det if solid else 0.0
-        x = (scale * x[0], scale * x[1], scale * x[2])
-        y = (scale * y[0], scale * y[1], scale * y[2])
-        z = (scale * z[0], scale * z[1], scale * z[2])
-        a = edge(at, o, i, c)
-        b = edge(at, o, j, c)
-        last = edge(at, o, k, c)
-        last = (last[0] * (1.0 - up), last[1] * (1.0 - up), last[2] + up)
-        one = 0.0 if solid else 1.0
-        f = _mixed((x[0], y[0], z[0]), a, b, last)
-        g = _mixed((x[1], y[1], z[1]), a, b, last)
-        h = _mixed((x[2], y[2], z[2]), a, b, last)
-        f = (f[0] + one, f[1], f[2])
-        g = (g[0], g[1] + one, g[2])
-        h = (h[0], h[1], h[2] + one)
+        scale[c] = 1.0 / det if abs(det) > FLAT * size else 0.0
+
+
+@njit(inline="always")
+def _write_jacobians(at, ends, scale, jacobian):  # type: ignore[no-untyped-def]
+    """Write J of a corner, (LANES,); 1 where it was flat."""
+    for c in range(LANES):
+        a, b, last = _edges(at, ends, ends[4], c)
+        det = dot3(a, cross3(b, last)) * scale[c]
+        jacobian[c] = det if scale[c] != 0.0 else 1.0
+
+
+@njit(inline="always")
+def _write_pulls(duals, columns, c, pull):  # type: ignore[no-untyped-def]
+    """Write the slopes by the edges of a corner, from those by the columns of its map."""
+    for k in range(3):
+        one = _mixed(duals[k][0], columns[0], duals[k][1], columns[1], duals[k][2], columns[2])
         for axis in range(3):
-            duals[0, axis, c] = x[axis]
-            duals[1, axis, c] = y[axis]
-            duals[2, axis, c] = z[axis]
-            maps[0, axis, c] = f[axis]
-            maps[1, axis, c] = g[axis]
-            maps[2, axis, c] = h[axis]
-        p = cross3(g, h)
-        q = cross3(h, f)
-        r = cross3(f, g)
-        jacobian[c] = dot3(f, p)
-        squares[c] = dot3(f, f) + dot3(g, g) + dot3(h, h)
-        cofactors[c] = dot3(p, p) + dot3(q, q) + dot3(r, r)
+            pull[k, axis, c] = one[axis]
+
+
+@njit(inline="always")
+def _add_pulls(pull, corner, slope):  # type: ignore[no-untyped-def]
+    """Add slopes by the edges of a corner, (3, 3, LANES), to those by nodes, (3, n, LANES)."""
+    for k in range(1, len(corner)):
+        for axis in range(3):
+            for c in range(LANES):
+                slope[axis, corner[k], c] += pull[k - 1, axis, c]
+            for c in range(LANES):
+                slope[axis, corner[0], c] -= pull[k - 1, axis, c]
 
 
 @njit
@@ -311,209 +279,192 @@ def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out,
 
     It ends at the first cell whose energy is infinite.
     """
-    d = points.shape[1]
     n = nodes.shape[1]
-    start, at, slope = np.zeros((3, 3, n, LANES))
-    duals, maps = np.empty((2, 3, 3, LANES))
-    jacobian, squares, cofactors, first_part, second_part, third_part, value, low = np.empty(
-        (8, LANES)
-    )
+    start = np.zeros((3, n, LANES))
+    at = np.zeros((3, n, LANES))
+    slope = np.zeros((3, n, LANES))
+    pull = np.empty((3, 3, LANES))
+    scale = np.empty(LANES)
+    jacobian = np.empty(LANES)
+    chi = np.empty(LANES)
+    lam = np.zeros(LANES)
+    log = np.zeros(LANES)
+    value = np.empty(LANES)
     share = 1.0 / len(table)
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, start)
         gather(x, nodes, first, count, at)
+        for c in range(count):
+            lam[c] = coupling[first + c]
+            least[first + c] = np.inf
         slope[:] = 0.0
         value[:] = 0.0
-        low[:] = np.inf
-        for k in range(len(table)):
-            _write_maps(start, at, table[k], d, count, duals, maps, jacobian, squares, cofactors)
-            for c in range(count):
+        for corner in table:
+            ends = _ends(corner)
+            _write_scales(start, ends, scale)
+            _write_jacobians(at, ends, scale, jacobian)
+            for c in range(LANES):
                 j = jacobian[c]
                 root = np.sqrt(epsilon * epsilon + j * j)
-                chi = 0.5 * (j + root) if j > 0.0 else 0.5 * epsilon * epsilon / (root - j)
-                low[c] = min(low[c], j)
-                if not chi > 0.0:
+                chi[c] = 0.5 * (j + root) if j > 0.0 else 0.5 * epsilon * epsilon / (root - j)
+            for c in range(count):
+                least[first + c] = min(least[first + c], jacobian[c])
+                if not chi[c] > 0.0:
                     values[0] = np.inf
                     return
-                lam = coupling[first + c]
-                log = np.log(chi) if lam > 0.0 else 0.0
-                inverse = 1.0 / chi
-                q = cofactors[c] * inverse * inverse
-                one = 0.25 * (squares[c] + q) - 1.5 + lam * log * log
+                log[c] = np.log(chi[c]) if lam[c] > 0.0 else 0.0
+            for c in range(LANES):
+                duals = _duals(start, ends, scale[c], c)
+                flat = 0.0 if scale[c] != 0.0 else 1.0
+                f, g, h = _map(duals, _edges(at, ends, ends[4], c), flat)
+                p = cross3(g, h)
+                q = cross3(h, f)
+                r = cross3(f, g)
+                inverse = 1.0 / chi[c]
+                cof = (dot3(p, p) + dot3(q, q) + dot3(r, r)) * inverse * inverse
+                squares = dot3(f, f) + dot3(g, g) + dot3(h, h)
+                one = 0.25 * (squares + cof) - 1.5 + lam[c] * log[c] * log[c]
                 value[c] += share * (one + worst * one * one)
                 weight = share * (1.0 + 2.0 * worst * one)
-                first_part[c] = 0.5 * weight
-                second_part[c] = 0.5 * weight * inverse * inverse
-                force = (-0.5 * q + 2.0 * lam * log) * inverse
-                third_part[c] = weight * force * chi / root
-            _add_slopes(
-                table[k], d, count, duals, maps, squares, first_part, second_part, third_part, slope
-            )
-        for c in range(count):
-            values[first + c] = value[c]
-            least[first + c] = low[c]
-        for c in range(count):
-            for j in range(n):
-                for axis in range(d):
-                    out[first + c, j, axis] = slope[axis, j, c]
+                s = 0.5 * weight
+                t = s * inverse * inverse
+                root = np.sqrt(epsilon * epsilon + jacobian[c] * jacobian[c])
+                u = weight * (2.0 * lam[c] * log[c] - 0.5 * cof) / root
+                columns = (
+                    _mixed(s, f, t, _crosses(q, h, g, r), u, p),
+                    _mixed(s, g, t, _crosses(r, f, h, p), u, q),
+                    _mixed(s, h, t, _crosses(p, g, f, q), u, r),
+                )
+                _write_pulls(duals, columns, c, pull)
+            _add_pulls(pull, corner, slope)
+        values[first : first + count] = value[:count]
+        _write_nodes(slope, first, count, out)
 
 
-@njit
-def _add_slopes(corner, d, count, duals, maps, squares, one, two, three, slope):  # type: ignore[no-untyped-def]
-    """Add the slopes of a corner to slope (3, n, LANES).
-
-    They are ``one F + two (|F|^2 F - F C) + three cof F``.
-    """
-    o = corner[0]
-    i = corner[1]
-    j = corner[2]
+@njit(inline="always")
+def _write_nodes(slope, first, count, out):  # type: ignore[no-untyped-def]
     for c in range(count):
-        f = maps[0, 0, c], maps[0, 1, c], maps[0, 2, c]
-        g = maps[1, 0, c], maps[1, 1, c], maps[1, 2, c]
-        h = maps[2, 0, c], maps[2, 1, c], maps[2, 2, c]
-        fg = dot3(f, g)
-        gh = dot3(g, h)
-        hf = dot3(h, f)
-        near = one[c] + two[c] * squares[c]
-        u = cross3(g, h)
-        v = cross3(h, f)
-        w = cross3(f, g)
-        s = two[c]
-        p = _mixed((near - s * dot3(f, f), -s * fg, -s * hf), f, g, h)
-        q = _mixed((-s * fg, near - s * dot3(g, g), -s * gh), f, g, h)
-        r = _mixed((-s * hf, -s * gh, near - s * dot3(h, h)), f, g, h)
-        t = three[c]
-        p = (p[0] + t * u[0], p[1] + t * u[1], p[2] + t * u[2])
-        q = (q[0] + t * v[0], q[1] + t * v[1], q[2] + t * v[2])
-        r = (r[0] + t * w[0], r[1] + t * w[1], r[2] + t * w[2])
-        a = _mixed((duals[0, 0, c], duals[0, 1, c], duals[0, 2, c]), p, q, r)
-        b = _mixed((duals[1, 0, c], duals[1, 1, c], duals[1, 2, c]), p, q, r)
-        for axis in range(3):
-            slope[axis, i, c] += a[axis]
-            slope[axis, j, c] += b[axis]
-            slope[axis, o, c] -= a[axis] + b[axis]
-        if d == 3:
-            k = corner[3]
-            last = _mixed((duals[2, 0, c], duals[2, 1, c], duals[2, 2, c]), p, q, r)
-            for axis in range(3):
-                slope[axis, k, c] += last[axis]
-                slope[axis, o, c] -= last[axis]
+        for j in range(out.shape[1]):
+            for axis in range(out.shape[2]):
+                out[first + c, j, axis] = slope[axis, j, c]
 
 
 @njit
 def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ignore[no-untyped-def]
     """Write the Hessians of cells times t (n, d), (m, n, d) by nodes."""
-    d = points.shape[1]
-    g0 = np.empty((3, 3))
-    edges = np.empty((3, 3))
-    f = np.empty((3, 3))
-    h = np.empty((3, 3))
-    cof = np.empty((3, 3))
-    dcof = np.empty((3, 3))
-    c = np.empty((3, 3))
-    dc = np.empty((3, 3))
-    fc = np.empty((3, 3))
-    hc = np.empty((3, 3))
-    fdc = np.empty((3, 3))
-    p = np.empty((3, 3))
-    dp = np.empty((3, 3))
+    n = nodes.shape[1]
+    start = np.zeros((3, n, LANES))
+    at = np.zeros((3, n, LANES))
+    along = np.zeros((3, n, LANES))
+    slope = np.zeros((3, n, LANES))
+    pull = np.empty((3, 3, LANES))
+    scale = np.empty(LANES)
+    jacobian = np.empty(LANES)
+    lam = np.zeros(LANES)
+    log = np.zeros(LANES)
     share = 1.0 / len(table)
-    for e in range(len(nodes)):
-        out[e] = 0.0
-        lam = coupling[e]
-        for k in range(len(table)):
-            if not _inverse(points, nodes, e, table[k], edges, g0):
-                continue
-            _edges(x, nodes, e, table[k], edges)
-            _times(edges, g0, f)
-            _edges(t, nodes, e, table[k], edges)
-            if d == 2:
-                edges[2, 2] = 0.0
-            _times(edges, g0, h)
-            chi = _cofactors(f, cof)
-            _gram(f, f, c)
-            _gram(f, h, dc)
-            for i in range(3):
-                for j in range(i, 3):
-                    both = dc[i, j] + dc[j, i]
-                    dc[i, j] = both
-                    dc[j, i] = both
-            a = c[0, 0] + c[1, 1] + c[2, 2]
-            da = dc[0, 0] + dc[1, 1] + dc[2, 2]
-            q = 0.5 * (a * a - _dot(c, c))
-            dq = a * da - _dot(c, dc)
-            dchi = _dot(cof, h)
-            log = np.log(chi)
-            one = 0.25 * (a + q / (chi * chi)) - 1.5 + lam * log * log
-            force = -0.5 * q / (chi * chi * chi) + 2.0 * lam * log / chi
-            dforce = (
-                -0.5 * dq / (chi * chi * chi)
-                + 1.5 * q / (chi * chi * chi * chi) * dchi
-                + 2.0 * lam * (1.0 - log) / (chi * chi) * dchi
-            )
-            for i in range(3):
-                j = (i + 1) % 3
-                m = (i + 2) % 3
-                for u in range(3):
-                    v = (u + 1) % 3
-                    w = (u + 2) % 3
-                    dcof[i, u] = (
-                        h[j, v] * f[m, w]
-                        + f[j, v] * h[m, w]
-                        - h[j, w] * f[m, v]
-                        - f[j, w] * h[m, v]
-                    )
-            _times(f, c, fc)
-            _times(h, c, hc)
-            _times(f, dc, fdc)
-            i2 = 1.0 / (chi * chi)
-            for i in range(3):
-                for j in range(3):
-                    big = a * f[i, j] - fc[i, j]
-                    p[i, j] = 0.5 * f[i, j] + 0.5 * big * i2 + force * cof[i, j]
-                    dbig = da * f[i, j] + a * h[i, j] - hc[i, j] - fdc[i, j]
-                    dp[i, j] = (
-                        0.5 * h[i, j]
-                        + 0.5 * dbig * i2
-                        - big * dchi * i2 / chi
-                        + dforce * cof[i, j]
-                        + force * dcof[i, j]
-                    )
-            w1 = share * (1.0 + 2.0 * worst * one)
-            w2 = share * 2.0 * worst * _dot(p, h)
-            for i in range(3):
-                for j in range(3):
-                    dp[i, j] = w1 * dp[i, j] + w2 * p[i, j]
-            for j in range(d):
-                for i in range(d):
-                    pull = dp[i, 0] * g0[j, 0] + dp[i, 1] * g0[j, 1] + dp[i, 2] * g0[j, 2]
-                    out[e, table[k, 1 + j], i] += pull
-                    out[e, table[k, 0], i] -= pull
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(points, nodes, first, count, start)
+        gather(x, nodes, first, count, at)
+        gather(t, nodes, first, count, along)
+        for c in range(count):
+            lam[c] = coupling[first + c]
+        slope[:] = 0.0
+        for corner in table:
+            ends = _ends(corner)
+            _write_scales(start, ends, scale)
+            _write_jacobians(at, ends, scale, jacobian)
+            for c in range(count):
+                log[c] = np.log(jacobian[c]) if lam[c] > 0.0 else 0.0
+            for c in range(LANES):
+                duals = _duals(start, ends, scale[c], c)
+                flat = 0.0 if scale[c] != 0.0 else 1.0
+                f, g, h = _map(duals, _edges(at, ends, ends[4], c), flat)
+                df, dg, dh = _map(duals, _edges(along, ends, 0.0, c), 0.0)
+                p = cross3(g, h)
+                q = cross3(h, f)
+                r = cross3(f, g)
+                dp = _crosses(dg, h, g, dh)
+                dq = _crosses(dh, f, h, df)
+                dr = _crosses(df, g, f, dg)
+                # The slopes of half the square of the cofactors, and their changes.
+                a = _crosses(q, h, g, r)
+                b = _crosses(r, f, h, p)
+                last = _crosses(p, g, f, q)
+                da = add3(_crosses(dq, h, q, dh), _crosses(dg, r, g, dr))
+                db = add3(_crosses(dr, f, r, df), _crosses(dh, p, h, dp))
+                dlast = add3(_crosses(dp, g, p, dg), _crosses(df, q, f, dq))
+                inverse = 1.0 / jacobian[c]
+                dlog = (dot3(p, df) + dot3(q, dg) + dot3(r, dh)) * inverse
+                square = inverse * inverse
+                cof = (dot3(p, p) + dot3(q, q) + dot3(r, r)) * square
+                dcof = 2.0 * (dot3(a, df) + dot3(b, dg) + dot3(last, dh)) * square
+                squares = dot3(f, f) + dot3(g, g) + dot3(h, h)
+                one = 0.25 * (squares + cof) - 1.5 + lam[c] * log[c] * log[c]
+                force = (2.0 * lam[c] * log[c] - 0.5 * cof) * inverse
+                dforce = (2.0 * lam[c] + cof) * dlog - 0.5 * dcof
+                dforce = dforce * inverse - force * dlog
+                slopes = (
+                    _mixed(0.5, f, 0.5 * square, a, force, p),
+                    _mixed(0.5, g, 0.5 * square, b, force, q),
+                    _mixed(0.5, h, 0.5 * square, last, force, r),
+                )
+                weight = share * (1.0 + 2.0 * worst * one)
+                more = dot3(slopes[0], df) + dot3(slopes[1], dg) + dot3(slopes[2], dh)
+                more = 2.0 * share * worst * more
+                s = 0.5 * weight
+                t_a = s * square
+                u = weight * force
+                v = -2.0 * t_a * dlog
+                w = weight * dforce
+                columns = (
+                    add3(_mixed(s, df, t_a, da, u, dp), _mixed(v, a, w, p, more, slopes[0])),
+                    add3(_mixed(s, dg, t_a, db, u, dq), _mixed(v, b, w, q, more, slopes[1])),
+                    add3(_mixed(s, dh, t_a, dlast, u, dr), _mixed(v, last, w, r, more, slopes[2])),
+                )
+                _write_pulls(duals, columns, c, pull)
+            _add_pulls(pull, corner, slope)
+        _write_nodes(slope, first, count, out)
 
 
 @njit
 def write_laplacians(points, nodes, table, coupling, out):  # type: ignore[no-untyped-def]
     """Write ``1 + lam`` times the mean over corners of grad N_a . grad N_b to ``out`` (m, n, n)."""
+    n = nodes.shape[1]
     d = points.shape[1]
-    edges = np.empty((3, 3))
-    dual = np.empty((3, 3))
-    for e in range(len(nodes)):
-        out[e] = 0.0
-        share = (1.0 + coupling[e]) / len(table)
-        for k in range(len(table)):
-            if not _inverse(points, nodes, e, table[k], edges, dual):
-                continue
-            o = table[k, 0]
+    start = np.zeros((3, n, LANES))
+    entries = np.empty((n, n, LANES))
+    scale = np.empty(LANES)
+    products = np.empty((3, 3, LANES))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(points, nodes, first, count, start)
+        entries[:] = 0.0
+        for corner in table:
+            ends = _ends(corner)
+            _write_scales(start, ends, scale)
+            for c in range(LANES):
+                duals = _duals(start, ends, scale[c], c)
+                for a in range(3):
+                    for b in range(3):
+                        products[a, b, c] = dot3(duals[a], duals[b])
+            o = corner[0]
             for a in range(d):
                 for b in range(d):
-                    one = 0.0
-                    for i in range(d):
-                        one += dual[a, i] * dual[b, i]
-                    one *= share
-                    i = table[k, 1 + a]
-                    j = table[k, 1 + b]
-                    out[e, i, j] += one
-                    out[e, o, j] -= one
-                    out[e, i, o] -= one
-                    out[e, o, o] += one
+                    i = corner[1 + a]
+                    j = corner[1 + b]
+                    for c in range(LANES):
+                        entries[i, j, c] += products[a, b, c]
+                    for c in range(LANES):
+                        entries[o, j, c] -= products[a, b, c]
+                    for c in range(LANES):
+                        entries[i, o, c] -= products[a, b, c]
+                    for c in range(LANES):
+                        entries[o, o, c] += products[a, b, c]
+        for c in range(count):
+            share = (1.0 + coupling[first + c]) / len(table)
+            for i in range(n):
+                for j in range(n):
+                    out[first + c, i, j] = share * entries[i, j, c]
