@@ -9,7 +9,7 @@ from typing import Any
 
 from slideviz import terms
 from slideviz.argument_types import check_types
-from slideviz.case.cfg import read_case, write_case
+from slideviz.case.cfg import read_case, set_key, write_case
 from slideviz.case.check import key_problems
 from slideviz.case.fields import CaseFields
 from slideviz.errors import CaseError, nearest, raise_all
@@ -95,6 +95,27 @@ class Case(CaseFields):
             if name not in names:
                 raise CaseError(f"a case has no {name!r}{nearest(name, names)}")
         return replace(self, **values)
+
+    def set(self, **keys: str) -> Case:
+        """Return the case with other values of some keys, as texts like those of a case file.
+
+        As with the option ``--set`` of the commands, a list of markers replaces all with that role.
+
+        Raises
+        ------
+        CaseError
+            There is no such key, or the value is wrong.
+
+        Examples
+        --------
+        >>> import slideviz as sv
+        >>> sv.Case().set(STEPS="5", MARKER_MOVING="( blade )").markers_with("moving")
+        ('blade',)
+        """
+        case = self
+        for key, text in keys.items():
+            case = set_key(case, key, text, "set")
+        return case
 
     def markers_with(self, role: terms.Role) -> tuple[str, ...]:
         """Return the names of the markers with a role, in the order of ``roles``."""

@@ -171,11 +171,13 @@ def metric_names(text: str) -> tuple[Quantity, ...]:
 
 
 def zoom(text: str) -> Zoom:
-    """Return the detail for ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``; ``auto`` and ``all`` as they are."""
+    """Return the detail for ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``; a word of `Zoom` as it is."""
     if text == "auto":
         return "auto"
     if text == "all":
         return "all"
+    if text == "view":
+        return "view"
     # Late: NumPy takes 0.1 s, and help does not need it.
     from slideviz.scene.overview import Detail
 
@@ -186,7 +188,7 @@ def zoom(text: str) -> Zoom:
         width = 0.0
     if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
         raise CaseError(
-            f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
+            f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH > 0) nor all, auto or view"
         )
     return Detail(tuple(centre), width)
 

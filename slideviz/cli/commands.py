@@ -142,7 +142,7 @@ ZOOM = value(
     zoom,
     "X,Y[,Z],WIDTH",
     "center and width of the picture; `all` is the whole mesh, as is `auto` (default), unless the "
-    "moving body is tiny in it",
+    "moving body is tiny in it; `view` is the view, colors and sections of the keys VIEW_...",
     default="auto",
 )
 REFERENCE = file(
@@ -262,6 +262,25 @@ COMMANDS = {
             FORCE,
         ),
         holds=True,
+    ),
+    "picture": Command(
+        "deform a mesh and write a picture of a step",
+        (
+            CASE,
+            file("-o --output", "FILE.png", "the picture", required=True),
+            value("--step", int, "N", "the step to show; 0 is the undeformed mesh (the last)"),
+            several(
+                "--beside",
+                "KEY=VALUE",
+                "show a second run next to it with this change; or `undeformed`; may be repeated",
+            ),
+            value("--size", size, "WxH", "pixels (1600x1000)", default=(1600, 1000)),
+            ZOOM,
+            *CHANGES,
+            ZONE,
+            QUIET,
+        ),
+        "Deform a mesh as a case file says, and write a picture of a step. No mesh is written.",
     ),
     "film": Command(
         "deform a mesh and write the steps as MP4, GIF or numbered pictures",

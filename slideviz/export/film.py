@@ -217,7 +217,9 @@ def film(
     if options.both:
         require_pair_width(options.size)
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
-        runs = renderer.shown(session, options)
+        if zoom == "view":
+            options = options.like(renderer.session.view)
+        runs = renderer.shown(renderer.session, options)
         titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
         yield from draw_images(
             film_steps(renderer, options, path, film_options, titles=titles, overwrite=overwrite)

@@ -33,7 +33,7 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import show_frame
-from slideviz.session.opening import session_of_runs
+from slideviz.session.opening import session_of_runs, with_case_view
 from slideviz.session.panes import second_session, shown_views
 from slideviz.session.pieces import render_in_groups, run_to_end
 from slideviz.session.state import Run, Session, StepFrame
@@ -45,7 +45,7 @@ class OffscreenRenderer:
 
     ``surfaces``: the boundaries of its mesh. ``like``: the scene of a view whose camera, color
     scheme and ghosts are used. ``overview``: the cells and the camera without such a view; all
-    steps of the runs are fitted.
+    steps of the runs are fitted. ``place``: the camera without either (`Camera.view`).
     """
 
     def __init__(
@@ -54,11 +54,13 @@ class OffscreenRenderer:
         surfaces: Sequence[Surface],
         like: Scene | None = None,
         overview: Overview | None = None,
+        place: tuple[float, ...] | None = None,
     ) -> None:
         self.session = session
         self.surfaces = surfaces
         self.like = like
         self.overview = overview
+        self.place = place
         self._stack = ExitStack()
         self._plotter: Any = None
         self._scene: Any = None
@@ -68,11 +70,14 @@ class OffscreenRenderer:
     def of_runs(cls, session: Session, zoom: Zoom = "auto") -> OffscreenRenderer:
         """Return a renderer with the overview of the run with the largest displacement.
 
-        Raises SlidevizError if the detail has not as many coordinates as the mesh, or is outside
-        the mesh.
+        Or, for the zoom ``view``, with the view of the session's case. Raises SlidevizError if the
+        detail has not as many coordinates as the mesh, or is outside the mesh.
         """
         base = session.mesh
         assert base is not None
+        if zoom == "view":
+            place = session.case.view.get("VIEW_CAMERA")
+            return cls(with_case_view(session), find_surfaces(base), place=place)
         lasts = [run.last.mesh for run in session.runs if run.last is not None]
         farthest = max(lasts, key=lambda mesh: float(lengths(mesh, base).max()), default=base)
         overview = Overview.of(farthest, base, zoom)
@@ -279,12 +284,16 @@ class OffscreenRenderer:
             scene.camera.copy_from(like.camera)
         if self.overview is not None:
             scene.look_along(self.overview, self._seen(options))
+        elif self.place is not None:
+            scene.camera.move_to(self.place)
+            if scene.camera.is_fit(self.place):
+                scene.camera.fit()
         elif options.fill:
             scene.camera.fit()
         elif like is not None:
             scene.camera.show_width_of(like.camera)
-        # Zoom out for the title's room; a detail keeps the width that was asked for.
-        if camera.parallel_projection and not self.shows_detail:
+        # Zoom out for the title's room; a place, or the width of a detail, was asked for.
+        if camera.parallel_projection and self.place is None and not self.shows_detail:
             camera.parallel_scale = camera.parallel_scale / (1.0 - options.top)
         self._keep_room(options)
 
@@ -305,14 +314,19 @@ def picture(
 ) -> None:
     """Write a PNG of what a session shows, a run or a mesh alone, for `slideviz.picture`.
 
-    Raises SlidevizError if the size cannot be drawn, or the file cannot be written.
+    With the zoom ``view``, it is the picture of the view that the case has. Raises SlidevizError if
+    the size cannot be drawn, or the file cannot be written.
     """
     check_png(Path(file))
     assert session.frame is not None
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         words = caption(Path(session.frame.mesh.name).name, session.frame.quality)
         words += DETAIL if renderer.shows_detail else ""
-        renderer.write(PictureOptions(size, title=True, heading=words), Path(file))
+        options = PictureOptions(size, title=True, heading=words)
+        if zoom == "view":
+            letters = LETTERS * size[0] / size[1] / 1.6  # as large as in the window
+            options = PictureOptions(size, letters=letters).like(renderer.session.view)
+        renderer.write(options, Path(file))
 
 
 def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[Pixels]:

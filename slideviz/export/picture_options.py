@@ -17,7 +17,7 @@ from slideviz.export.titles import (
 )
 from slideviz.scene.stage import STRIP
 from slideviz.session.colors import with_drawable_colors
-from slideviz.session.state import Session, StepFrame
+from slideviz.session.state import Session, StepFrame, ViewState
 from slideviz.terms import Shown
 
 Background = Literal["white", "shown", "transparent"]
@@ -89,6 +89,13 @@ class PictureOptions:
     def scale(self) -> float:
         """Return the size of the letters in units of 13 pixels, and so of all lengths in pixels."""
         return font_scale(self.size) * self.letters
+
+    def like(self, view: ViewState) -> PictureOptions:
+        """Return the options of a picture that draws what a view draws."""
+        drawn = view.drawn
+        return replace(
+            self, legend="legend" in drawn, edges="edges" in drawn, triad="triad" in drawn
+        )
 
     def within(self, box: tuple[int, int]) -> PictureOptions:
         """Return the options of the same picture, scaled down to fit a box of pixels."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
@@ -14,6 +16,7 @@ from slideviz.export.offscreen_renderer import PICTURE_SIZE
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
+from slideviz.session.changes import UNDEFORMED, show_beside
 from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import Step
@@ -32,6 +35,7 @@ def picture(
     before: Quality | None = None,
     size: tuple[int, int] = PICTURE_SIZE,
     zoom: Zoom = "auto",
+    beside: tuple[Case, Step] | Literal["undeformed"] | None = None,
 ) -> None:
     """Write a PNG of a mesh in the colors of its quality, with name and quality as title.
 
@@ -54,8 +58,12 @@ def picture(
         The quality of the cells, and of those of the reference, if they are known already.
     size : (int, int)
         Width and height in pixels.
-    zoom : Detail, "auto" or "all"
-        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
+    zoom : Detail, "auto", "all" or "view"
+        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it, "view"
+        what the window showed by the keys VIEW_... of the case, with colors and sections, and
+        without a title.
+    beside : (Case, Step) or "undeformed", optional
+        Another run of the mesh, or the undeformed mesh, drawn beside it.
 
     Raises
     ------
@@ -71,12 +79,19 @@ def picture(
     case = case or Case()
     metric = case.quality_metric
     measured = quality(mesh, reference=reference, metric=metric) if rated is None else rated
-    if reference is None:
-        session = session_of_runs(StepFrame(mesh, measured))
-    else:
+    runs = []
+    first = StepFrame(mesh, measured)
+    if reference is not None:
         before = quality(reference, metric=metric) if before is None else before
         first = StepFrame(reference, before)
-        session = session_of_runs(first, [Run(1, case, (StepFrame(mesh, measured, step),), "done")])
+        runs = [Run(1, case, (StepFrame(mesh, measured, step),), "done")]
+    if isinstance(beside, tuple):
+        other, its = beside
+        found = quality(its.mesh, reference=reference, metric=other.quality_metric)
+        runs.append(Run(2, other, (StepFrame(its.mesh, found, its),), "done"))
+    session = replace(session_of_runs(first, runs), case=case)
+    if beside == "undeformed":
+        session = show_beside(session, UNDEFORMED)
     offscreen_renderer.picture(session, path, size, zoom)
 
 
@@ -117,8 +132,8 @@ def film(
         Seconds that the last image is shown.
     between : int
         Images between two steps: nodes on straight lines, quality of that mesh.
-    zoom : Detail, "auto" or "all"
-        What part of the mesh is seen.
+    zoom : Detail, "auto", "all" or "view"
+        What part of the mesh is seen, as for `picture`.
     overwrite : bool
         Allow files that exist.
 

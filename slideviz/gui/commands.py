@@ -242,6 +242,22 @@ def needs_repair(now: CommandState) -> bool:
     return is_idle(now) and to_mend(now.session) is not None
 
 
+def has_file(now: CommandState) -> bool:
+    """Return whether there is a mesh in memory whose case is saved."""
+    session = now.session
+    return has_mesh(now) and session.case.source is not None and not session.lacks_cells
+
+
+def has_section(now: CommandState) -> bool:
+    """Return whether a section of a saved case is selected."""
+    return has_file(now) and now.session.view.section is not None
+
+
+def has_run_of_file(now: CommandState) -> bool:
+    """Return whether the shown run of a saved case has steps."""
+    return has_file(now) and has_steps(now)
+
+
 def has_steps_and_is_idle(now: CommandState) -> bool:
     """Return whether the shown run has steps and no job runs."""
     return has_steps(now) and is_idle(now)
@@ -314,6 +330,7 @@ def _fill_panels(window: MainWindow, menu: QMenu) -> None:
 # fmt: off
 
 _NO_STEPS = "There are no steps yet: run the case first."
+_NO_FILE = "Save the case first (Ctrl+Shift+S): a command names its file."
 _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes.", (
     Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
             call("exports.picture"), ("Ctrl+P",), "picture", has_mesh),
@@ -361,6 +378,21 @@ _FILE = Menu("file", "&File", entries=(
             call("close"), (KEY.Quit,)),
 ), tooltips=True)
 
+_COPY_AS = Menu("copy_as", "&Copy as", "Copy what makes again what is shown, to be pasted.", tuple(
+    Command(f"copy_{what}_{place}", f"{title} {words}",
+            f"Copy {about} {words}: what differs from the case file is in it.",
+            call("exports.copy_as", what, place), keys, enabled=able, why_not=why)
+    for place, words in enumerate(("as a command", "as Python"))
+    for what, title, about, keys, able, why in (
+        ("picture", "&View", "the picture of the view, with the run it shows,",
+         (("Ctrl+Alt+C", "Ctrl+Alt+P")[place],), has_file, _NO_FILE),
+        ("section", "&Section", "the picture of the selected section", (), has_section,
+         "Select a section of a saved case first."),
+        ("film", "&Film", "the film of the steps", (), has_run_of_file, _NO_STEPS),
+        ("run", "&Run", "the run", (), has_file, _NO_FILE),
+    )
+), tooltips=True)
+
 _EDIT = Menu("edit", "&Edit", entries=(
     Command("undo", "Undo", "Undo the last change.",
             lambda w: _undo_or_redo(w, w.store.undo, w.store.can_undo, "Undone"),
@@ -372,6 +404,8 @@ _EDIT = Menu("edit", "&Edit", entries=(
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
             title_now=lambda now: f"Redo {now.redo}".rstrip(),
             tip_now=lambda now: now.redo and f"Redo {now.redo}"),
+    None,
+    _COPY_AS,
 ))
 
 _RUN = Menu("run", "&Run", entries=(

@@ -24,16 +24,17 @@ class Detail:
     """The width that is seen, in the mesh's length unit."""
 
 
-Zoom = Detail | Literal["auto", "all"]
+Zoom = Detail | Literal["auto", "all", "view"]
 """What a picture shows: a given detail, the whole mesh (``all``), or automatically one of both.
 
-``auto`` is the surroundings of the moved boundaries if these are tiny in the mesh, else all."""
+``auto`` is the surroundings of the moved boundaries if these are tiny in the mesh, else all.
+``view`` is the view of the window, as the keys VIEW_... of the case have it."""
 
 
 def require_detail(zoom: Zoom, mesh: Mesh) -> None:
     """Raise SlidevizError if a detail is not in the mesh or has the wrong dimension.
 
-    A word other than "auto" and "all" raises it, too.
+    A word that `Zoom` does not have raises it, too.
     """
     if not isinstance(zoom, Detail):
         if zoom not in (words := get_args(get_args(Zoom)[1])):

@@ -12,7 +12,7 @@ import numpy as np
 from slideviz.case.model import NEW, Case
 from slideviz.case.motions.box import box_motions
 from slideviz.mesh.model import Mesh, Skin
-from slideviz.mesh.periodic import Pair
+from slideviz.mesh.periodic import Pair, find_pairs
 from slideviz.rbf.reduction import Reduction
 from slideviz.session.saving import bound_sections, view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
@@ -89,6 +89,15 @@ def session_of_runs(
     view = ViewState(color_by=color_by, frame=last, beside=beside)
     shown = runs[0].number if runs else None
     return Session(first.mesh, None, case, first=first, runs=tuple(runs), shown=shown, view=view)
+
+
+def with_case_view(session: Session) -> Session:
+    """Return a session with the view of its case; step and second view stay."""
+    first = session.first
+    assert first is not None
+    pairs = tuple(find_pairs(first.mesh))
+    view = open_mesh(first, None, pairs, session.case).view
+    return replace(session, pairs=pairs, view=session.view.in_style(view))
 
 
 NAMES: tuple[tuple[Role, str], ...] = (

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 import threading
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ from qtpy.QtWidgets import QApplication, QDialog
 
 from slideviz import read
 from slideviz.case.model import Case
+from slideviz.cli import run
 from slideviz.errors import SlidevizError
 from slideviz.export import film as film_module
 from slideviz.export.film import FilmOptions
@@ -41,6 +43,7 @@ from slideviz.plots.style import PRINT
 from slideviz.session import changes, jobs, pieces
 from slideviz.session.section_cuts import first_section
 from tests.builders import passage, stage
+from tests.golden.alike import picture_difference
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
@@ -808,3 +811,51 @@ def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_
         assert not dialog.options["marked"].isChecked()
         assert dialog._form.isRowVisible(dialog.options["marked"])
         assert "marked" not in json.loads(dialog.choices)
+
+
+def paste(qtbot, keys):
+    QApplication.clipboard().clear()
+    qtbot.keyClick(QApplication.activeWindow(), *keys)
+    return QApplication.clipboard().text()
+
+
+COPY = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
+
+
+def test_the_view_is_copied_as_a_command_that_draws_it(
+    ran, qtbot, sample_folder, tmp_path, monkeypatch
+):
+    driver = ran
+    window = driver.window
+    window.viewing.fit()
+    copied = paste(qtbot, (Qt.Key.Key_C, COPY))
+    assert copied.startswith(f"slideviz picture {sample_folder}/passage/passage.cfg -o passage.png")
+    assert "VIEW_COLOR=size-skew" in copied
+    program = paste(qtbot, (Qt.Key.Key_P, COPY))
+    assert program.startswith("import slideviz as sv\n")
+    assert "Copied: sv.picture(" in window.statusBar().currentMessage()
+    monkeypatch.chdir(tmp_path)
+    _, *words = shlex.split(copied.replace("\\\n", ""))
+    assert run([*words, "-q"]) == 0
+    window.exports.copy_picture()
+    ours = QApplication.clipboard().image()
+    ours.save("window.png")
+    with Image.open("window.png") as one, Image.open("passage.png") as other:
+        assert picture_difference(one.convert("RGB"), other.convert("RGB")) == ""
+
+
+def test_what_cannot_be_copied_says_why(opened, qtbot):
+    window = opened.window
+    act = window.actions_table.by_name["copy_picture_0"]
+    assert not act.isEnabled(), "no case file"
+    assert "Save the case first" in act.toolTip()
+    assert not paste(qtbot, (Qt.Key.Key_C, COPY))
+
+
+def test_an_error_of_copying_is_shown(ran, qtbot):
+    window = ran.window
+    file = ran.session.case.source
+    case = ran.session.case.change(source=file.with_name("none.cfg"))
+    window.store.change(changes.saved_case, case)
+    paste(qtbot, (Qt.Key.Key_C, COPY))
+    assert "no such case file" in window.banner.text.text()

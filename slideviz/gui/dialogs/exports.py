@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject
-from qtpy.QtWidgets import QWidget
+from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.export.flat_section import save_section
@@ -33,6 +33,7 @@ from slideviz.gui.widgets.services import Services
 from slideviz.plots.section_picture import SectionStyle
 from slideviz.session import changes, jobs
 from slideviz.session.motions import shown_case, wheel_passages
+from slideviz.session.scripts import SCRIPTS
 from slideviz.session.state import Session
 
 if TYPE_CHECKING:
@@ -65,6 +66,13 @@ class Exports(QObject):
     def _renderer(self) -> OffscreenRenderer:
         viewing = self.window.viewing
         return OffscreenRenderer(self._session, viewing.surfaces, viewing.scene)
+
+    def _size(self) -> tuple[int, int]:
+        """Return the size in pixels of a picture of the view."""
+        view = self.window.viewing
+        width = max(view.width(), 64)
+        larger = max(COPIED_WIDTH / width, 1.0)
+        return round(larger * width), round(larger * max(view.height(), 64))
 
     # Pictures --------------------------------------------------------------------------
     def picture(self) -> None:
@@ -104,23 +112,27 @@ class Exports(QObject):
         """Copy a picture of the view to the clipboard, with a white background."""
         if self._session.mesh is None:
             return
-        view = self.window.viewing
-        width = max(view.width(), 64)
-        height = max(view.height(), 64)
-        larger = max(COPIED_WIDTH / width, 1.0)
-        size = round(larger * width), round(larger * height)
-        shown = self._session.view
+        size = self._size()
         with self._renderer() as renderer, wait_cursor():
             options = PictureOptions(
                 size,
-                legend="legend" in shown.drawn,
-                edges="edges" in shown.drawn,
                 fill=renderer.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
                 marked=renderer.session.marked_here,
-            )
+            ).like(self._session.view)
             copy_image(to_image(renderer.image(options)))
         self.window.show_status(f"Copied a picture of {size[0]} × {size[1]} pixels")
+
+    def copy_as(self, what: str, place: int) -> None:
+        """Copy the command (``place`` 0) or the program (1) that makes again what is shown."""
+        camera = self.window.viewing.scene.camera.view
+        try:
+            made = SCRIPTS[what](self._session, camera, self._size())
+        except (OSError, SlidevizError) as error:
+            self.window.banner.show_error(error)
+            return
+        QApplication.clipboard().setText(made[place])
+        self.window.show_status(f"Copied: {made[place].splitlines()[-1]}")
 
     def section(self, paper: SectionStyle) -> None:
         """Ask for a file name, and write a picture of the selected section."""

@@ -490,16 +490,13 @@ class FilmForm(PixelFields, QWidget):
         return PictureOptions(
             self.pixels,
             "white" if self.white.isChecked() else "shown",
-            legend="legend" in view.drawn,
-            edges="edges" in view.drawn,
-            triad="triad" in view.drawn,
             title=True,
             fill=self.fill.isChecked(),
             both=False,
             letters=1.25,
             film=True,
             marked=self.mark.isChecked(),
-        )
+        ).like(view)
 
     def _kind_chosen(self, kind: str) -> None:
         width, height = SIZES[kind or ".png"]
