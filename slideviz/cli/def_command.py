@@ -99,7 +99,7 @@ def main(arguments: Namespace) -> int:
         case = surface.case()
         if surface.moves_whole_mesh or not moves:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
-        return surface, run_steps(arguments, case, mesh)
+        return surface, run_steps(arguments, case, mesh, converged=True)
 
     say("warning", warning_of_losses(output, first.boxed(mesh), kind))
     with _relaxation_told(config):

@@ -291,7 +291,9 @@ def measured(case: Case, mesh: Mesh, steps: Sequence[Step], timer: PhaseTimer) -
     return RunResult(mesh, tuple(steps), found, before, folded, timer.seconds, layers)
 
 
-def run_steps(arguments: Namespace, case: Case, mesh: Mesh) -> list[Step]:
+def run_steps(
+    arguments: Namespace, case: Case, mesh: Mesh, *, converged: bool = False
+) -> list[Step]:
     """Deform a mesh, and return all steps; write each step's mesh where asked for.
 
     Once meshes take more than `KEPT_BYTES`, only the last step keeps its own; earlier steps have
@@ -301,7 +303,7 @@ def run_steps(arguments: Namespace, case: Case, mesh: Mesh) -> list[Step]:
     folder = arguments.steps_dir
     series = _series(arguments, case, mesh)
     with series as add, Bar(not arguments.quiet, begun=arguments.begun) as bar:
-        for step in deform(case, mesh, bar, certify=True):
+        for step in deform(case, mesh, bar, certify=True, converged=converged):
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))

@@ -648,7 +648,7 @@ class Deformer:
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
         held = _with_common_radius(case, mesh, asked, references)
-        setup = make_setup(Prepared(held, mesh), displaced(most, mesh))
+        setup = make_setup(Prepared(held, mesh), displaced(most, mesh)).converging()
         if setup.reduction is not None and not sizes.any():
             raise DeformError(
                 "all displacements are zero, so control nodes cannot be chosen; give "
@@ -810,6 +810,7 @@ class Deformer:
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.
 
+        That is with ``converged=True``, if the mesh is relaxed.
         None where a system is nearly singular: the deformer solves it with more digits than a run.
         Of several zones, nodes that follow others are equal to them up to rounding.
         """

@@ -127,6 +127,8 @@ class Relaxation:
     mesh: Mesh  # undeformed, with its halo
     domain: Mesh  # undeformed, without the halo
     body: Body
+    converged: bool = False
+    """Whether it goes on until only rounding is left, as derivatives need it."""
 
     def relaxed(
         self,
@@ -162,11 +164,11 @@ class Relaxation:
             def way_on(walls: Walls) -> _Way:
                 return _Way(self, problem, value(displacement), made, unknowns, walls)
 
-            if problem.frozen is not None and problem.curved:
+            if self.converged and problem.curved:
                 walls = problem.choose("walls", lambda: way_on(walls).frozen_walls(tick))
             way = way_on(walls)
-            way.go(tick, _residual(made.energy.count) if problem.frozen is None else CLOSE)
-            if problem.frozen is not None:
+            way.go(tick, CLOSE if self.converged else _residual(made.energy.count))
+            if self.converged:
                 way.finish()
             start = points(self.body.frame, problem.coords + displacement)
             end = recorded(

@@ -45,6 +45,7 @@ def deform(
     progress: Callable[[Progress], None] | None = None,
     setup: Setup | None = None,
     certify: bool = False,
+    converged: bool = False,
 ) -> Iterator[Step]:
     """Yield the deformed mesh of each step, with numbers on how it was made.
 
@@ -62,6 +63,9 @@ def deform(
         alone; it is made when there is none.
     certify
         Whether each step says how far it may go until the first cell folds (``Step.safe``).
+    converged
+        Whether relaxation goes on until only rounding is left, as that of a `Deformer`; it takes
+        longer, and differences of runs then are those that a derivative predicts.
 
     Raises
     ------
@@ -100,10 +104,11 @@ def deform(
     with beginning_with(prepared.doubts):
         if isinstance(mesh, Assembly):
             motion = InterfaceMotion(prepared, mesh)
-            runs = zone_runs(motion, partial(_steps_of_zone, certify=certify), report)
+            run = partial(_steps_of_zone, certify=certify, converged=converged)
+            runs = zone_runs(motion, run, report)
             steps = joined_steps(motion, runs)
         else:
-            steps = _steps_of_zone(prepared, report, setup, certify=certify)
+            steps = _steps_of_zone(prepared, report, setup, certify=certify, converged=converged)
         for step in steps:
             yield replace(step, check_limits=check_limits)
 
@@ -114,6 +119,7 @@ def _steps_of_zone(
     setup: Setup | None = None,
     *,
     certify: bool,
+    converged: bool,
 ) -> Iterator[Step]:
     case = prepared.case
     mesh = prepared.mesh
@@ -121,6 +127,8 @@ def _steps_of_zone(
     if setup is None:
         with timer.phase("classify"):
             setup = make_setup(prepared)
+    if converged:
+        setup = setup.converging()
     require_memory(setup, case)
     mend = None
     if case.repair != "no" and not isinstance(mesh, Skin):

@@ -195,6 +195,12 @@ class Setup(Domain):
         """
         return self if is_last or self.relaxation is None else replace(self, relaxation=None)
 
+    def converging(self) -> Setup:
+        """Return the setup with which relaxation goes on until only rounding is left."""
+        if self.relaxation is None:
+            return self
+        return replace(self, relaxation=replace(self.relaxation, converged=True))
+
     @property
     def rigid(self) -> IntArray:
         """Return the nodes (r,) that walls carry nearly alone."""

@@ -10,6 +10,8 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.design.su2 import gradients
+from slideviz.design.su2.config import on_mesh, read_config
+from slideviz.design.su2.surface import make_surface
 from tests.builders import cube, passage, square
 
 DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
@@ -136,6 +138,59 @@ def test_gradient_is_that_of_central_differences(kinds, setting, here):
     assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
     np.testing.assert_allclose(gradient(), expected, rtol=2e-6, atol=1e-8)
     assert json.loads(Path("dot.json").read_text())["at"] == "design"
+
+
+REPEATED = "MARKER_PERIODIC= (x_m, x_p, 0, 0, 0, 0, 0, 0, 1, 0, 0)\n"
+TURNED = "MARKER_PERIODIC= (per1, per2, 0, 0, 0, 0, 0, 30, 0, 0, 0)\nPERIODIC_AXIS= z\n"
+SLIDE_AND_REPEAT = {
+    "box": (
+        lambda: square(8),
+        "BLOCK",
+        REPEATED + "MARKER_SYM= (y_m, y_p)\n",
+    ),
+    "layers": (
+        lambda: cube(4),
+        "BLOCK",
+        REPEATED + "MARKER_SYM= (y_m, y_p, z_m, z_p)\nLAYERS= KEEP\nLAYER_THICKNESS= 0.15\n",
+    ),
+    "curved": (
+        lambda: passage((3, 8, 6)),
+        "blade",
+        TURNED + "MARKER_SYM= (inflow, outflow)\nMARKER_SLIDING= (hub, shroud)\nRIMS= SLIDE\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SLIDE_AND_REPEAT)
+def test_relaxed_gradient_where_nodes_slide_and_repeat(name, here, capsys):
+    make, moving, boundaries = SLIDE_AND_REPEAT[name]
+    mesh = make()
+    sv.write("mesh.su2", mesh)
+    config = (
+        f"MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nSOLUTION_ADJ_FILENAME= adj.dat\n"
+        f"OBJECTIVE_FUNCTION= DRAG\nDV_MARKER= ({moving})\n{boundaries}"
+        "DV_KIND= TRANSLATION, ROTATION\nDV_PARAM= (0.3, 0.7, 0); (0.5, 0.5, 0, 0.5, 0.5, 1)\n"
+        "DV_VALUE= VALUES\n"
+    )
+    values = [0.02, 3.0]
+    weights = np.random.default_rng(5).normal(size=mesh.points.shape)
+    expected = differences(config, values, weights, [1e-5, 1e-4])
+    text = config.replace("VALUES", values_text(values))
+    points = written(text)
+    assert np.abs(written(text + "RELAX= NO\n") - points).max() > 1e-3
+    write_csv("adj_cd.csv", points, weights)
+    Path("dot.cfg").write_text(text)
+    capsys.readouterr()
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert "differ" not in capsys.readouterr().err
+    np.testing.assert_allclose(gradient(), expected, rtol=1e-6, atol=1e-8)
+    config = read_config(Path("dot.cfg"))
+    surface = make_surface(on_mesh(config, mesh), mesh)
+    deformer = gradients._deformer(surface, surface.displacement, None)
+    np.testing.assert_allclose(deformer.deform(), points, rtol=0, atol=1e-10)
+    for place, value in enumerate(gradient()):
+        forward = weights * deformer.jvp(surface.displacement, surface.slope(place))
+        assert abs(forward.sum() - value) <= 1e-12 * np.abs(forward).sum()
 
 
 RIMS = {

@@ -380,7 +380,7 @@ def test_design_is_scaled_back_until_cells_are_convex(here, capsys):
     sv.write("mesh.su2", square(8))
     text = (
         "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nSOLUTION_ADJ_FILENAME= adj\n"
-        "DV_MARKER= (BLOCK)\nDATA_REDUCTION= NO\nDV_KIND= ROTATION, SCALE\n"
+        "DV_MARKER= (BLOCK)\nRELAX= NO\nDATA_REDUCTION= NO\nDV_KIND= ROTATION, SCALE\n"
         "DV_PARAM= (0.5, 0.5, 0, 0.5, 0.5, 1); (1.0)\nDV_VALUE= VALUES\n"
     )
     Path("a.cfg").write_text(text.replace("VALUES", "120, 1.1"))
@@ -406,7 +406,7 @@ def test_design_is_scaled_back_until_cells_are_convex(here, capsys):
 def test_design_through_a_wall_is_scaled_back_too(here, capsys):
     sv.write("mesh.su2", square(8))
     text = (
-        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nCONVEXITY_CHECK= YES\n"
+        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nCONVEXITY_CHECK= YES\nRELAX= NO\n"
         "DV_MARKER= (BLOCK)\nDV_KIND= TRANSLATION\nDV_PARAM= (1, 0, 0)\nDV_VALUE= 0.5\n"
     )
     Path("a.cfg").write_text(text)
@@ -422,7 +422,7 @@ def test_design_through_a_wall_is_scaled_back_too(here, capsys):
 def test_convexity_that_cannot_be_had_is_told(here, capsys):
     sv.write("mesh.su2", square(8))
     text = (
-        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nCONVEXITY_CHECK= YES\n"
+        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nCONVEXITY_CHECK= YES\nRELAX= NO\n"
         "DV_MARKER= (BLOCK)\nCONVEXITY_CHECK_ITER= 1\n"
     )
     turn = "DV_KIND= ROTATION\nDV_PARAM= (0.5, 0.5, 0, 0.5, 0.5, 1)\nDV_VALUE= 240\n"

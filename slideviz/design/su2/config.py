@@ -849,7 +849,7 @@ class _Reader:
 
     def case(self) -> tuple[Case, tuple[str, ...]]:
         """Return the case with roles and settings, and the markers that move."""
-        case = Case(generate_quality=False, layers=NEW["layers"])
+        case = Case(generate_quality=False, relax=NEW["relax"], layers=NEW["layers"])
         roles: dict[str, Role] = {}
         for key, role in ROLE_KEYS.items():
             names = self.names(key)
@@ -859,6 +859,8 @@ class _Reader:
             if name not in ROLE_KEYS:
                 case = self.put(case, name, row)
         case = radial_settings(case, self)
+        if case.method != "rbf" and "RELAX" not in self.rows:
+            case = case.change(relax="no")
         mover = "DV_MARKER" if self.names("DV_MARKER") else "MARKER_DEFORM_MESH"
         moving = self.names(mover)
         self.named |= {name: ROLES[role].key for name, role in case.roles.items()}

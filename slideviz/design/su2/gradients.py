@@ -449,7 +449,7 @@ def design_gradients(
         surface = make_surface(config, mesh)
         if surface.moves_whole_mesh or not surface.displacement.any():
             return surface, surface.moved()
-        *_, last = deform(surface.case(), mesh, progress)
+        *_, last = deform(surface.case(), mesh, progress, converged=True)
         return surface, last.mesh
 
     part, (surface, _), messages = convex_part(config, mesh, attempt, lambda each: each[1])
@@ -485,7 +485,7 @@ def find_gradients(
         prepared.append(_deformer(surface, displacement, progress))
         points = prepared[0].as_run()
         if points is None:
-            *_, last = deform(surface.case(), mesh, progress)
+            *_, last = deform(surface.case(), mesh, progress, converged=True)
             points = last.mesh.points
         written.append(points)
         return points
