@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +13,6 @@ from slideviz.case.keys import FILES, KEYS, MOTION, VIEW
 from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number
-from slideviz.design.sweeps.sweep import sweep
 from slideviz.design.sweeps.table import (
     DesignRow,
     case_values,
@@ -27,8 +25,6 @@ from slideviz.design.sweeps.table import (
     result_of,
 )
 from slideviz.errors import CaseError
-from slideviz.mesh.model import Mesh
-from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.system.csv_table import csv_rows, write_csv
 
 MOST = 100_000  # most designs of a table in the window
@@ -280,23 +276,3 @@ def read_results(path: Path) -> DesignTable:
     return DesignTable(tuple(head[columns]), tuple(tuple(c[columns]) for c in lines)).with_results(
         done
     )
-
-
-def run_designs(
-    case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
-) -> None:
-    """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
-
-    Raises SlidevizError if the table has mistakes, or no process can be started.
-    """
-    total = len(table.rows)
-    left = [at for at in range(1, total + 1) if at not in table.results]
-    wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
-    report(JobProgress(f"Starting with {counted(len(left), 'design')}"))
-    begin = time.monotonic()
-    rows = sweep(case, wanted, mesh=mesh, going_on=lambda: raise_if_cancelled(stopped))
-    for done, row in enumerate(rows, start=1):
-        report(replace(row, design=left[row.design - 1]))
-        seconds = (time.monotonic() - begin) / done * (len(left) - done)
-        words = f"{total - len(left) + done} of {total}, {seconds:.0f} s left"
-        report(JobProgress(words, done / len(left)))

@@ -7,6 +7,7 @@ any thread, with progress and results, and raises `slideviz.errors.Cancelled` so
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -27,8 +28,10 @@ from slideviz.case.limits import (
 )
 from slideviz.case.model import Case
 from slideviz.case.motions.span import prepare_span
+from slideviz.case.words import counted
 from slideviz.case.zone_cases import each_zone, with_marker_names
 from slideviz.design.deformed_wheel import write_wheel
+from slideviz.design.sweeps.sweep import sweep
 from slideviz.errors import Cancelled, CaseError, MeshError, Message, SlidevizError
 from slideviz.formats.files import read, write
 from slideviz.formats.source import unreadable
@@ -42,6 +45,7 @@ from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_
 from slideviz.mesh.walls import Walls, walls
 from slideviz.samples.table import write_sample
 from slideviz.sections.span import find_walls
+from slideviz.session.design_table import DesignTable
 from slideviz.session.inspect import WORST
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
@@ -538,3 +542,23 @@ def check_frame(
     except SlidevizError as error:
         problem = str(error)
     return CheckedLimits(frame, case.limits, check_limits(known, measured), problem)
+
+
+def run_designs(
+    case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
+) -> None:
+    """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
+
+    Raises SlidevizError if the table has mistakes, or no process can be started.
+    """
+    total = len(table.rows)
+    left = [at for at in range(1, total + 1) if at not in table.results]
+    wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
+    report(JobProgress(f"Starting with {counted(len(left), 'design')}"))
+    begin = time.monotonic()
+    rows = sweep(case, wanted, mesh=mesh, going_on=lambda: raise_if_cancelled(stopped))
+    for done, row in enumerate(rows, start=1):
+        report(replace(row, design=left[row.design - 1]))
+        seconds = (time.monotonic() - begin) / done * (len(left) - done)
+        words = f"{total - len(left) + done} of {total}, {seconds:.0f} s left"
+        report(JobProgress(words, done / len(left)))

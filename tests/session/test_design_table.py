@@ -17,11 +17,10 @@ from slideviz.session.design_table import (
     column_choices,
     read_results,
     read_table,
-    run_designs,
     values_of,
     write_results,
 )
-from slideviz.session.jobs import JobProgress
+from slideviz.session.jobs import JobProgress, run_designs
 
 
 @pytest.mark.parametrize(

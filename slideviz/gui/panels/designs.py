@@ -65,11 +65,10 @@ from slideviz.session.design_table import (
     DesignTable,
     column_choices,
     read_table,
-    run_designs,
     values_of,
     write_results,
 )
-from slideviz.session.jobs import JobProgress
+from slideviz.session.jobs import JobProgress, run_designs
 from slideviz.session.run_messages import stopped_words
 from slideviz.session.state import Session
 
