@@ -89,7 +89,7 @@ def check_fields(value: Any) -> None:
     """
     kind: Any = type(value)
     fields = {field.name: field for field in dataclass_fields(value)}
-    hints = _annotations(kind)
+    hints = annotations_of(kind)
     given = [
         (name, field)
         for name in fields
@@ -121,7 +121,7 @@ def _plain(value: Any) -> Any:
 
 
 def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) -> None:
-    needed = _annotations(owner)
+    needed = annotations_of(owner)
     for name, value in given:
         wrong = _misfit(value, needed.get(name, Any), name)
         if wrong is not None:
@@ -131,7 +131,7 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
 
 
 @cache
-def _annotations(owner: Any) -> dict[str, Any]:
+def annotations_of(owner: Any) -> dict[str, Any]:
     """Return the annotations of a function or class, without those that only mypy can know."""
     hints = {}
     for each in reversed(getattr(owner, "__mro__", (owner,))):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,12 @@ def read_case(path: Path, start: Case) -> Case:
     ``start``: the case of a file without keys.
     """
     text, warnings = read_text(path, "case file")
+    case = case_of_text(path, text, start)
+    return case.change(warnings=warnings + case.warnings)
+
+
+def case_of_text(path: Path, text: str, start: Case) -> Case:
+    """Return the case that the text of a file describes, as `read_case`."""
     case, problems, remarks = _parsed(path, text, start)
     raise_all(listed(path, problems))
     case = case.with_paths(lambda file: _from_folder(file, path.parent))
@@ -48,26 +54,32 @@ def read_case(path: Path, start: Case) -> Case:
         remarks += (
             f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
         )
-    return case.change(source=path, warnings=warnings + remarks)
+    return case.change(source=path, warnings=remarks)
 
 
-def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
-    """Write a case file that ``read_case`` reads back without loss.
+def write_case(path: Path, case: Case) -> None:
+    """Write a case file that ``read_case`` reads back without loss; CaseError as `case_text`."""
+    text = case_text(path, case)
+    with atomic_write(path, CaseError, case.source) as file:
+        file.write(text.encode("utf-8"))
+
+
+def case_text(path: Path, case: Case) -> str:
+    """Return the text of a case file at a path.
 
     Paths in it are relative to its folder, so that both can be moved together; absolute where they
-    have nothing but the root in common. Remarks, of one line each, are comments at its top. Raises
-    CaseError if the file cannot be written, or a value of the case has no form in a case file.
+    have nothing but the root in common. Raises CaseError if a value of the case has no form in a
+    case file.
     """
     folder = Path(os.path.realpath(path.parent))
     named = case.with_paths(lambda file: _to_folder(file, folder))
-    text = "".join(f"% {remark}\n" for remark in remarks) + _text(named, path)
+    text = _text(named, path)
     # Whatever is saved can be opened again: better no file than one with mistakes.
     again, problems, _ = _parsed(path, text, type(case)())
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:
         problems = [Message("a case file cannot hold some of its values; check points and motions")]
     raise_all(f"{path}: cannot be written: {problem}" for problem in problems)
-    with atomic_write(path, CaseError, case.source) as file:
-        file.write(text.encode("utf-8"))
+    return text
 
 
 def set_key(case: Case, key: str, value: str, option: str = "--set") -> Case:

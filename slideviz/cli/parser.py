@@ -87,7 +87,9 @@ def _base(**options: Any) -> _Parser:
 
 def _window_parser() -> ArgumentParser:
     parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
-    parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
+    parser.add_argument(
+        "file", nargs="?", type=Path, help="mesh, case (.cfg) or session (.slideviz) to open"
+    )
     parser.add_argument("--run", action="store_true", help="deform the case at once")
     # Quiet on the terminal: the window itself shows when it compiles.
     parser.set_defaults(command=_window, holds=False, quiet=True)

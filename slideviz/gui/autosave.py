@@ -1,8 +1,9 @@
-"""Autosave: the session is written as a case file, so that a crash costs some seconds of work.
+"""Autosave: the session is written without its runs, so that a crash costs some seconds of work.
 
-Each window has a file of its own, ``session-PID-N.cfg``, and a lock file beside it that is free
-when the process has ended, however it did. A session file without a held lock is of a session that
-did not end properly. No file is ever deleted unasked: an unreadable one is renamed to ``….broken``.
+Each window has a file of its own, ``session-PID-N.slideviz``, and a lock file beside it that is
+free when the process has ended, however it did. A session file without a held lock is of a session
+that did not end properly. No file is ever deleted unasked: an unreadable one is renamed to
+``….broken``.
 """
 
 from __future__ import annotations
@@ -18,21 +19,25 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import unquote_to_bytes
 
 from qtpy.QtCore import QLockFile, QObject
 
-from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
-from slideviz.errors import CaseError, SlidevizError
-from slideviz.gui.panels.designs import DesignsPanel
+from slideviz.errors import CaseError
 from slideviz.gui.responsiveness.timers import AUTOSAVE_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.error_reporter import old_crashes
 from slideviz.session import jobs
-from slideviz.session.design_table import DesignTable, read_results, write_results
-from slideviz.session.saving import Camera, as_recovered, view_to_case
+from slideviz.session.design_table import DesignTable
+from slideviz.session.saving import Camera, as_recovered
+from slideviz.session.session_file import (
+    ENDING,
+    StoredSession,
+    read_session,
+    stored_session,
+    write_session,
+)
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.cleanup import private_file, private_folder
@@ -76,7 +81,7 @@ class SessionRecovery(QObject):
             return
         session = self.waiting[0]
         more = len(self.waiting) - 1
-        path = session.case.mesh_file if session.source is None else session.source
+        path = session.content.source or session.content.mesh_file
         text = (
             f"slideviz did not end properly. Restore the session of {_time_text(session.when)} "
             f"with {path.name} in {path.parent}?" + (f" ({more} more)" if more else "")
@@ -91,11 +96,7 @@ class SessionRecovery(QObject):
             self.waiting.pop(0).remove()
         elif self.window.files.ask_about_unsaved(partial(self.answer, True)):
             self._later.append(self.waiting.pop(0))
-            done = partial(self._opened, session)
-            name = session.case.mesh_file.name
-            self.window.running.start_job(
-                f"Restoring {name}", done, jobs.open_file, session.path, None
-            )
+            self.window.files.start_opening(session.path, None, partial(self._opened, session))
         self._offer()
 
     def _postpone(self) -> None:
@@ -103,27 +104,10 @@ class SessionRecovery(QObject):
         self.waiting = []
 
     def _opened(self, found: OrphanedSession, opened: jobs.Opened) -> None:
-        session = as_recovered(opened.session, found.source)
+        session = as_recovered(opened.session, found.content.source)
         self.window.show_opened(replace(opened, session=session))
-        self._restore_designs(found)
         self.autosave.replace(found)
         self.window.show_status("Session restored. Runs are not saved; Run computes them again")
-
-    def _restore_designs(self, found: OrphanedSession) -> None:
-        """Show the restored table of designs, or the error of its file.
-
-        Its results count as those of the session's case only if the file says so.
-        """
-        panel = self.window.dock_manager.panel(DesignsPanel)
-        session = self.window.store.session
-        try:
-            table, current = found.designs()
-        except CaseError as error:
-            self.window.banner.show_error(error)
-            return
-        panel.case = session.case if current else None
-        panel.mesh = session.mesh
-        panel.put(table)
         log.info("restored the session of %s", _time_text(found.when))
 
 
@@ -133,13 +117,6 @@ def _time_text(when: datetime) -> str:
 
 
 HALF_WRITTEN_S = 60.0  # age in seconds from which a temporary file is not being written any more
-SOURCE = "saved as: "
-"""Begin of the remark in a session's file that names the case file it belongs to."""
-
-CURRENT = "the results of the designs belong to this case"
-"""The remark in a session's file that says so."""
-
-_URI = "file://"
 _numbers = count(1)
 log = logging.getLogger("slideviz")
 
@@ -162,7 +139,7 @@ class Autosave(QObject):
     ) -> None:
         super().__init__(parent)
         self.store = store
-        self.path = folder / f"session-{os.getpid()}-{next(_numbers)}.cfg"
+        self.path = folder / f"session-{os.getpid()}-{next(_numbers)}{ENDING}"
         self._camera = camera
         self._designs = designs
         self._lock: QLockFile | None = None
@@ -182,10 +159,7 @@ class Autosave(QObject):
             self._timer.start()
         elif session.mesh is not None and self._key(session) != self._written_key:
             self._pending_key = self._key(session)
-            case = view_to_case(session, self._camera())
-            table, of = self._designs()
-            up_to_date = bool(table.left(of, session.case).results)
-            self._runner.start(self._write, case, table, up_to_date)
+            self._runner.start(self._write, session, self._camera(), *self._designs())
 
     def replace(self, found: OrphanedSession) -> None:
         """Save this session, restored from an earlier one, then remove the earlier one's file."""
@@ -198,7 +172,7 @@ class Autosave(QObject):
         self._timer.stop()
         self._runner.close()
         with contextlib.suppress(OSError):
-            _unlink(self.path)
+            self.path.unlink(missing_ok=True)
         if self._lock is not None:
             self._lock.unlock()
 
@@ -219,25 +193,20 @@ class Autosave(QObject):
         return session.mesh, session.case, session.view.style, self._designs()
 
     def _write(
-        self, case: Case, table: DesignTable, up_to_date: bool, _report: object, _stopped: object
+        self,
+        session: Session,
+        camera: Camera | None,
+        designs: DesignTable,
+        of: Case | None,
+        _report: object,
+        _stopped: object,
     ) -> None:
         private_folder(self.path.parent)
         if self._lock is None:
             self._lock = _lock(self.path)
             if self._lock.tryLock(0):
                 private_file(Path(self._lock.fileName()))
-        remarks = []
-        if case.source is not None:
-            plain = str(case.source).isprintable()
-            remarks = [f"{SOURCE}{case.source if plain else case.source.absolute().as_uri()}"]
-        if table.rows:
-            write_results(_designs_file(self.path), table)
-            private_file(_designs_file(self.path))
-            if up_to_date:
-                remarks.append(CURRENT)
-        else:
-            _designs_file(self.path).unlink(missing_ok=True)
-        write_case(self.path, case, remarks)
+        write_session(self.path, session, stored_session(session, designs, of), camera)
         private_file(self.path)
 
     def _done(self, _: object) -> None:
@@ -258,10 +227,7 @@ class OrphanedSession:
 
     path: Path
     """The session's file."""
-    case: Case
-    """The case in the file."""
-    source: Path | None
-    """The case file that the session was opened from or saved to."""
+    content: StoredSession
     lock: QLockFile
     """Held by this window, so that no other window offers the session too."""
 
@@ -270,20 +236,9 @@ class OrphanedSession:
         """Return the time at which the session was written."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
-    def designs(self) -> tuple[DesignTable, bool]:
-        """Return the table of designs, and whether its results belong to the present case.
-
-        Raises CaseError if it cannot be read.
-        """
-        file = _designs_file(self.path)
-        if not file.exists():
-            return DesignTable(), False
-        text = self.path.read_text(encoding="utf-8", errors="replace")
-        return read_results(file), f"% {CURRENT}" in text
-
     def remove(self) -> None:
         """Remove the session's files, and release its lock."""
-        _unlink(self.path)
+        self.path.unlink(missing_ok=True)
         self.lock.unlock()
 
 
@@ -295,17 +250,14 @@ def find_sessions(folder: Path) -> tuple[list[OrphanedSession], list[str]]:
     """
     found = []
     problems = []
-    for path in sorted(folder.glob("session-*.cfg"), key=_modified, reverse=True):
+    for path in sorted(folder.glob(f"session-*{ENDING}"), key=_modified, reverse=True):
         lock = _lock(path)
         if not lock.tryLock(0):
             continue
         try:
-            case = Case.read(path)
-            if case.mesh_file is None:
-                raise SlidevizError(f"{path.name}: it names no mesh")
-            found.append(OrphanedSession(path, case, _source(path), lock))
-        except (SlidevizError, OSError, ValueError) as problem:
-            problems.append(_rename_broken(path, str(problem).splitlines()[0]))
+            found.append(OrphanedSession(path, read_session(path), lock))
+        except CaseError as problem:
+            problems.append(_rename_broken(path, str(problem)))
             lock.unlock()
     problems += [
         _rename_broken(path, "it was being written when the program ended")
@@ -313,15 +265,6 @@ def find_sessions(folder: Path) -> tuple[list[OrphanedSession], list[str]]:
         if time.time() - _modified(path) > HALF_WRITTEN_S
     ]
     return found, problems
-
-
-def _designs_file(path: Path) -> Path:
-    return path.with_suffix(".csv")
-
-
-def _unlink(path: Path) -> None:
-    for file in (_designs_file(path), path):
-        file.unlink(missing_ok=True)
 
 
 def _lock(path: Path) -> QLockFile:
@@ -336,17 +279,6 @@ def _modified(path: Path) -> float:
         return path.stat().st_mtime
     except OSError:
         return 0.0
-
-
-def _source(path: Path) -> Path | None:
-    """Return the case file named by the remark in a session's file, or None."""
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        _, found, name = line.partition(f"% {SOURCE}")
-        if found and name.startswith(_URI):
-            return Path(os.fsdecode(unquote_to_bytes(name.removeprefix(_URI))))
-        if found:
-            return Path(name)
-    return None
 
 
 def _rename_broken(path: Path, why: str) -> str:

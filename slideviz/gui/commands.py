@@ -353,7 +353,7 @@ _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes."
 ), tooltips=True)
 
 _FILE = Menu("file", "&File", entries=(
-    Command("open", "&Open…", "Open a mesh, or a case with its mesh.",
+    Command("open", "&Open…", "Open a mesh, or a case or session with its mesh.",
             call("files.ask_and_open"), (KEY.Open,), "open"),
     Menu("open_recent", "Open &recent", "Open a recent file.", fill=_fill_recent),
     Menu("open_sample", "Open sa&mple", "Open a case that comes with the program.", (
@@ -372,6 +372,10 @@ _FILE = Menu("file", "&File", entries=(
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
             call("files.save_case"), ("Ctrl+Shift+S",), "case", has_mesh),
+    Command("save_session", "Save s&ession as…",
+            "Save case, view, runs with their steps, and designs in one file, to go on later.",
+            call("files.save_session"), ("Ctrl+Alt+S",), enabled=is_idle,
+            why_not="There is no mesh yet: open one first."),
     _EXPORT,
     None,
     Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",

@@ -22,8 +22,11 @@ from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.samples.table import SAMPLES
 from slideviz.session import changes, jobs
+from slideviz.session.design_table import DesignTable
 from slideviz.session.run_messages import stopped_words
 from slideviz.session.saving import Unsaved, files_beside, view_to_case
+from slideviz.session.session_file import ENDING, MissingMeshError, files_of
+from slideviz.session.state import Session
 from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
@@ -51,7 +54,9 @@ class Files(QObject):
         self.saving = False
         self._answered = False
         self.after_save: Callable[[], object] | None = None
+        self._again: Callable[[Path], object] = lambda _: None
         window.running.ended.connect(lambda: setattr(self, "saving", False))
+        window.runner.failed.connect(self._failed)
 
     # Open ------------------------------------------------------------------------------
     def recent(self) -> list[Path]:
@@ -99,10 +104,28 @@ class Files(QObject):
             log.error("%s", error)
             return
         if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
-            path = Path(path).absolute()
-            self.window.running.start_job(
-                f"Opening {path.name}", self._opened, jobs.open_file, path, zone
-            )
+            self.start_opening(Path(path).absolute(), zone, self._opened)
+
+    def start_opening(
+        self,
+        path: Path,
+        zone: int | None,
+        done: Callable[[jobs.Opened], object],
+        mesh: Path | None = None,
+    ) -> None:
+        """Start the job that opens a file; ``mesh``: where the user says that its mesh is."""
+        self._again = partial(self.start_opening, path, zone, done)
+        job = partial(jobs.open_file, mesh_file=mesh, unpacked=sample_folder())
+        self.window.running.start_job(f"Opening {path.name}", done, job, path, zone)
+
+    def _failed(self, error: Exception) -> None:
+        if isinstance(error, MissingMeshError):
+            find = {"Find the mesh…": self._find_mesh}
+            self.window.banner.show_message(str(error), calm=False, answers=find)
+
+    def _find_mesh(self) -> None:
+        if mesh := questions.ask_open(self.window, self.folder()):
+            self._again(mesh)
 
     def open_zone(self, zone: int) -> None:
         """Open a zone of the file, from 1; or with 0 all of them."""
@@ -144,6 +167,7 @@ class Files(QObject):
         if path is not None and sample_folder() not in path.parents:
             self.remember(path)
         self.window.show_opened(opened)
+        self._designs.written = self._designs.table
         mesh = session.mesh
         counts = len(mesh.cells), len(mesh.points), len(mesh.markers)
         words = "opened %s: %dD, %d cells, %d points, %d boundaries"
@@ -158,7 +182,6 @@ class Files(QObject):
         returned. ``before``: what the user wants to do that would lose the changes, in words.
         """
         window = self.window
-        designs = self.window.dock_manager.panel(DesignsPanel)
         unsaved = self._unsaved()
         if self._answered or not unsaved.lost:
             return True
@@ -176,19 +199,20 @@ class Files(QObject):
             window.running.cancel(lambda: QTimer.singleShot(0, again))
             return False
         # The question named everything unsaved: nothing is asked about again.
-        wanted = can_save if answer == "all" else [answer]
-        savers = {"case": self.save_case, "table": designs.save_table}
-        if not all(save() for name, save in savers.items() if name in wanted):
+        if answer in ("mesh", "session"):
+            save = partial(self.save_mesh, last=True) if answer == "mesh" else self.save_session
+            save(then=lambda: self._confirmed(again))
             return False
-        if "mesh" in wanted:
-            self.save_mesh(last=True, then=lambda: self._confirmed(again))
-            return False
-        return answer != "cancel"
+        savers = {"case": self.save_case, "table": self._designs.save_table}
+        return savers[answer]() if answer in savers else answer != "cancel"
 
     def _unsaved(self) -> Unsaved:
         window = self.window
-        designs = window.dock_manager.panel(DesignsPanel).unsaved
-        return Unsaved.of(window.store.session, window.runner.busy, designs)
+        return Unsaved.of(window.store.session, window.runner.busy, self._designs.unsaved)
+
+    @property
+    def _designs(self) -> DesignsPanel:
+        return self.window.dock_manager.panel(DesignsPanel)
 
     def _confirmed(self, again: Callable[[], object]) -> None:
         """Call ``again`` with `ask_about_unsaved` returning True."""
@@ -274,15 +298,54 @@ class Files(QObject):
         if self.after_save is not None:
             QTimer.singleShot(0, self.after_save)
 
+    def _beside(self, ending: str) -> Path:
+        """Return the name of the open case or session, with another ending."""
+        source = self.window.store.session.case.source or self.folder() / self.stem()
+        folder = self.folder() if sample_folder() in source.parents else source.parent
+        return folder / f"{source.stem}{ending}"
+
+    def save_session(self, then: Callable[[], object] | None = None) -> None:
+        """Ask for a file name and start the job that writes the session: case, runs, designs.
+
+        ``then`` is called when it is written.
+        """
+        session = self.window.store.session
+        if session.mesh is None or self.window.runner.busy:
+            return
+        path, with_mesh = questions.ask_session(self.window, self._beside(ENDING))
+        if path is None:
+            return
+        # Those of samples are in a cache.
+        files = files_of(session.case)
+        copied = [one for one in files if with_mesh or sample_folder() in one.parents]
+        designs = self._designs.table, self._designs.case
+        self.saving = True
+        self.after_save = then
+        self.window.running.start_job(
+            f"Saving {path.name}",
+            partial(self._session_saved, session, designs[0]),
+            jobs.save_session,
+            path,
+            session,
+            designs,
+            self.window.scene.camera.view,
+            copied,
+        )
+
+    def _session_saved(self, session: Session, designs: DesignTable, path: Path) -> None:
+        self.window.store.change(changes.saved_session, session, path)
+        self._designs.written = designs
+        self.remember(path)
+        self.window.show_status(f"Saved {path}")
+        if self.after_save is not None:
+            QTimer.singleShot(0, self.after_save)
+
     def save_case(self) -> bool:
         """Ask for a file name and write the case; return whether it was written."""
         session = self.window.store.session
         if session.mesh is None:
             return False
-        source = session.case.source
-        default = source or self.folder() / f"{self.stem()}.cfg"
-        if sample_folder() in default.parents:
-            default = self.folder() / default.name
+        default = self._beside(".cfg")
         path = questions.ask_save(self.window, "Save case", default, questions.CASE_FILTERS)
         if path is None:
             return False

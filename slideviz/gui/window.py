@@ -353,6 +353,11 @@ class MainWindow(Services):
         self.player.stop()
         self.viewing.open(opened, session)
         self.store.put(session)
+        if opened.content is not None:
+            content = opened.content
+            self.dock_manager.panel(DesignsPanel).restore(content.designs, content.designs_case)
+        if opened.remark:
+            self.banner.show_message(opened.remark, calm=False)
         remarks = () if session.mesh is None else session.mesh.remarks
         for remark in remarks:
             log.warning("%s", remark)
@@ -445,7 +450,7 @@ class MainWindow(Services):
         # What counts as unsaved, and the question: `Files.ask_about_unsaved`.
         if not self._closed:
             if self.files.saving:
-                self.show_status("The window closes when the mesh is saved")
+                self.show_status("The window closes when the file is saved")
                 self.files.after_save = self.close
                 event.ignore()
                 return

@@ -366,6 +366,15 @@ def saved_case(session: Session, case: Case) -> Session:
     return replace(session, case=case, saved=case, saved_sections=session.view.sections)
 
 
+def saved_session(session: Session, written: Session, path: Path) -> Session:
+    """Return the session after ``written``, an earlier state of it, was saved as a session file."""
+    numbers = {run.number for run in written.runs}
+    runs = (replace(run, saved=run.saved or run.number in numbers) for run in session.runs)
+    there = written.case.change(source=path)
+    session = replace(session, runs=tuple(runs), case=session.case.change(source=path))
+    return replace(session, saved=there, saved_sections=written.view.sections)
+
+
 # Runs ------------------------------------------------------------------------------------
 def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
     """Return the session with a new run, which is shown: of ``case``, or of the session's case.

@@ -53,7 +53,16 @@ from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_periods
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
-from slideviz.session.state import CheckedLimits, Session, StepFrame
+from slideviz.session.session_file import (
+    ENDING,
+    StoredRun,
+    StoredSession,
+    read_case_of,
+    read_session,
+    stored_session,
+    write_session,
+)
+from slideviz.session.state import CheckedLimits, Run, Session, StepFrame
 from slideviz.solver.deform import deform
 from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.repair_stage import mended_frame
@@ -240,7 +249,8 @@ class Opened:
 
     ``has_view`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are
     the moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh
-    with fewer facets.
+    with fewer facets. ``content`` is what a session file has besides, ``remark`` what
+    the user should know of it.
     """
 
     session: Session
@@ -249,6 +259,8 @@ class Opened:
     has_view: bool = False
     camera: Camera | None = None
     coarse: tuple[Surface, ...] = ()
+    content: StoredSession | None = None
+    remark: str = ""
 
 
 def require_openable(path: Path) -> None:
@@ -259,16 +271,31 @@ def require_openable(path: Path) -> None:
         raise unreadable(path, problem) from problem
 
 
-def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
-    """Return a mesh, or the case of a ``.cfg`` file with its mesh, ready to be shown.
+def open_file(
+    path: Path,
+    zone: int | None,
+    report: Report,
+    stopped: Stopped,
+    mesh_file: Path | None = None,
+    unpacked: Path | None = None,
+) -> Opened:
+    """Return a mesh, or the case or session in a file with its mesh, ready to be shown.
 
-    Raises SlidevizError if the file cannot be used; the message says what and where.
+    ``mesh_file``: the mesh of a session, where it is neither beside it nor where it was.
+    ``unpacked``: the folder for copies of files that a session has; by default a new one. Raises
+    SlidevizError if the file cannot be used; the message says what and where.
     """
     case = None
     mesh_path = path
-    if path.suffix.lower() == ".cfg":
+    ending = path.suffix.lower()
+    moved = dict[Path, Path]()
+    if ending in (".cfg", ENDING):
         report(JobProgress(f"Reading {path.name}"))
+    if ending == ENDING:
+        case, moved = read_case_of(path, unpacked, mesh_file)
+    elif ending == ".cfg":
         case = Case.read(path)
+    if case is not None:
         if case.mesh_file is None:
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
         mesh_path = case.mesh_file
@@ -280,7 +307,53 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
         mesh = read_boundary(mesh_path, zone, reading)
     else:
         mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
-    return prepare(mesh, mesh_path, case, report, stopped)
+    opened = prepare(mesh, mesh_path, case, report, stopped)
+    if ending != ENDING:
+        return opened
+    content = read_session(path, mesh, moved)
+    session = opened.session
+    runs = [_restored(run, mesh, report, stopped) for run in content.runs]
+    remark = ""
+    if content.shown is not None and not runs:
+        remark = f"{mesh_path} has changed since the session was saved, so its runs are left out."
+    return replace(opened, session=content.put_into(session, runs), content=content, remark=remark)
+
+
+def _restored(run: StoredRun, mesh: Mesh, report: Report, stopped: Stopped) -> Run:
+    """Return a run of a session file, with the quality of its steps."""
+    tick = _tick(f"Run {run.number}: {PHASES['quality']}", report, stopped)
+    frames = []
+    metric = run.case.quality_metric
+    for k, one in enumerate(run.steps):
+        tick(k / len(run.steps))
+        limits = run.case.limits if one.step.index == one.step.total else ()
+        measured = quality(one.step.mesh, mesh, metric)
+        frame = _frame_of(one.step, measured, run.case, mesh, limits)
+        frames.append(replace(frame, label=one.label))
+    return Run(
+        run.number, run.case, tuple(frames), run.end, saved=True, name=run.name, panels=run.panels
+    )
+
+
+def save_session(
+    path: Path,
+    session: Session,
+    designs: tuple[DesignTable, Case | None],
+    camera: Camera | None,
+    copied: Sequence[Path],
+    report: Report,
+    stopped: Stopped,
+) -> Path:
+    """Write a session file with copies of some files (`session_file`), and return its path.
+
+    ``designs``: their table, and the case of its results.
+    """
+    report(JobProgress(f"Writing {path.name}"))
+    runs = () if session.lacks_cells else session.runs
+    content = stored_session(session, *designs, runs)
+    going_on = partial(raise_if_cancelled, stopped)
+    write_session(path, session, content, camera, copied, going_on)
+    return path
 
 
 def prepare(

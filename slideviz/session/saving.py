@@ -25,8 +25,8 @@ class Unsaved:
     session: Session
     lost: Mapping[str, str]
     """The words for what would be lost, by its kind: ``run``, a question on the run that goes on;
-    ``case``; ``mesh``, the deformed mesh of the run shown; ``table``, a sentence on the table of
-    designs."""
+    ``case``; ``mesh``, the deformed mesh of the run shown; ``runs``, that there are others;
+    ``table``, a sentence on the table of designs."""
     named: Run | None = None  # the run that `lost` is about, whose mesh or steps would be lost
 
     @classmethod
@@ -51,17 +51,20 @@ class Unsaved:
         if not going and session.unsaved_mesh and run is not None and run.panels is None:
             part = f" ({run.progress_words})" if run.incomplete else ""
             lost["mesh"] = f"the deformed mesh of run {run.number}{part}"
+        elif not going and any(map(_is_unsaved, session.runs)):
+            lost["runs"] = "the session"
         if designs:
             lost["table"] = designs
         return cls(session, lost, run)
 
     @property
     def can_save(self) -> list[str]:
-        """Return the kinds of lost work that can be saved now: ``case``, ``mesh``, ``table``.
+        """Return what can be saved: ``session`` has all, then kinds of lost work with own files.
 
         While a run goes on, only ``run``, to be stopped first.
         """
-        return ["run"] if "run" in self.lost else list(self.lost)
+        each = [name for name in self.lost if name != "runs"]
+        return ["run"] if "run" in self.lost else ["session", *each]
 
     def question(self, before: str) -> str:
         """Return the question to the user, with what else to know in further lines.
@@ -69,7 +72,7 @@ class Unsaved:
         ``before``: the action that would lose the work, such as "closing".
         """
         table = self.lost.get("table", "")
-        kept = [self.lost[name] for name in ("case", "mesh") if name in self.lost]
+        kept = [self.lost[name] for name in ("case", "mesh", "runs") if name in self.lost]
         if "run" in self.lost:
             case = f"Not saved either: {kept[0]}." if kept else ""
             lines = [self.lost["run"], " ".join(filter(None, (case, self._others())))]
@@ -91,13 +94,16 @@ class Unsaved:
 
     def _others(self) -> str:
         """Return a sentence about the other runs whose meshes are not saved."""
-        runs = [
-            run for run in self.session.runs if run.frames and not run.saved and run.panels is None
-        ]
+        runs = filter(_is_unsaved, self.session.runs)
         others = [str(run.number) for run in runs if run is not self.named]
         if len(others) == 1:
             return f"The mesh of run {others[0]} is not saved either."
         return f"The meshes of runs {', '.join(others)} are not saved either." if others else ""
+
+
+def _is_unsaved(run: Run) -> bool:
+    """Return whether a run would be lost; that of a design is computed again at a click."""
+    return bool(run.frames) and not run.saved and run.panels is None
 
 
 def _stop_question(run: Run) -> str:

@@ -227,7 +227,7 @@ def tell_dialogs(desk: Desk, window, place: Path) -> None:
         questions.ask_replace(window, here[:1])
         questions.ask_replace(window, here)
         questions.ask_overwrite_input(window, here[0])
-        for able in ((), ("case",), ("mesh",), ("case", "mesh")):
+        for able in (("session",), ("session", "case"), ("session", "case", "mesh"), ("table",)):
             ask_unsaved(window, "Save it?\nIt would be lost.", able)
         window.exports.picture()
     window.help.shortcuts()

@@ -30,6 +30,7 @@ DIALOGS = (
     "ask_open",
     "ask_table",
     "ask_save",
+    "ask_session",
     "ask_numbered",
     "ask_folder",
     "ask_replace",

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from qtpy.QtWidgets import QMessageBox, QWidget
@@ -11,15 +10,17 @@ from qtpy.QtWidgets import QMessageBox, QWidget
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.gui import autosave
-from slideviz.gui.autosave import SOURCE, Autosave, find_sessions
+from slideviz.gui.autosave import Autosave, find_sessions
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import error_reporter, questions
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
+from slideviz.session.session_file import read_case_of
 from slideviz.session.store import Store
 
 pytestmark = pytest.mark.usefixtures("unpainted")
+LEFT = "session-4194399-"  # of a process that is not there
 
 
 @pytest.fixture
@@ -59,7 +60,12 @@ def kept(window, qtbot):
     keeper = window.autosave
     keeper.save()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
-    return Case.read(keeper.path)
+    return case_in(keeper.path)
+
+
+def case_in(path):
+    """The case in the file of a session."""
+    return read_case_of(path)[0]
 
 
 @pytest.fixture
@@ -71,10 +77,10 @@ def crashed(qtbot, folder, case_file):
     store.put(changes.set_view(changes.set_case(session, steps=7), color_by="skew"))
     keeper.save()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
-    text = keeper.path.read_text()
+    content = keeper.path.read_bytes()
     keeper.close()
-    left = folder / "session-4194399-1.cfg"
-    left.write_text(text)
+    left = folder / f"{LEFT}1.slideviz"
+    left.write_bytes(content)
     return left
 
 
@@ -113,9 +119,9 @@ def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypa
     open_in(window, case_file, qtbot)
     qtbot.waitUntil(window.autosave.path.exists)
     window.store.change(changes.set_case, steps=9)
-    qtbot.waitUntil(lambda: Case.read(window.autosave.path).steps == 9)
+    qtbot.waitUntil(lambda: case_in(window.autosave.path).steps == 9)
     window.store.change(changes.set_view, edges=False)
-    qtbot.waitUntil(lambda: "VIEW_SHOW" in Case.read(window.autosave.path).view)
+    qtbot.waitUntil(lambda: "VIEW_SHOW" in case_in(window.autosave.path).view)
 
 
 def test_nothing_is_written_before_a_mesh_is_open(make, folder):
@@ -154,7 +160,7 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
     assert session.unsaved_case
     assert not window.recovery_banner.isVisible()
     qtbot.waitUntil(lambda: not crashed.exists())
-    assert Case.read(window.autosave.path).steps == 7, "it is safe under its new name"
+    assert case_in(window.autosave.path).steps == 7, "it is safe under its new name"
     assert find_sessions(folder) == ([], [])
 
 
@@ -173,40 +179,23 @@ def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file,
     if changed:
         window.store.change(changes.set_case, sliding="ds")
     kept(window, qtbot)
-    texts = {path.suffix: path.read_text() for path in folder.glob("session-*")}
+    content = window.autosave.path.read_bytes()
     modes = {path.stat().st_mode & 0o777 for path in folder.iterdir()}
     assert modes == {0o600}
     window.close()
     assert list(folder.iterdir()) == []
-    for suffix in (".cfg", ".csv"):
-        folder.joinpath("session-4194399-1").with_suffix(suffix).write_text(texts[suffix])
+    folder.joinpath(f"{LEFT}1.slideviz").write_bytes(content)
     window = make()
     window.recovery.start()
     window.recovery_banner.answers["Restore"].click()
     panel = window.dock_manager.panel(DesignsPanel)
     qtbot.waitUntil(lambda: bool(panel.table.rows))
     assert panel.table.designs() == [{"STEPS": "1"}, {"STEPS": "2"}, {"STEPS": "3"}]
-    assert panel.table.results[1] == results[0]
+    assert repr(panel.table.results[1]) == repr(results[0])
     assert panel.table.results[3].problem == "too\nfar"
     assert panel.run.text() == ("Run 3 designs" if changed else "Run 2 designs")
     assert panel.unsaved
-    qtbot.waitUntil(lambda: not any(folder.glob("session-4194399*")))
-    assert window.autosave.path.with_suffix(".csv").exists()
-    # An empty table takes its file away.
-    panel.put(DesignTable())
-    kept(window, qtbot)
-    assert not window.autosave.path.with_suffix(".csv").exists()
-
-
-def test_designs_that_cannot_be_read_are_told_and_the_session_is_restored(make, qtbot, crashed):
-    crashed.with_suffix(".csv").write_text("design,STEPS\n1\n")
-    window = make()
-    window.recovery.start()
-    window.recovery_banner.answers["Restore"].click()
-    qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
-    qtbot.waitUntil(window.banner.isVisible)
-    assert "is not a table of results" in window.banner.text.text()
-    assert window.store.session.case.steps == 7
+    qtbot.waitUntil(lambda: not any(folder.glob(f"{LEFT}*")))
 
 
 def test_discard_throws_it_away(make, crashed, folder):
@@ -233,12 +222,12 @@ def test_a_closed_offer_comes_again_at_the_next_start_only(make, crashed, qtbot)
 
 
 def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
-    older = crashed.with_name("session-4194398-1.cfg")
-    older.write_text(crashed.read_text().replace("STEPS= 7", "STEPS= 3"))
+    older = crashed.with_name("session-4194398-1.slideviz")
+    older.write_bytes(crashed.read_bytes())
     os.utime(older, (1e9, 1e9))
     window = make()
     window.recovery.start()
-    assert [found.case.steps for found in window.recovery.waiting] == [7, 3]
+    assert [found.path for found in window.recovery.waiting] == [crashed, older]
     assert "1 more" in window.recovery_banner.text.text()
     window.recovery_banner.answers["Discard"].click()
     assert older.exists()
@@ -247,47 +236,44 @@ def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
     assert not older.exists()
 
 
-def test_a_session_whose_mesh_is_gone_is_told_and_kept(make, crashed, qtbot, case_file):
+def test_a_session_whose_mesh_is_gone_is_told_and_kept(
+    make, crashed, qtbot, case_file, monkeypatch
+):
     mesh = Case.read(case_file).mesh_file
-    away = mesh.rename(mesh.with_suffix(".away"))
+    away = mesh.rename(mesh.with_name("away.su2"))
     try:
         window = make()
         window.recovery.start()
         window.recovery_banner.answers["Restore"].click()
         qtbot.waitUntil(lambda: window.banner.isVisible())
-        assert "no such file" in window.banner.text.text()
+        assert "is neither beside it nor in" in window.banner.text.text()
         assert crashed.exists()
+        # Where the user says where it is, the session is restored.
+        monkeypatch.setattr(questions, "ask_open", lambda *_: away)
+        window.banner.answers["Find the mesh…"].click()
+        qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
+        assert window.store.session.path == away
+        assert window.store.session.case.source == case_file
+        qtbot.waitUntil(lambda: not crashed.exists())
     finally:
         away.rename(mesh)
 
 
-BROKEN = ["", "MESH_FILENAME= ", "NONSENSE= 3\n", "STEPS= 3\n", "MESH_FILENAME= a.su2\nSTE"]
+BROKEN = ["", "PK", "PK\5\6" + 18 * "\0", "STEPS= 3\n"]
 
 
 @pytest.mark.parametrize("text", BROKEN)
 def test_a_session_that_cannot_be_read_is_kept(folder, text):
     folder.mkdir(parents=True)
-    bad = folder / "session-4194399-1.cfg"
+    bad = folder / f"{LEFT}1.slideviz"
     bad.write_text(text)
-    (folder / "session-4194399-1.cfg.broken").write_text("an earlier one")
+    (folder / f"{LEFT}1.slideviz.broken").write_text("an earlier one")
     found, (problem,) = find_sessions(folder)
     assert found == []
     assert "cannot be read" in problem
     assert not bad.exists()
-    assert (folder / "session-4194399-1.cfg.2.broken").read_text() == text
-    assert (folder / "session-4194399-1.cfg.broken").read_text() == "an earlier one"
-
-
-def test_a_session_that_is_not_utf_8_does_not_end_the_search(folder):
-    folder.mkdir(parents=True)
-    odd, plain = folder / "session-4194399-1.cfg", folder / "session-4194399-2.cfg"
-    odd.write_bytes(b"% caf\xe9\nMESH_FILENAME= m.su2\n")
-    plain.write_text(f"% {SOURCE}a.cfg\nMESH_FILENAME= m.su2\n")
-    found, problems = find_sessions(folder)
-    assert {session.path for session in found} == {odd, plain}
-    assert {session.source for session in found} == {None, Path("a.cfg")}
-    assert not problems
-    assert all(session.designs() == (DesignTable(), False) for session in found)
+    assert (folder / f"{LEFT}1.slideviz.2.broken").read_text() == text
+    assert (folder / f"{LEFT}1.slideviz.broken").read_text() == "an earlier one"
 
 
 def test_the_name_of_the_case_need_not_be_utf_8(make, qtbot, folder, case_file):
@@ -298,18 +284,18 @@ def test_the_name_of_the_case_need_not_be_utf_8(make, qtbot, folder, case_file):
     window.autosave.save()
     qtbot.waitUntil(window.autosave.path.exists)
     qtbot.waitUntil(lambda: not window.autosave._runner.busy)
-    left = folder / "session-4194399-1.cfg"
+    left = folder / f"{LEFT}1.slideviz"
     left.write_bytes(window.autosave.path.read_bytes())
     path.unlink()
     (found,) = (one for one in find_sessions(folder)[0] if one.path == left)
-    assert found.source == path
+    assert found.content.source == path
 
 
 def test_sessions_that_cannot_be_read_are_told_once(make, folder):
     folder.mkdir(parents=True)
     window = make()
     for text in BROKEN:
-        (folder / "session-4194399-1.cfg").write_text(text)
+        (folder / f"{LEFT}1.slideviz").write_text(text)
         window.recovery.start()
         assert "cannot be read" in window.banner.text.text()
         assert not window.recovery_banner.isVisible()
@@ -378,9 +364,9 @@ def test_a_program_that_was_killed_leaves_its_session(tmp_path, folder, case_fil
     subprocess.run(call, timeout=120, check=False)
     found, problems = find_sessions(folder)
     assert problems == []
-    assert [one.case.steps for one in found] == [11]
-    assert found[0].source == case_file
-    assert Path(found[0].case.mesh_file).is_file()
+    assert case_in(found[0].path).steps == 11
+    assert found[0].content.source == case_file
+    assert found[0].content.mesh_file.is_file()
 
 
 # Unsaved changes --------------------------------------------------------------------------
@@ -392,7 +378,7 @@ def run_in(window, qtbot):
     assert window.store.session.unsaved_mesh
 
 
-def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
+def test_all_is_saved_with_one_answer_before_the_window_closes_and_comes_back(
     make, qtbot, case_file, monkeypatch, tmp_path
 ):
     window = make()
@@ -400,24 +386,28 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
     window.store.change(changes.set_case, steps=2)
     run_in(window, qtbot)
     asked = []
-    names = iter([tmp_path / "out.cfg", tmp_path / "out.su2"])
+    file = tmp_path / "out.slideviz"
 
     def ask(_parent, what, can_save, _now):
         asked.append((what, tuple(can_save)))
-        return "all"
+        return "session"
 
     monkeypatch.setattr(questions, "ask_unsaved", ask)
-    monkeypatch.setattr(questions, "ask_save", lambda *_: next(names))
+    monkeypatch.setattr(questions, "ask_session", lambda *_: (file, False))
     window.store.change(changes.show_frame, 1)
-    assert not window.close(), "first the mesh is written"
+    assert not window.close(), "first the session is written"
     qtbot.waitUntil(lambda: not window.isVisible())
-    assert [can for _, can in asked] == [("case", "mesh")]
+    assert [can for _, can in asked] == [("session", "case", "mesh")]
     assert "the deformed mesh of run 1" in asked[0][0]
-    assert (tmp_path / "out.cfg").is_file()
-    from slideviz.formats.files import read
-
-    last = window.store.session.frames[-1].mesh
-    assert (read(tmp_path / "out.su2").points == last.points).all(), "the last step, not that shown"
+    left = window.store.session
+    window = make()
+    open_in(window, file, qtbot)
+    session = window.store.session
+    assert session.view.frame == 1
+    assert window.windowTitle() == "out.slideviz – slideviz"
+    for one, other in zip(session.frames, left.frames, strict=True):
+        assert (one.mesh.points == other.mesh.points).all()
+    assert window.close(), "nothing is unsaved"
 
 
 @pytest.mark.parametrize("answer", ["case", "mesh"])
@@ -438,14 +428,13 @@ def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, an
 @pytest.mark.parametrize(
     ("can_save", "words"),
     [
-        (("case", "mesh"), ["Save &case…", "Save &mesh…", "Save &both…", "&Don’t save", "C&ancel"]),
         (
-            ("case", "mesh", "table"),
-            ["Save &case…", "Save &mesh…", "Save &table…", "Save a&ll…", "&Don’t save", "C&ancel"],
+            ("session", "case", "mesh"),
+            ["Save &session…", "Save &case…", "Save &mesh…", "&Don’t save", "C&ancel"],
         ),
+        (("session", "table"), ["Save &session…", "Save &table…", "&Don’t save", "C&ancel"]),
         (("table",), ["Save &table…", "&Don’t save", "C&ancel"]),
-        (("mesh",), ["&Save…", "&Don’t save", "C&ancel"]),
-        ((), ["&Don’t save", "C&ancel"]),
+        (("session",), ["Save &session…", "&Don’t save", "C&ancel"]),
     ],
 )
 def test_the_question_offers_what_can_be_saved(qtbot, monkeypatch, can_save, words):
@@ -462,7 +451,7 @@ def test_the_question_offers_what_can_be_saved(qtbot, monkeypatch, can_save, wor
     monkeypatch.setattr(QMessageBox, "exec", look)
     answer = questions.ask_unsaved(window, "Save it?\nIt is worth it.", can_save)
     assert sorted(seen[0]) == sorted(words)
-    assert answer == (can_save[0] if can_save else "discard")
+    assert answer == can_save[0]
 
 
 def test_the_question_about_a_run_is_asked_again_when_it_has_ended(make, qtbot, monkeypatch):

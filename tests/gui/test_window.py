@@ -933,7 +933,10 @@ def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkey
     assert all(can_save == ["run"] for _, can_save, _ in asked[:3])
     assert asked[0][0].startswith("Run 1 is still running. Stop it and keep its ")
     case, mesh = "the changes to passage.cfg", f"the deformed mesh of run 1 (step {count} of 2000)"
-    assert asked[3][:2] == (f"Save {case} and {mesh} before closing?", ["case", "mesh"])
+    assert asked[3][:2] == (
+        f"Save {case} and {mesh} before closing?",
+        ["session", "case", "mesh"],
+    )
     assert window.isVisible()
     assert ready.session.run_shown.end == "cancelled"
     assert f"cancelled after step {count} of 2000" in window.banner.text.text()
@@ -1090,10 +1093,13 @@ def test_the_question_promises_the_same_result_only_where_that_is_true(ready, an
     ready.window.store.change(changes.saved_mesh)
     ready.window.close()
     question = "Save the changes to passage.cfg before closing?"
-    assert asked[-1][:2] == (f"{question}\nThe case repeats run 1 exactly.", ["case"])
+    assert asked[-1][:2] == (
+        f"{question}\nThe case repeats run 1 exactly.",
+        ["session", "case"],
+    )
     ready.window.store.change(changes.set_case, steps=7)
     ready.window.close()
-    assert asked[-1][:2] == (question, ["case"])
+    assert asked[-1][:2] == (question, ["session", "case"])
 
 
 # View -------------------------------------------------------------------------------------

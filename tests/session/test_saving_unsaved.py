@@ -28,18 +28,33 @@ def saved(session, *numbers):
 
 
 def test_where_all_is_saved_nothing_is_asked(session):
-    unsaved = Unsaved.of(saved(session, 1, 2), busy=False)
-    assert not unsaved.lost
-    assert not unsaved.can_save
+    assert not Unsaved.of(saved(session, 1, 2), busy=False).lost
 
 
 def test_a_mesh_is_asked_about_with_the_runs_that_are_not_shown(session):
     unsaved = Unsaved.of(session, busy=False)
-    assert unsaved.can_save == ["mesh"]
+    assert unsaved.can_save == ["session", "mesh"]
     assert unsaved.question("closing") == (
         "Save the deformed mesh of run 2 before closing?\nThe mesh of run 1 is not saved either."
     )
     assert "\n" not in Unsaved.of(saved(session, 1), busy=False).question("closing")
+
+
+def test_other_runs_are_asked_about_where_the_mesh_of_the_one_that_is_shown_is_saved(session):
+    unsaved = Unsaved.of(saved(session, 2), busy=False)
+    assert unsaved.can_save == ["session"]
+    assert unsaved.question("opening another mesh").splitlines() == [
+        "Save the session before opening another mesh?",
+        "The mesh of run 1 is not saved either.",
+    ]
+    written = changes.saved_session(session, session, Path("a.slideviz"))
+    assert not Unsaved.of(written, busy=False).lost
+    assert title_of(written) == "a.slideviz – slideviz"
+    later = changes.set_case(written, steps=9)
+    assert title_of(later) == "*a.slideviz – slideviz"
+    # What was changed while it was written is not saved.
+    meanwhile = changes.saved_session(changes.set_case(session, steps=9), session, Path("b"))
+    assert meanwhile.unsaved_case
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
@@ -106,10 +121,10 @@ def test_the_mesh_of_a_design_that_is_looked_at_is_not_asked_about(session):
 def test_designs_with_results_can_be_saved(session):
     words = "The table of designs, 2 with results, is not saved."
     alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)
-    assert alone.can_save == ["table"]
+    assert alone.can_save == ["session", "table"]
     assert alone.question("closing") == f"Save the table of designs before closing?\n{words}"
     both = Unsaved.of(saved(session, 1), busy=False, designs=words)
-    assert both.can_save == ["mesh", "table"]
+    assert both.can_save == ["session", "mesh", "table"]
     assert both.question("closing").splitlines() == [
         "Save the deformed mesh of run 2 before closing?",
         words,
@@ -136,7 +151,10 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     # How they are shown is not asked about; that they are gone is.
     hidden = changes.set_view(written, sections=(replace(written.view.section, shown=False),))
     assert not Unsaved.of(hidden, busy=False).lost
-    assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == ["case"]
+    assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == [
+        "session",
+        "case",
+    ]
     # A case that is opened with sections has them.
     kept = view_to_case(written)
     again = open_mesh(session.first, None, (), kept)

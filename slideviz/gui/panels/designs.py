@@ -569,6 +569,12 @@ class DesignsPanel(Panel):
         self._show_status(counted(len(table.rows), "design") if table.rows else "")
         return True
 
+    def restore(self, table: DesignTable, case: Case | None) -> None:
+        """Show the table of a session that was opened, whose results are for ``case``."""
+        self.case = case
+        self.mesh = self.session.mesh
+        self.put(table)
+
     def _design_clicked(self, number: int) -> None:
         self.rows.view.selectRow(number - 1)
         self.show_design(number)

@@ -14,9 +14,11 @@ from slideviz.gui.responsiveness.timers import ROWS_MS
 from slideviz.gui.widgets.build import Choice, decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
+from slideviz.session.session_file import ENDING
 
 PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
+WITH_MESH = f"Session with a copy of the mesh (*{ENDING})"
 
 
 def mesh_filters(mesh: Mesh) -> str:
@@ -30,10 +32,11 @@ def mesh_filter(row: MeshFormat) -> str:
 
 
 def ask_open(parent: QWidget, folder: Path) -> Path | None:
-    """Return the mesh or case that the user wants to open, or None."""
+    """Return the mesh, case or session that the user wants to open, or None."""
     ours = " ".join(f"*.{ending}" for ending in FILE_FORMATS)
     filters = (
-        f"SU2 meshes and cases ({ours} *.cfg);;All meshes ({readable_patterns()});;All files (*)"
+        f"SU2 meshes, cases and sessions ({ours} *.cfg *{ENDING});;"
+        f"All meshes ({readable_patterns()});;All files (*)"
     )
     name, _ = QFileDialog.getOpenFileName(parent, "Open a mesh or case", str(folder), filters)
     return Path(name) if name else None
@@ -51,33 +54,45 @@ def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path |
 
     Its suffix is one of the ``filters``: another one, as that of the mesh, gets it behind.
     """
-    return _save_name(parent, title, default, filters, QFileDialog.Option(0))
+    return _save_name(parent, title, default, filters, QFileDialog.Option(0))[0]
+
+
+def ask_session(parent: QWidget, default: Path) -> tuple[Path | None, bool]:
+    """Return the session file to write, or None; and whether it is to have copies of its files."""
+    filters = f"Session (*{ENDING});;{WITH_MESH}"
+    option = QFileDialog.Option(0)
+    path, chosen = _save_name(parent, "Save session", default, filters, option)
+    return path, chosen == WITH_MESH
 
 
 def ask_numbered(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
     """Return the name, with a suffix, of a series of files that each get a number, or None."""
     # A file of just that name is not replaced: no question.
-    return _save_name(parent, title, default, filters, QFileDialog.Option.DontConfirmOverwrite)
+    option = QFileDialog.Option.DontConfirmOverwrite
+    return _save_name(parent, title, default, filters, option)[0]
 
 
 def _save_name(
     parent: QWidget, title: str, default: Path, filters: str, option: QFileDialog.Option
-) -> Path | None:
-    """Return the chosen name, with the suffix of the chosen filter if it has none; or None."""
+) -> tuple[Path | None, str]:
+    """Return the chosen name, with the suffix of the chosen filter if it has none; or None.
+
+    Also the chosen filter.
+    """
     call = QFileDialog.getSaveFileName
     while True:
         name, chosen = call(parent, title, str(default), filters, options=option)
         if not name:
-            return None
+            return None, chosen
         path = Path(name)
         if path.suffix.lower() in _suffixes(filters):
-            return path
+            return path, chosen
         suffix = next(iter(_suffixes(chosen)), default.suffix)
         path = path.with_name(f"{path.name.rstrip('.')}{suffix}")
         # The dialog has asked about the name without the suffix.
         asks = option != QFileDialog.Option.DontConfirmOverwrite and path.exists()
         if not asks or ask_replace(parent, [path]):
-            return path
+            return path, chosen
         default = path
 
 
@@ -94,7 +109,7 @@ def ask_unsaved(
 ) -> str:
     """Ask what to do with unsaved changes when they would be lost.
 
-    Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``run`` to stop the run first,
+    Return ``session``, ``case``, ``mesh`` or ``table`` to save that, ``run`` to stop the run first,
     ``discard``, ``cancel``, or ``again`` where the question has become another one. Called by
     `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
     `slideviz.session.saving`. ``what``: the question; the text after a line break is shown in
@@ -118,25 +133,21 @@ def ask_unsaved(
         tick = QTimer(box)
         tick.timeout.connect(lambda: show(now()))
         tick.start(ROWS_MS)
-    several = len(can_save) > 1
     going = "run" in can_save
-    words = {"case": "Save &case…", "mesh": "Save &mesh…", "table": "Save &table…"}
-    words["run"] = "&Stop it"
-    words["all"] = "Save &both…" if len(can_save) == 2 else "Save a&ll…"
-    offered = [*can_save, "all"] if several else list(can_save)
-    role = QMessageBox.ButtonRole
-    buttons = {
-        # “Save” is enough for a single case or mesh; the table may be in a hidden dock.
-        name: box.addButton(
-            words[name] if several or name in ("table", "run") else "&Save…", role.AcceptRole
-        )
-        for name in offered
+    words = {
+        "session": "Save &session…",
+        "case": "Save &case…",
+        "mesh": "Save &mesh…",
+        "table": "Save &table…",
+        "run": "&Stop it",
     }
+    role = QMessageBox.ButtonRole
+    buttons = {name: box.addButton(words[name], role.AcceptRole) for name in can_save}
     buttons["discard"] = box.addButton("&Don’t save", role.DestructiveRole)
     # Not &Cancel: Alt+C saves the case.
     buttons["cancel"] = box.addButton("Let it &run" if going else "C&ancel", role.RejectRole)
     box.setEscapeButton(buttons["cancel"])
-    box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
+    box.setDefaultButton(next(iter(buttons.values())))
     box.exec()
     clicked = box.clickedButton()
     answer = next((name for name, button in buttons.items() if button is clicked), "cancel")
