@@ -423,7 +423,7 @@ def test_results_are_not_lost_without_a_question(
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
     assert "table of designs, 1 with results, is not saved" in asked[0][0]
-    assert asked[0][1] == ["table"]
+    assert asked[0][1] == ["session", "table"]
     answers("ask_unsaved", "table")
     answers("ask_save", None)
     assert not window.close()
@@ -487,7 +487,7 @@ def test_closing_asks_about_designs_that_go_on(
     asked = answers("ask_unsaved", "table")
     answers("ask_save", tmp_path / "out.csv")
     assert window.close()
-    assert asked[0][1] == ["table"]
+    assert asked[0][1] == ["session", "table"]
     with (tmp_path / "out.csv").open() as file:
         done = [row for row in csv.DictReader(file) if row["min"]]
     assert 1 < len(done) < 500
