@@ -824,6 +824,12 @@ class Deformer:
             return out
         return self._as_run
 
+    def setups(self) -> tuple[tuple[IntArray, Setup], ...]:
+        """Return the points (z,) of each zone that moves, and its setup."""
+        if self._zones:
+            return tuple((zone.points, zone.deformer._setup) for zone in self._zones)
+        return ((np.arange(len(self.mesh.points)), self._setup),)
+
     @check_types
     def refresh(self, displacement: FloatArray) -> Deformer:
         """Return a deformer that is made anew with another displacement, (m, d) or (k, m, d)."""

@@ -127,6 +127,8 @@ class Motion(CheckedFields):
     """Whether its displacement takes seconds to compute; the window computes it in a thread."""
     depends_on_place: ClassVar[bool] = False
     """Whether the displacement of a node depends on where motions before have taken it."""
+    affine: ClassVar[bool] = False
+    """Whether it maps the points of a body by an affine map."""
     checked_as_text: ClassVar[bool] = True
     """Whether its values must be such as `read` returns."""
 

@@ -62,6 +62,7 @@ class Translate(_ByFormula):
     vector: tuple[float, ...]
 
     kind_term = Term("translate")
+    affine = True
     verbs = ("translate",)
     grammar = ("(BLADE, translate, dx, dy[, dz])",)
     rows = ("vector",)
@@ -132,6 +133,7 @@ class Rotate(_AboutPoint):
     axis: Vector = (0.0, 0.0, 1.0)
 
     kind_term = Term("rotate")
+    affine = True
     verbs = ("rotate",)
     grammar = (
         "(BLADE, rotate, degrees, centroid)            counter-clockwise; in 3D about z",
@@ -205,6 +207,7 @@ class Scale(_AboutPoint):
     point: Point = "centroid"
 
     kind_term = Term("scale")
+    affine = True
     verbs = ("scale",)
     grammar = (
         "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
