@@ -10,8 +10,10 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+from PIL.PngImagePlugin import PngInfo
 from pyvista import Color
 
+from slideviz.case.cfg import case_text
 from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.export.encode import Pixels
@@ -33,9 +35,12 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import show_frame
+from slideviz.session.motions import shown_case
 from slideviz.session.opening import session_of_runs, with_case_view
 from slideviz.session.panes import second_session, shown_views
 from slideviz.session.pieces import render_in_groups, run_to_end
+from slideviz.session.saving import view_to_case
+from slideviz.session.session_file import PICTURE_KEY
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.system.atomic import atomic_write
 
@@ -225,13 +230,18 @@ class OffscreenRenderer:
         return ranges[0], ranges[1]
 
     def write(self, options: PictureOptions, file: Path) -> None:
-        """Write the picture as a PNG file, whole or not at all.
+        """Write the picture as a PNG file, whole or not at all; that of a view with its case.
 
         Raises SlidevizError if the size cannot be drawn, the name does not end with .png, or the
         file cannot be written.
         """
         check_png(file)
-        known = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}
+        known: dict[str, Any] = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}
+        if self.like is not None and options.case:
+            shown = replace(self.session, case=shown_case(self.session))
+            known["pnginfo"] = PngInfo()
+            text = case_text(file, view_to_case(shown, self.like.camera.view))
+            known["pnginfo"].add_itxt(PICTURE_KEY, text)
         content = png_bytes(self.image(options), **known)
         with atomic_write(file) as out:
             out.write(content)

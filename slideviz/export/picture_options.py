@@ -60,6 +60,8 @@ class PictureOptions:
     """Whether it has the name of its run even without a title, as one of two side by side."""
     marked: bool = True
     """Whether the marked cell is drawn, with its number and value."""
+    case: bool = True
+    """Whether the file of a picture of a view has the case with that view as text."""
     lines: int = 1
     """Number of lines of the title."""
     heading: str = ""

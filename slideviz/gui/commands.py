@@ -245,7 +245,7 @@ def needs_repair(now: CommandState) -> bool:
 def has_file(now: CommandState) -> bool:
     """Return whether there is a mesh in memory whose case is saved."""
     session = now.session
-    return has_mesh(now) and session.case.source is not None and not session.lacks_cells
+    return has_mesh(now) and session.case_file is not None and not session.lacks_cells
 
 
 def has_section(now: CommandState) -> bool:

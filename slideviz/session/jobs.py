@@ -58,6 +58,7 @@ from slideviz.session.session_file import (
     StoredRun,
     StoredSession,
     read_case_of,
+    read_picture,
     read_session,
     stored_session,
     write_session,
@@ -279,7 +280,7 @@ def open_file(
     mesh_file: Path | None = None,
     unpacked: Path | None = None,
 ) -> Opened:
-    """Return a mesh, or the case or session in a file with its mesh, ready to be shown.
+    """Return a mesh, or the case or session in a file or picture with its mesh, ready to be shown.
 
     ``mesh_file``: the mesh of a session, where it is neither beside it nor where it was.
     ``unpacked``: the folder for copies of files that a session has; by default a new one. Raises
@@ -293,6 +294,8 @@ def open_file(
         report(JobProgress(f"Reading {path.name}"))
     if ending == ENDING:
         case, moved = read_case_of(path, unpacked, mesh_file)
+    elif ending == ".png":
+        case = read_picture(path, mesh_file)
     elif ending == ".cfg":
         case = Case.read(path)
     if case is not None:

@@ -44,7 +44,7 @@ class _Recipe:
     """
 
     def __init__(self, session: Session, camera: Camera | None = None) -> None:
-        source = session.case.source
+        source = session.case_file
         mesh = session.mesh
         if source is None or mesh is None:
             raise CaseError("a command names the file of the case, which has none yet; save it")

@@ -24,6 +24,7 @@ from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from slideviz.argument_types import annotations_of
 from slideviz.case.cfg import case_of_text, case_text
@@ -39,6 +40,7 @@ from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
 
 ENDING = ".slideviz"
+PICTURE_KEY = "slideviz"  # of the text in a PNG file that is its case
 VERSION = 1  # of the form of the file
 _LARGEST_TEXT = 100_000_000  # most bytes of a text in it
 _CASE = "case.cfg"
@@ -238,6 +240,21 @@ def read_case_of(
         folder = unpacked or Path(mkdtemp() if copies else "")
         moved = {path.parent / name: reader.unpack(name, folder) for name in copies}
         return placed(reader.decoded(_CASE, Case), path, moved, mesh)
+
+
+def read_picture(path: Path, mesh: Path | None = None) -> Case:
+    """Return the case that a picture of the window has as text, with the view of the picture.
+
+    ``mesh``: as of `placed`. Raises CaseError if it has none.
+    """
+    try:
+        with Image.open(path, formats=["PNG"]) as image:
+            text = str(image.info[PICTURE_KEY])
+    except (OSError, ValueError, SyntaxError, KeyError) as problem:
+        raise CaseError(
+            f"{printable(path)}: has no case in it; open a picture that the window has exported"
+        ) from problem
+    return placed(case_of_text(path, text, Case()), path, {}, mesh)[0].change(source=None)
 
 
 def placed(

@@ -394,6 +394,12 @@ class Session:
         """Return why nothing can be done that needs all cells in memory; "" if they are there."""
         return IN_FILE if isinstance(self.mesh, Skin) else ""
 
+    @property
+    def case_file(self) -> Path | None:
+        """Return the case file that was opened or saved last; None, too, for a session file."""
+        source = self.case.source
+        return source if source is not None and source.suffix.lower() == ".cfg" else None
+
     def inputs(self) -> dict[Path, str]:
         """Return the files that the session was read from, with words for what each is."""
         inputs = self.case.inputs()

@@ -8,6 +8,7 @@ import pytest
 from qtpy.QtWidgets import QFileDialog
 
 from slideviz.design.sweeps.table import DesignRow
+from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.files import sample_folder
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
@@ -160,3 +161,28 @@ def test_the_dialog_offers_a_copy_of_the_mesh(window, monkeypatch, tmp_path, cho
     assert questions.ask_session(window, path) == (path, bool(chosen))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, options: ("", ""))
     assert questions.ask_session(window, path) == (None, False)
+
+
+@pytest.mark.usefixtures("painted")
+def test_a_picture_of_the_view_carries_its_case_and_opens_as_such(left, answers, tmp_path):
+    window = left.window
+    answers("ask_unsaved", "discard")
+    window.store.change(changes.set_view, color_by="skew", edges=False)
+    left.window.store.change(changes.show_beside, None)
+    seen = [0, 1, 3, 4, 5, 6, 7, 8, 9]
+    camera = np.array(window.scene.camera.view)[seen]
+    run = left.session.run_shown
+    path = tmp_path / "view.png"
+    with window.exports._renderer() as renderer:
+        window.exports._write_picture(renderer, PictureOptions((320, 200)), path)
+        plain = tmp_path / "plain.png"
+        window.exports._write_picture(renderer, PictureOptions((320, 200), case=False), plain)
+    mesh = left.session.path
+    left.open(path)
+    assert left.session.path == mesh
+    assert left.session.case.steps == run.case.steps, "that of the run that is shown"
+    assert left.session.view.color_by == "skew"
+    assert "edges" not in left.session.view.drawn
+    assert np.allclose(np.array(window.scene.camera.view)[seen], camera)
+    left.open(plain)
+    assert "has no case in it" in window.banner.text.text()

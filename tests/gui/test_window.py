@@ -143,7 +143,7 @@ def test_a_broken_file_and_an_unexpected_error_are_told_and_the_window_goes_on(
     opened.open(opened.session.path)
     assert not banner.isVisible()
 
-    def broken(*_):
+    def broken(*_, **_named):
         raise ZeroDivisionError("strange")
 
     monkeypatch.setattr(jobs, "open_file", broken)

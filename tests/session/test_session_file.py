@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
+from slideviz.case.cfg import case_text
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.errors import Cancelled, CaseError, Doubt, Message, SlidevizError
 from slideviz.formats.files import read, write
@@ -19,6 +22,7 @@ from slideviz.samples.table import write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
+from slideviz.session.saving import view_to_case
 from slideviz.session.session_file import MissingMeshError, digest, stored_session, write_session
 from slideviz.session.state import StepFrame
 
@@ -427,3 +431,43 @@ def test_a_missing_member_or_a_wrong_case_is_told(file, folder, tmp_path, name):
 def test_a_case_without_a_mesh_is_told(file, tmp_path):
     changed = {"case.cfg": b"STEPS= 3\n"}
     refused(rewritten(file, tmp_path / "bad.slideviz", changed), "the case in it names no mesh")
+
+
+# Pictures --------------------------------------------------------------------------------
+
+
+def picture(path, text=None):
+    known = PngInfo()
+    if text is not None:
+        known.add_itxt("slideviz", text)
+    Image.new("RGB", (4, 4)).save(path, pnginfo=known)
+    return path
+
+
+def test_a_picture_opens_as_the_case_in_it(folder, left, tmp_path):
+    text = case_text(folder / "a.png", view_to_case(left, CAMERA))
+    found = opened(picture(folder / "a.png", text))
+    assert found.camera == CAMERA
+    assert found.session.view.color_by == "skew"
+    assert found.session.case.source is None
+    assert not found.session.unsaved_case
+    with pytest.raises(MissingMeshError, match=r"its mesh mesh\.su2 is neither"):
+        opened(picture(tmp_path / "a.png", text))
+    chosen = opened(tmp_path / "a.png", mesh_file=folder / "mesh.su2")
+    assert chosen.session.path == folder / "mesh.su2"
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture", None])
+def test_a_picture_without_a_case_is_told(tmp_path, content):
+    path = picture(tmp_path / "a.png")
+    if content is not None:
+        path.write_bytes(content)
+    refused(path, "has no case in it; open a picture that the window has exported")
+    bomb = picture(tmp_path / "b.png", 20_000_000 * "x")
+    assert bomb.stat().st_size > 10_000_000
+    refused(bomb)
+
+
+def test_a_picture_with_a_wrong_case_is_told(tmp_path):
+    refused(picture(tmp_path / "a.png", "STEPS= many"), "STEPS: ")
+    refused(picture(tmp_path / "a.png", "STEPS= 3"), "the case in it names no mesh")

@@ -249,6 +249,10 @@ OPTIONS = {
     ),
     "marked": ("Marked cell", "Its outline, with its number and its value."),
     "both": ("Both runs side by side", "Like the two views, with one legend."),
+    "case": (
+        "Case and view in the PNG file",
+        "slideviz opens the picture like a case: with this view, and the mesh beside it.",
+    ),
 }
 """Text and tip of the check box for each field of `PictureOptions` that is a bool."""
 

@@ -36,7 +36,7 @@ def ask_open(parent: QWidget, folder: Path) -> Path | None:
     ours = " ".join(f"*.{ending}" for ending in FILE_FORMATS)
     filters = (
         f"SU2 meshes, cases and sessions ({ours} *.cfg *{ENDING});;"
-        f"All meshes ({readable_patterns()});;All files (*)"
+        f"All meshes ({readable_patterns()});;{PICTURE_FILTERS};;All files (*)"
     )
     name, _ = QFileDialog.getOpenFileName(parent, "Open a mesh or case", str(folder), filters)
     return Path(name) if name else None
