@@ -70,6 +70,7 @@ def _fill(
 
 
 Keys = str | QKeySequence.StandardKey
+NO_MESH = "There is no mesh yet: open one first."
 WAIT = "Wait for the running job, or cancel it."
 
 
@@ -141,13 +142,20 @@ class Command:
         act.setEnabled(able)
         if self.checked is not None:
             act.setChecked(self.checked(now))
-        if self.tip_now or self.why_not:
-            tip = self.tip_now(now) if self.tip_now else ""
-            if not able and self.why_not:
-                reason = WAIT if has_mesh(now) and now.busy else self.why_not
-                tip = now.session.lacks_cells or reason
-            tip = tip or self.tip
-            self._explain(act, self.tip if able else tip, tip)
+        tip = self.tip_now(now) if self.tip_now else ""
+        if not able:
+            tip = self.reason(now) if self.why_not or not tip else tip
+            act.setWhatsThis(tip)
+        tip = tip or self.tip
+        self._explain(act, self.tip if able else tip, tip)
+
+    def reason(self, now: CommandState) -> str:
+        """Return why the command is disabled."""
+        if not has_mesh(now):
+            return self.why_not or NO_MESH
+        return now.session.lacks_cells or (
+            WAIT if now.busy else self.why_not or "Not possible now."
+        )
 
 
 @dataclass(frozen=True)
@@ -330,6 +338,7 @@ def _fill_panels(window: MainWindow, menu: QMenu) -> None:
 # fmt: off
 
 _NO_STEPS = "There are no steps yet: run the case first."
+_BY_ROLE = "Color the cells by a quantity first, with a range of its own."
 _NO_FILE = "Save the case first (Ctrl+Shift+S): a command names its file."
 _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes.", (
     Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
@@ -344,7 +353,7 @@ _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes."
             "Save the quality of every cell of the step that is shown as a CSV table.",
             call("exports.quality"),
             enabled=in_memory(is_idle),
-            why_not="There is no mesh yet: open one first."),
+            why_not=NO_MESH),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
             call("exports.steps"),
@@ -363,7 +372,7 @@ _FILE = Menu("file", "&File", entries=(
     None,
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
             call("files.save_mesh"), (KEY.Save,), "save", in_memory(is_idle),
-            why_not="There is no mesh yet: open one first."),
+            why_not=NO_MESH),
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
             call("exports.wheel"), enabled=in_memory(has_wheel),
@@ -402,12 +411,14 @@ _EDIT = Menu("edit", "&Edit", entries=(
             lambda w: _undo_or_redo(w, w.store.undo, w.store.can_undo, "Undone"),
             (KEY.Undo,), "undo", lambda now: bool(now.undo),
             title_now=lambda now: f"Undo {now.undo}".rstrip(),
-            tip_now=lambda now: now.undo and f"Undo {now.undo}"),
+            tip_now=lambda now: now.undo and f"Undo {now.undo}",
+            why_not="There is nothing to undo."),
     Command("redo", "Redo", "Redo the change that was undone.",
             lambda w: _undo_or_redo(w, w.store.redo, w.store.can_redo, "Redone"),
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
             title_now=lambda now: f"Redo {now.redo}".rstrip(),
-            tip_now=lambda now: now.redo and f"Redo {now.redo}"),
+            tip_now=lambda now: now.redo and f"Redo {now.redo}",
+            why_not="There is nothing to redo."),
     None,
     _COPY_AS,
 ))
@@ -419,6 +430,7 @@ _RUN = Menu("run", "&Run", entries=(
             button_tip="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
     Command("cancel", "&Cancel", "Stop the running job; finished steps are kept.",
             call("running.cancel"), image="cancel", enabled=lambda now: now.busy,
+            why_not="No job is running.",
             button_tip="Stop within a second (Esc); finished steps are kept.",
             button_key="Esc"),
     Command("repair", "Re&pair",
@@ -432,7 +444,7 @@ _RUN = Menu("run", "&Run", entries=(
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "
             "or other settings, and their quality.",
             call("dock_manager.toggle", "designs"), ("F6",), enabled=has_mesh,
-            why_not="There is no mesh yet: open one first."),
+            why_not=NO_MESH),
 ))
 
 _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.", (
@@ -440,17 +452,18 @@ _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.",
             "Let the colors range over the values of the step that is shown, and of the other step "
             "in a comparison.",
             call("store.change", fit_colors, every=False),
-            ("R",), enabled=colored_by_value,
+            ("R",), enabled=colored_by_value, why_not=_BY_ROLE,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
     Command("fit_all_colors", "Fit to all steps",
             "Let the colors range over the values of all steps, so that they mean the same in a "
             "whole film.",
             call("store.change", fit_colors, every=True),
-            ("Shift+R",), enabled=colored_by_value),
+            ("Shift+R",), enabled=colored_by_value, why_not=_BY_ROLE),
     Command("usual_colors", "Default range", "Use the default range of the colors.",
             call("store.change", changes.set_view, color_range=None),
             enabled=lambda now: colored_by_value(now) and now.session.view.color_range is not None,
+            why_not=_BY_ROLE,
             title_now=lambda now: usual_range(now.session)),
 ))
 
@@ -459,7 +472,7 @@ def _side_command(side: str, keys: str, short: str = "") -> Command:
     place = "a corner" if side == "iso" else side
     return Command(f"side{side}", "isometric" if side == "iso" else side,
                    f"Look at the mesh from {place}.", call("viewing.look_from", side),
-                   (keys,), enabled=is_3d, short=short)
+                   (keys,), enabled=is_3d, short=short, why_not="A 2D mesh has one side.")
 
 
 _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
@@ -472,19 +485,19 @@ _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
 # Without steps the commands are disabled, and Space presses the focused button.
 STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
-            call("player.go", 0), ("Home",), enabled=has_steps,
+            call("player.go", 0), ("Home",), enabled=has_steps, why_not=_NO_STEPS,
             button_tip="Undeformed mesh (Home)"),
     Command("step_previous", "Step back", "Show the step before this one.",
-            call("player.step", -1), ("Alt+Left",), enabled=has_steps,
+            call("player.step", -1), ("Alt+Left",), enabled=has_steps, why_not=_NO_STEPS,
             button_tip="One step back (Alt+Left)"),
     Command("step_play", "Play or pause", "Play the steps one after the other, or pause.",
-            call("player.toggle"), ("Space",), enabled=has_steps,
+            call("player.toggle"), ("Space",), enabled=has_steps, why_not=_NO_STEPS,
             button_tip="Play the steps (Space)"),
     Command("step_next", "Step on", "Show the step after this one.",
-            call("player.step", 1), ("Alt+Right",), enabled=has_steps,
+            call("player.step", 1), ("Alt+Right",), enabled=has_steps, why_not=_NO_STEPS,
             button_tip="One step on (Alt+Right)"),
     Command("step_last", "Last step", "Show the deformed mesh.",
-            call("player.go", 10**9), ("End",), enabled=has_steps,
+            call("player.go", 10**9), ("End",), enabled=has_steps, why_not=_NO_STEPS,
             button_tip="Last step (End)"),
 ))
 
@@ -563,6 +576,9 @@ _VIEW = Menu("view", "&View", entries=(
 ))
 
 _HELP = Menu("help", "&Help", entries=(
+    Command("palette", "&Find anything…",
+            "Find commands, boundaries, runs, keys of the case and pages of the manual.",
+            call("help.palette"), ("Ctrl+Shift+P",), short="Find…"),
     Command("manual", "&Manual", "Read and search the pages of the documentation.",
             call("help.manual"), ("Shift+F1",)),
     Command("shortcuts", "&Keyboard and mouse", "Show all keys and what the mouse does.",

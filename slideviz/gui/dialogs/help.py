@@ -5,10 +5,19 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from qtpy.QtCore import QModelIndex, QObject, QSignalBlocker, QSize, Qt, QUrl
-from qtpy.QtGui import QImage, QKeySequence, QTextCursor, QTextDocument
+from qtpy.QtGui import (
+    QAction,
+    QImage,
+    QKeyEvent,
+    QKeySequence,
+    QTextCursor,
+    QTextDocument,
+)
 from qtpy.QtWidgets import (
     QApplication,
     QDialog,
@@ -20,6 +29,7 @@ from qtpy.QtWidgets import (
     QPushButton,
     QSplitter,
     QTextBrowser,
+    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -28,8 +38,9 @@ from qtpy.QtWidgets import (
 import slideviz
 from slideviz import __version__
 from slideviz.case.cfg import describe_keys
+from slideviz.case.keys import KEYS, Key
 from slideviz.case.words import counted
-from slideviz.gui.commands import MENUS, CommandState
+from slideviz.gui.commands import COMMANDS, MENUS, CommandState
 from slideviz.gui.widgets.build import (
     dialog_buttons,
     fixed_font,
@@ -37,11 +48,16 @@ from slideviz.gui.widgets.build import (
     in_column,
     in_row,
     push_button,
+    reveal,
 )
 from slideviz.gui.widgets.error_reporter import versions
 from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.theme import logo
+from slideviz.session import changes
+from slideviz.session.panes import run_title
 
+NATIVE = QKeySequence.SequenceFormat.NativeText
+RECENT = 12  # entries that the palette has first, as they were chosen last
 LOG_LINES = 40  # number of the log's last lines in a bug report
 CLOSE = QDialogButtonBox.StandardButton.Close
 PANELS = (
@@ -82,15 +98,19 @@ class Help(QObject):
     def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.window = window
-        self._shown: dict[str, QDialog] = {}
+        self._shown: dict[str, Any] = {}
 
     def shortcuts(self) -> None:
         self._show("shortcuts", lambda: ShortcutsDialog(self.window))
 
-    def case_keys(self) -> None:
+    def case_keys(self, wanted: str = "") -> None:
+        """Show all keys of a case, at a wanted text."""
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
+        if wanted:
+            self._shown["keys"].search.setText(wanted)
 
-    def manual(self) -> None:
+    def manual(self, page: Path | None = None) -> None:
+        """Show the manual, at a page."""
         folder = manual_folder()
         if folder is None:
             self.window.banner.show_message(
@@ -98,6 +118,25 @@ class Help(QObject):
             )
             return
         self._show("manual", lambda: ManualDialog(self.window, folder))
+        if page is not None:
+            self._shown["manual"].pages.show_page(page)
+
+    def palette(self) -> None:
+        dialog = PaletteDialog(self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def show_key(self, key: Key) -> None:
+        """Go to the field of a key of the case, or else show it among all keys."""
+        panel = self.window.dock_manager.panels["method"]
+        field = panel.findChild(QWidget, key.field) if key.form else None
+        if field is None:
+            self.case_keys(f"{key.name}=")
+            return
+        panel.findChild(QToolButton, "more").setChecked(True)
+        self.window.dock_manager.bring_to_front("method")
+        field.setFocus()
+        reveal(field)
 
     def about(self) -> None:
         self._show("about", lambda: AboutDialog(self.window))
@@ -203,6 +242,89 @@ class ShortcutsDialog(SearchDialog):
         self.count.setVisible(not show_matching(self.tree.invisibleRootItem(), matches))
 
 
+class Entry(NamedTuple):
+    """A row of the palette."""
+
+    title: str
+    about: str
+    """Its shortcut, or what it is; of what cannot be done now, why."""
+    do: Callable[..., object]
+    able: bool = True
+
+
+def palette_entries(helper: Help) -> Iterator[Entry]:
+    """Yield commands, boundaries, runs, keys of the case and pages of the manual, in this order."""
+    window = helper.window
+    for name in COMMANDS:
+        act = window.findChild(QAction, name)
+        able = act.isEnabled()
+        about = act.shortcut().toString(NATIVE) if able else act.whatsThis()
+        if act.isVisible():
+            yield Entry(_plain(act.text()), about, act.trigger, able)
+    session = window.store.session
+    change = partial(partial, window.store.change)
+    for name in session.mesh.marker_names if session.mesh is not None else ():
+        yield Entry(name, "boundary", change(changes.select, [name]))
+    for run in session.runs:
+        yield Entry(run_title(run, session.runs), "run", change(changes.show_run, run.number))
+    for key in KEYS.values():
+        yield Entry(key.name, key.label or "key of the case", partial(helper.show_key, key))
+    folder = manual_folder()
+    for _, path in manual_pages(folder) if folder is not None else ():
+        yield Entry(page_title(path), "page of the manual", partial(helper.manual, path))
+
+
+class PaletteDialog(SearchDialog):
+    """The dialog that finds and does everything by letters of its name; what was done is first."""
+
+    def __init__(self, helper: Help) -> None:
+        words = "Find a command, boundary, run, key or page (Enter does it)"
+        super().__init__(helper.window, "Find anything", QSize(820, 520), words)
+        self.settings = helper.window.settings
+        self.entries = list(palette_entries(helper))
+        self.tree = QTreeWidget()
+        self.tree.setHeaderLabels(["Name", "Key, or what it is"])
+        self.tree.setColumnWidth(0, 400)
+        self.tree.setRootIsDecorated(False)
+        self.tree.itemActivated.connect(self._do)
+        self.lay_out(self.tree)
+        self.look_for("")
+
+    @property
+    def _recent(self) -> list[str]:
+        return list(self.settings.value("palette") or ())
+
+    def look_for(self, wanted: str) -> None:
+        recent = self._recent
+        near = wanted.strip().lower()
+        letters = re.compile(".*?".join(map(re.escape, near)))
+
+        def rank(entry: Entry) -> tuple[bool, bool, int]:
+            done = recent.index(entry.title) if entry.title in recent else RECENT
+            return near not in entry.title.lower(), not entry.able, done
+
+        self.tree.clear()
+        for entry in sorted(self.entries, key=rank):
+            if letters.search(entry.title.lower()) or near in entry.about.lower():
+                item = QTreeWidgetItem(self.tree, entry[:2])
+                item.setData(0, PATH, entry)
+                item.setToolTip(1, entry.about)
+                item.setDisabled(not entry.able)
+        self.tree.setCurrentIndex(self.tree.model().index(0, 0))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        super().keyPressEvent(event)
+        self.tree.keyPressEvent(event)  # the search field does nothing with arrows and Enter
+
+    def _do(self, item: QTreeWidgetItem) -> None:
+        entry = item.data(0, PATH)
+        if entry.able:
+            recent = dict.fromkeys([entry.title, *self._recent])
+            self.settings.setValue("palette", list(recent)[:RECENT])
+            self.accept()
+            entry.do()
+
+
 class TextDialog(SearchDialog):
     """A dialog with a long text and a field to search it."""
 
@@ -259,10 +381,9 @@ def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]
     """Return per menu its title, and title, first key and tip of each command that has a key."""
     # A plain `CommandState`: no title such as “Undo role”.
     now = CommandState(window.store.session)
-    native = QKeySequence.SequenceFormat.NativeText
     rows = {
         menu.title: [
-            (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(native), one.tip)
+            (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(NATIVE), one.tip)
             for one in menu.commands()
             if one.keys
         ]

@@ -1,0 +1,124 @@
+"""The palette finds commands, boundaries, runs, keys and pages by letters, and does them."""
+
+import pytest
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QAction
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QLineEdit
+
+from slideviz.gui.commands import COMMANDS
+from slideviz.gui.dialogs.help import PaletteDialog
+
+pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
+
+
+@pytest.fixture
+def find(driver, qtbot):
+    """Open the palette by its keys, and type letters."""
+
+    def type_letters(letters):
+        driver.activate()
+        QTest.keyClick(
+            driver.window,
+            Qt.Key.Key_P,
+            Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier,
+        )
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, PaletteDialog)
+        QTest.keyClicks(dialog.search, letters)
+        return dialog
+
+    return type_letters
+
+
+def rows(dialog):
+    model = [dialog.tree.topLevelItem(k) for k in range(dialog.tree.topLevelItemCount())]
+    return {item.text(0): item.text(1) for item in model}
+
+
+def enter(dialog):
+    QTest.keyClick(dialog.search, Qt.Key.Key_Return)
+
+
+def test_it_has_every_command_with_its_key_or_why_it_is_disabled(find, with_runs):
+    driver = with_runs({"steps": 2})
+    dialog = find("")
+    named = {entry.title: entry for entry in dialog.entries}
+    hidden = {"add_cone", "add_span"}
+    assert {one.name for one in COMMANDS.values()} - hidden <= {
+        entry.do.__self__.objectName()
+        for entry in dialog.entries
+        if isinstance(getattr(entry.do, "__self__", None), QAction)
+    }
+    assert named["Picture"].about == "Ctrl+P"
+    assert "nothing to redo" in named["Redo"].about
+    assert not named["Redo"].able
+    assert all(entry.about for entry in dialog.entries if not entry.able)
+    assert [entry.title for entry in dialog.entries if "Not possible" in entry.about] == []
+    assert {named[name].about for name in driver.session.mesh.marker_names} == {"boundary"}
+    assert named["STEPS"].about == "Steps"
+    assert named["The window"].about == "page of the manual"
+    assert [one.title[:6] for one in dialog.entries if one.about == "run"] == ["Run 1:"]
+    dialog.close()
+
+
+def test_without_a_mesh_it_says_what_is_missing(find):
+    dialog = find("save case")
+    assert rows(dialog)["Save case as"] == "There is no mesh yet: open one first."
+    enter(dialog)
+    assert dialog.isVisible(), "nothing was done"
+    dialog.close()
+
+
+def test_letters_in_order_are_enough_and_enter_does_it(find, with_runs):
+    driver = with_runs({"steps": 2})
+    dialog = find("mshedg")
+    assert next(iter(rows(dialog))) == "Mesh edges"
+    before = "edges" in driver.session.view.drawn
+    enter(dialog)
+    assert ("edges" in driver.session.view.drawn) != before
+    driver.window.activateWindow()
+    again = find("e")
+    assert next(iter(rows(again))) == "Mesh edges", "what was done is first"
+    again.close()
+
+
+def test_arrows_move_in_the_list_while_typing(find, with_runs):
+    driver = with_runs({"steps": 2})
+    dialog = find("step ")
+    names = [name for name in rows(dialog) if name in ("Step back", "Step on")]
+    assert names == ["Step back", "Step on"]
+    for _ in range(names.index("Step back") + list(rows(dialog)).index("Step back")):
+        QTest.keyClick(dialog.search, Qt.Key.Key_Down)
+    enter(dialog)
+    assert driver.session.view.frame == 1
+
+
+def test_a_boundary_is_selected(find, with_runs):
+    driver = with_runs({"steps": 1})
+    dialog = find("airfoil")
+    enter(dialog)
+    assert driver.session.view.selected == ("airfoil",)
+
+
+def test_a_run_is_shown(find, with_runs):
+    driver = with_runs({"steps": 1}, {"steps": 2})
+    assert driver.session.shown == 2
+    enter(find("run 1:"))
+    assert driver.session.shown == 1
+
+
+def test_a_key_leads_to_its_field_or_to_its_meaning(find, with_runs):
+    window = with_runs({"steps": 1}).window
+    enter(find("REPAIR_BELOW"))
+    assert window.focusWidget() is not None
+    assert window.dock_manager.panels["method"].isAncestorOf(window.focusWidget())
+    enter(find("VIEW_MAP"))
+    assert window.help._shown["keys"].findChild(QLineEdit).text() == "VIEW_MAP="
+
+
+def test_a_page_is_opened(find, with_runs):
+    window = with_runs({"steps": 1}).window
+    enter(find("The window"))
+    pages = window.help._shown["manual"].pages
+    assert pages.source().toLocalFile().endswith("window.md")
