@@ -322,6 +322,20 @@ COMMANDS = {
         ),
         "Deform a mesh as a case file says, and write the steps as a film.",
     ),
+    "report": Command(
+        "deform a mesh and write a report of the run as one HTML file",
+        (
+            CASE,
+            file("-o --output", "FILE.html", "the report (default: NAME_report.html)"),
+            ZOOM,
+            *CHANGES,
+            ZONE,
+            QUIET,
+        ),
+        "Deform a mesh as a case file says, and write a report as one HTML file: picture, "
+        "histogram, numbers of the run, limits, walls, warnings, case and versions. Nothing in it "
+        "comes from a network. No mesh is written.",
+    ),
     "section": Command(
         f"picture of a {names()} through a mesh",
         (

@@ -55,7 +55,7 @@ def require_mesh_file(arguments: Namespace, case: Case) -> Path:
 
 
 def read_inputs(arguments: Namespace, *, is_mesh: bool = False) -> tuple[Case, Mesh]:
-    """Return the case and its mesh of a command with ``-o`` and ``--json``, which can be written.
+    """Return the case and its mesh of a command with ``-o`` (and ``--json``), which can be written.
 
     ``is_mesh``: whether ``-o`` is a mesh. Errors as `require_output_paths`.
     """
@@ -64,7 +64,7 @@ def read_inputs(arguments: Namespace, *, is_mesh: bool = False) -> tuple[Case, M
     require_output_paths(
         arguments,
         OutputPath(arguments.output, "-o", is_mesh=is_mesh),
-        OutputPath(arguments.json, "--json"),
+        OutputPath(getattr(arguments, "json", None), "--json"),
     )
     return read_mesh(case, mesh_file)
 

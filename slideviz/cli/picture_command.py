@@ -7,8 +7,7 @@ from typing import Literal
 
 from slideviz import deform, picture
 from slideviz.case.model import Case
-from slideviz.cli.mesh_source import changed, read_case, read_mesh, require_mesh_file
-from slideviz.cli.output_paths import OutputPath, require_output_paths
+from slideviz.cli.mesh_source import changed, read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE
@@ -23,16 +22,14 @@ def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, and write a picture of a step; return the exit code."""
     check_png(arguments.output)
     check_size(arguments.size)
-    case = read_case(arguments)
-    require_output_paths(arguments, OutputPath(arguments.output, "-o"))
+    case, mesh = read_inputs(arguments)
+    require_detail(arguments.zoom, mesh)
     beside: tuple[Case, Step] | Literal["undeformed"] | None = None
     other = None
     if arguments.beside == ["undeformed"]:
         beside = "undeformed"
     elif arguments.beside:
         other = changed(case, arguments.beside, "--beside")
-    case, mesh = read_mesh(case, require_mesh_file(arguments, case))
-    require_detail(arguments.zoom, mesh)
     number = arguments.step
     step = None
     if number != 0:

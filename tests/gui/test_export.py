@@ -45,6 +45,7 @@ from slideviz.session.section_cuts import first_section
 from tests.builders import passage, stage
 from tests.golden.alike import picture_difference
 from tests.mesh.test_interfaces import moved, zones
+from tests.test_cli_report import read_report
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
@@ -859,3 +860,21 @@ def test_an_error_of_copying_is_shown(ran, qtbot):
     window.store.change(changes.saved_case, case)
     paste(qtbot, (Qt.Key.Key_C, COPY))
     assert "no such case file" in window.banner.text.text()
+
+
+def test_a_report_has_the_view_and_all_runs(with_runs, tmp_path, answers):
+    driver = with_runs({"steps": 1}, {"steps": 2})
+    path = tmp_path / "all.html"
+    answers("ask_save", path)
+    driver.window.actions_table.by_name["export_report"].trigger()
+    report = read_report(path)
+    assert len(report.pictures) == 2
+    assert ["run", "1", "2"] in report.tables["Runs"]
+    assert ["STEPS", "2"] in report.tables["Case"]
+    assert str(path) in driver.window.statusBar().currentMessage()
+
+
+def test_a_report_that_cannot_be_written_says_so(ran, tmp_path, answers):
+    answers("ask_save", tmp_path / "no" / "all.html")
+    ran.window.actions_table.by_name["export_report"].trigger()
+    assert "all.html" in ran.window.banner.text.text()

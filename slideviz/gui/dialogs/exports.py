@@ -13,6 +13,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.export.flat_section import save_section
+from slideviz.export.html_report import write_html_report
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
@@ -143,6 +144,17 @@ class Exports(QObject):
         if path := self._ask("Save picture of the section", "_section.png", PLOT_FILTERS):
             call = save_section, path, session, section, paper
             self.window.running.start_job(f"Drawing {path.name}", self._written, *call)
+
+    def report(self) -> None:
+        """Ask for a file name, and write a report of the runs as one HTML file."""
+        if path := self._ask("Save report", "_report.html", "HTML page (*.html)"):
+            with self._renderer() as renderer, wait_cursor():
+                try:
+                    write_html_report(path, renderer)
+                except SlidevizError as error:
+                    self.window.banner.show_error(error)
+                    return
+            self._written(path)
 
     # Films -----------------------------------------------------------------------------
     def make_film(self) -> None:

@@ -6,7 +6,6 @@ import contextlib
 import faulthandler
 import logging
 import os
-import platform
 import sys
 import threading
 import time
@@ -15,7 +14,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import datetime
 from functools import partial
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,24 +23,13 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
 from slideviz.system.cleanup import is_alive, private_file, private_folder
+from slideviz.system.versions import versions as library_versions
 
 if TYPE_CHECKING:
     from slideviz.gui.widgets.banner import Banner
 
 REST_S = 5.0
 """Seconds without an error after which the same error is shown anew rather than counted."""
-
-PACKAGES = (
-    "slideviz",
-    "numpy",
-    "scipy",
-    "numba",
-    "vtk",
-    "pyvista",
-    "pyvistaqt",
-    "PySide6_Essentials",
-)
-"""Distributions whose versions belong into a bug report."""
 
 _LEVELS = {
     QtMsgType.QtDebugMsg: logging.DEBUG,
@@ -119,11 +106,7 @@ def details_of(error: BaseException) -> str:
 
 def versions() -> str:
     """Return the versions of libraries, and the platform, a line for each."""
-    lines = [f"Python {platform.python_version()}", f"Qt {qVersion()}"]
-    for name in PACKAGES:
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            lines.append(f"{name} {metadata.version(name)}")
-    return "\n".join([*lines, platform.platform()])
+    return library_versions(f"Qt {qVersion()}")
 
 
 @contextlib.contextmanager
