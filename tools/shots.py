@@ -183,6 +183,14 @@ def twist(window: MainWindow, place: Path) -> None:
     _look(window, 30.0, -8.0)
 
 
+def handle(window: MainWindow, place: Path) -> None:
+    """Show the blade of the stator with its handle, moved and turned."""
+    _open(window, _stator(place))
+    window.store.change(changes.show_boundaries, OUTER, False)
+    window.store.change(changes.select, ("BLADE",))
+    _look(window, 30.0, -8.0)
+
+
 def wheel(window: MainWindow, place: Path) -> None:
     """Show all passages of the stator after a run."""
     _open(window, _stator(place))
@@ -307,6 +315,7 @@ STATES = (
     ShotState("roles", roles),
     ShotState("quality", quality),
     ShotState("twist", twist),
+    ShotState("handle", handle),
     ShotState("wheel", wheel),
     ShotState("onto", onto),
     ShotState("section", section),

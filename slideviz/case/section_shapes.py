@@ -120,7 +120,7 @@ SECTION_SHAPES = {
                     "Plane",
                     "&Cut by a plane",
                     add="Add a plane through the middle of the mesh.",
-                    handle="Drag the plane in the view to move it, or its arrow to turn it.",
+                    handle="Drag the arrow in the view to push the plane, or a ring to tilt it.",
                     flat="Show the section along its normal beside the 3D view.",
                     flat_name="Flat view",
                     look="Look along the normal.",
@@ -129,8 +129,8 @@ SECTION_SHAPES = {
                     "Line",
                     "&Cut by a line",
                     add="Add a line through the middle of the mesh.",
-                    handle="Drag the line or its middle in the view to move it, or its ends to "
-                    "turn it.",
+                    handle="Drag the arrow or the middle of the line in the view to move it, or "
+                    "the ring to turn it.",
                     flat=_CURVE,
                     flat_name="Curve",
                 ),
@@ -172,8 +172,8 @@ SECTION_SHAPES = {
                     "Circle",
                     "Cut by a circl&e",
                     add="Add a circle around the moving body, or about the axis of the period.",
-                    handle="Drag the middle of the circle in the view to move it, or the circle "
-                    "to change its radius.",
+                    handle="Drag the middle of the circle in the view to move it, or the ball on "
+                    "it to change its radius.",
                     flat=_CURVE,
                     flat_name="Curve",
                 ),

@@ -295,6 +295,7 @@ class MainWindow(Services):
         for change in (running.began, running.ended):
             change.connect(lambda *_: self.sync_actions())
         running.status_changed.connect(self.show_status)
+        self.viewing.status_changed.connect(self.show_status)
         running.worst_wanted.connect(self._show_worst)
         running.limits_wanted.connect(lambda: self.dock_manager.bring_to_front("limits"))
         panel.requirement_clicked.connect(self.focus_requirement)

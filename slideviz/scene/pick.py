@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,56 @@ from slideviz.scene.actors import DrawnBoundary
 REACH = 9.0  # distance in pixels from a line up to which a click hits it
 
 
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """How a view shows points: parallel, or in perspective; pixels are from the lower left."""
+
+    matrix: FloatArray  # (4, 4): from homogeneous points to a cube from -1 to 1
+    size: FloatArray  # (2,): of the view, in pixels
+
+    @classmethod
+    def of(cls, plotter: Any) -> Projection:
+        """Return the projection of a plotter's camera."""
+        renderer = plotter.renderer
+        aspect = renderer.GetTiledAspectRatio()
+        matrix = renderer.camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1)
+        size = np.array(plotter.render_window.GetSize())
+        return cls(np.asarray(pv.array_from_vtkmatrix(matrix), np.float64), size)
+
+    def pixels(self, points: FloatArray) -> FloatArray:
+        """Return the pixels (n, 2) of points (n, 3)."""
+        clip = np.column_stack([points, np.ones(len(points))]) @ self.matrix.T
+        return np.asarray((clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * self.size)
+
+    def ray(self, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the line of sight through a pixel (2,): its nearest point, and its direction."""
+        across = 2.0 * np.asarray(pixel) / self.size - 1.0
+        ends = np.array([[*across, -1.0, 1.0], [*across, 1.0, 1.0]])
+        found = np.linalg.solve(self.matrix, ends.T).T
+        near = found[0, :3] / found[0, 3]
+        far = found[1, :3] / found[1, 3]
+        return near, (far - near) / np.linalg.norm(far - near)
+
+    def on_plane(self, pixel: FloatArray, point: FloatArray, normal: FloatArray) -> FloatArray:
+        """Return where (3,) the line of sight through a pixel meets a plane."""
+        start, way = self.ray(pixel)
+        return np.asarray(start + (point - start) @ normal / (way @ normal) * way)
+
+    def sight(self, point: FloatArray) -> FloatArray:
+        """Return the unit direction (3,) in which a point (3,) is seen."""
+        return self.ray(self.pixels(point[None])[0])[1]
+
+    def pixel_length(self, point: FloatArray) -> float:
+        """Return the length of a pixel at a point (3,), across the line of sight."""
+        sight = self.sight(point)
+        (at,) = self.pixels(point[None])
+        beside = self.on_plane(at + np.array([1.0, 0.0]), point, sight)
+        return float(np.linalg.norm(beside - point))
+
+
 def to_display(plotter: Any, points: FloatArray) -> FloatArray:
     """Return the display coordinates (n, 2), in pixels from the lower left, of points (n, 3)."""
-    renderer = plotter.renderer
-    aspect = renderer.GetTiledAspectRatio()
-    matrix = renderer.camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1)
-    full = pv.array_from_vtkmatrix(matrix)
-    clip = np.column_stack([points, np.ones(len(points))]) @ full.T
-    size = np.array(plotter.render_window.GetSize())
-    return (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * size
+    return Projection.of(plotter).pixels(points)
 
 
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
@@ -74,16 +116,7 @@ def _foremost(
 
 def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
     """Return the point (x, y) where the line of sight through a pixel meets the plane z = 0."""
-    renderer = plotter.renderer
-    ends = []
-    for depth in (0.0, 1.0):
-        renderer.SetDisplayPoint(x, y, depth)
-        renderer.DisplayToWorld()
-        point = np.array(renderer.GetWorldPoint())
-        ends.append(point[:3] / point[3])
-    near, far = ends
-    along = near[2] / (near[2] - far[2])
-    at = near + along * (far - near)
+    at = Projection.of(plotter).on_plane(np.array([x, y]), np.zeros(3), np.array([0.0, 0.0, 1.0]))
     return float(at[0]), float(at[1])
 
 

@@ -17,7 +17,6 @@ from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Section, round_middle
 
 TURN = 2.0 * np.pi
-_WHOLE = np.radians(300.0)  # a cut over more than this angle, in radians, is taken as a whole ring
 _HOLE = 0.1
 """The handle is in the middle of a patch where the cut comes as near to that as this part of the
 patch's diagonal; else there is a hole, and it is at the nearest place of the cut."""
@@ -93,16 +92,9 @@ class Patch:
     the place of the cut nearest to it."""
     places: FloatArray  # (k, 2): some places of the cut, with angles in the range of angles
 
-    @property
-    def is_full_ring(self) -> bool:
-        """Return whether the patch goes all the way round the axis."""
-        return self.angles[1] - self.angles[0] > _WHOLE
-
 
 class AboutAxis(Section):
     """A shape about an axis with a size that its handle drags; see `Section`."""
-
-    handle = "pull"
 
     # What each shape defines, besides the functions of `Section` ------------------------
     @abstractmethod
@@ -120,10 +112,6 @@ class AboutAxis(Section):
     @abstractmethod
     def lean(self) -> float:
         """Return the angle in radians between the lines of the surface and its axis."""
-
-    @abstractmethod
-    def lever(self, along: float) -> float:
-        """Return how far a place at a length along the surface moves if the size grows by 1."""
 
     @abstractmethod
     def girth(self, along: float) -> float:

@@ -160,9 +160,5 @@ class Cone(Quadric):
         """Return the half angle, in radians."""
         return float(np.radians(self.half_angle_deg))
 
-    def lever(self, along: float) -> float:
-        """Return the arc of a place about the apex for one degree; 1 at the apex itself."""
-        return float(np.radians(abs(along))) or 1.0
-
     def girth(self, along: float) -> float:
         return abs(along) * self._lines[0]

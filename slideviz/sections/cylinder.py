@@ -7,15 +7,13 @@ The first line of a function says what it is for a cylinder or circle; shapes of
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.around_axis import Quadric, UnrolledPolygons
-from slideviz.sections.handles import HandleParts, Part, rounded, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -55,21 +53,6 @@ class Circle(InPlane):
     @property
     def middle(self) -> FloatArray:
         return self.point[:2]
-
-    def handle_parts(self, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle points of a circle: its centre, and one point on it."""
-        longest = max(parts, key=len)
-        ends = longest[None, len(longest) // 2 if len(parts) > 1 else len(longest) // 8]
-        return HandleParts(within(self.middle[None], box), ends, parts)
-
-    def dragged(self, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Self:
-        """Return the circle moved, if dragged by its centre; else with another radius."""
-        start, now = way
-        size = float((box[1] - box[0]).max())
-        if part == "middle":
-            return replace(self, origin=rounded_place(self.middle + now - start, size))
-        radius = float(np.linalg.norm(now - self.point[:2]))
-        return replace(self, radius=rounded(max(radius, 1e-4 * size), size))
 
     def positions_along(self, corners: FloatArray) -> FloatArray:
         """Return the angles of both ends of lines, in degrees.
@@ -158,10 +141,6 @@ class Cylinder(Circle, Quadric):
 
     def lean(self) -> float:
         return 0.0
-
-    def lever(self, along: float) -> float:
-        """Return 1: a place moves as far as the radius grows."""
-        return 1.0
 
     def girth(self, along: float) -> float:
         return self.radius

@@ -1,15 +1,11 @@
-"""The line that a plane is in a 2D mesh: its trace, its handle, and positions along it."""
+"""The line that a plane is in a 2D mesh: its trace, and positions along it."""
 
 from __future__ import annotations
-
-from dataclasses import replace
-from typing import Self
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.handles import HandleParts, Part, rounded_place, within
-from slideviz.sections.shape import DIGITS, InPlane, Label, axis_word, direction_label, triple_words
+from slideviz.sections.shape import InPlane, Label, axis_word, direction_label, triple_words
 
 MARGIN = 0.03  # margin of the box around a mesh, at which lines end, over the mesh's longest extent
 Box = tuple[FloatArray, FloatArray]  # lowest and highest coordinates, (2,) each
@@ -85,23 +81,6 @@ class Line(InPlane):
         # A plane oblique to z meets z = 0 beside the projection of its point.
         return origin[:2] + origin[2] * normal[2] / flat * normal[:2]
 
-    def handle_parts(self, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle of a line: its ends, the point about which it turns, and the line."""
-        return HandleParts(self._pivot(box)[None], parts[0], parts)
-
-    def dragged(self, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Self:
-        """Return the line turned, if dragged by an end; else moved."""
-        start, now = way
-        if part == "end":
-            centre = self._pivot(box)
-            return self._turned(centre, now - centre)
-        shift = now - start
-        if part == "line":
-            normal = np.asarray(self.direction[:2]) / np.linalg.norm(self.direction[:2])
-            shift = (shift @ normal) * normal
-        size = float((box[1] - box[0]).max())
-        return replace(self, origin=rounded_place(self.middle + shift, size))
-
     def positions_along(self, corners: FloatArray) -> FloatArray:
         way = self.way
         assert way is not None
@@ -111,29 +90,3 @@ class Line(InPlane):
         way = self.way
         assert way is not None
         return direction_label(np.append(way, 0.0))
-
-    def _pivot(self, box: Box) -> FloatArray:
-        """Return the point (2,) about which the line turns.
-
-        That is `middle` or, where it is not in the box, the middle of the line in the box.
-        """
-        middle = within(self.middle[None], box)
-        if len(middle):
-            return middle[0]
-        ends = self.ends(box)
-        return self.middle if ends is None else ends.mean(axis=0)
-
-    def _turned(self, centre: FloatArray, way: FloatArray) -> Self:
-        """Return the section with its line through ``centre`` (2,) in the direction ``way`` (2,).
-
-        The normal stays on its side; the section is unchanged where ``way`` is zero.
-        """
-        length = float(np.linalg.norm(way))
-        if not length > 0:
-            return self
-        normal = np.array([-way[1], way[0]]) / length
-        if normal @ np.asarray(self.direction[:2]) < 0:
-            normal = -normal
-        x, y = (normal.round(DIGITS) + 0.0).tolist()
-        origin = float(centre[0]), float(centre[1]), 0.0
-        return replace(self, origin=origin, direction=(x, y, 0.0))

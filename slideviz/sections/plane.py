@@ -42,7 +42,6 @@ class Plane(Line):
     """The plane; its position is that of its point along its normal."""
 
     terms = SECTION_SHAPES["plane"]
-    handle = "push"
 
     @property
     def axes(self) -> Axes:

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
-    from slideviz.sections.handles import HandleParts, Part
     from slideviz.sections.line import Box
     from slideviz.sections.span import SpanWalls
 
@@ -155,8 +154,6 @@ class Section:
     """Whether the sign of the direction matters, for signed distances at least."""
     near: ClassVar[float] = 0.0
     """Part of an edge of a cell within which, next to a node, the section goes through the node."""
-    handle: ClassVar[Literal["push", "pull"]]
-    """The kind of 3D handle: a plane to push and turn, or a ball that pulls the size."""
 
     def __new__(cls, kind: str = "", *_: object, **__: object) -> Self:
         """Return a section of the class of the shape ``kind``; raises CaseError if of another."""
@@ -418,19 +415,6 @@ class InPlane(Section):
     @abstractmethod
     def middle(self) -> FloatArray:
         """Return the point (2,) of the handle by which the mouse moves the section."""
-
-    @abstractmethod
-    def handle_parts(self, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the drawn parts of the handle; ``parts`` are the section's polylines there."""
-
-    @abstractmethod
-    def dragged(self, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Self:
-        """Return the section after a part of its handle was dragged.
-
-        A line is turned by its ends, and moved by the other parts; a circle is moved by its middle,
-        and gets another radius by the other parts. ``way``: where the mouse began and where it is
-        now, (2,) each, in coordinates of the mesh. ``box``: the visible box before the drag.
-        """
 
     @abstractmethod
     def positions_along(self, corners: FloatArray) -> FloatArray:

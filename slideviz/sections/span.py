@@ -151,15 +151,6 @@ class SpanWalls:
         """Return the span (n,) at meridional coordinates (n, 3)."""
         return self._each(coords, lambda k, some: self.channels[k].field.span(some)[0])
 
-    def height(self, coords: FloatArray) -> FloatArray:
-        """Return the distance of the walls (n,) at meridional coordinates (n, 3)."""
-
-        def value(k: int, some: FloatArray) -> FloatArray:
-            (hub, _, _), (shroud, _, _) = self.channels[k].field.distances(some)
-            return hub + shroud
-
-        return self._each(coords, value)
-
     def plane(self, coords: FloatArray) -> FloatArray:
         """Return m', m and span (n, 3) at meridional coordinates (n, 3)."""
 
@@ -302,10 +293,6 @@ class ConstantSpan(AboutAxis):
 
     def lean(self) -> float:
         return self.known_walls.lean
-
-    def lever(self, along: float) -> float:
-        """Return the height of the passage there."""
-        return float(self.known_walls.height(self._coords(along))[0])
 
     def girth(self, along: float) -> float:
         return float(self._coords(along)[0, 1])

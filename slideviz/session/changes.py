@@ -17,7 +17,7 @@ from slideviz.session.motions import with_new_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
 from slideviz.session.reach import scaled
 from slideviz.session.saving import bound_sections
-from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
+from slideviz.session.state import Handle, PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
 
 if TYPE_CHECKING:
@@ -110,8 +110,15 @@ def set_view(session: Session, **values: Any) -> Session:
 
 
 def select(session: Session, names: Iterable[str]) -> Session:
-    """Return the session with the boundaries ``names`` highlighted, and no others."""
-    return set_view(session, selected=tuple(names))
+    """Return the session with the boundaries ``names`` highlighted, and no others.
+
+    They have a handle if all of them move, and else no boundary has one.
+    """
+    chosen = tuple(names)
+    handle: Handle = "section" if session.view.handle == "section" else ""
+    if chosen and all(session.role(name) == "moving" for name in chosen):
+        handle = "boundary"
+    return set_view(session, selected=chosen, handle=handle)
 
 
 @undoable("hidden boundaries")
@@ -166,9 +173,22 @@ def choose_section(session: Session, index: int | None) -> Session:
 
 
 @undoable("handle")
-def show_handle(session: Session, shown: bool) -> Session:
-    """Return the session with the handle of the selected section shown, or not."""
+def show_handle(session: Session, shown: Handle) -> Session:
+    """Return the session with the handle of what is chosen shown; "" for none."""
     return set_view(session, handle=shown)
+
+
+@undoable("drag")
+def place(session: Session, moved: Session) -> Session:
+    """Return the session with motions and sections as a handle put them in ``moved``."""
+    view = replace(
+        session.view,
+        sections=moved.view.sections,
+        section_index=moved.view.section_index,
+        motion_index=moved.view.motion_index,
+        handle=moved.view.handle,
+    )
+    return replace(session, case=moved.case, view=view)
 
 
 def selection_after(
@@ -292,8 +312,14 @@ def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...])
 def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
     """Return the session with one more motion, performed last, or at the place ``index``."""
     motions = list(session.case.motions)
-    motions.insert(len(motions) if index is None else index, motion)
-    return _with_motions(session, motions)
+    place = len(motions) if index is None else index
+    motions.insert(place, motion)
+    return choose_motion(_with_motions(session, motions), place)
+
+
+def choose_motion(session: Session, index: int) -> Session:
+    """Return the session with the motion at the place ``index`` chosen, which has a handle then."""
+    return set_view(session, motion_index=index, handle="motion")
 
 
 def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
@@ -336,8 +362,9 @@ def move_motion(session: Session, index: int, by: int) -> Session:
     """Return the session with a motion performed ``by`` places later (negative: earlier)."""
     motions = list(session.case.motions)
     motion = motions.pop(index)
-    motions.insert(max(0, index + by), motion)
-    return set_case(session, motions=tuple(motions))
+    place = max(0, index + by)
+    motions.insert(place, motion)
+    return set_view(set_case(session, motions=tuple(motions)), motion_index=place)
 
 
 def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:

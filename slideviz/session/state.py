@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     from slideviz.solver.deform import Step
 
 
+Handle = Literal["", "section", "motion", "boundary"]
+"""What has a handle: the selected section, the chosen motion, the selected boundaries; "" nothing.
+"""
+
 LABEL = 20  # most characters of a run's name in a plot
 
 
@@ -304,7 +308,8 @@ class ViewState:
     """tuple of (str, (float, float)): the color ranges of other quantities that the view was
     colored by before."""
     section_index: int | None = None  # the place in ``sections`` of the one that is selected
-    handle: bool = False  # whether the selected section has its handle drawn
+    handle: Handle = ""  # what has a handle
+    motion_index: int = 0  # the place of the motion that is chosen
 
     @property
     def flat_index(self) -> int | None:
@@ -319,7 +324,8 @@ class ViewState:
 
     def in_style(self, style: ViewState) -> ViewState:
         """Return ``style`` with step, selection, marked cell and second view of this view."""
-        kept = ("selected", "frame", "marked_cell", "marked_in", "beside", "swapped")
+        marked = ("marked_cell", "marked_in")
+        kept = ("selected", "frame", *marked, "beside", "swapped", "motion_index")
         return replace(style, **{name: getattr(self, name) for name in kept})
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
@@ -444,6 +450,12 @@ class Session:
         """Return whether the marked cell was marked in a run that is shown now."""
         view = self.view
         return view.marked_cell is not None and view.marked_in in (self.shown, view.beside)
+
+    @property
+    def motion_index(self) -> int | None:
+        """Return the place of the chosen motion; None where there are no motions."""
+        last = len(self.case.motions) - 1
+        return min(self.view.motion_index, last) if last >= 0 else None
 
     @property
     def unsaved_mesh(self) -> bool:

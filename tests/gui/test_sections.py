@@ -12,10 +12,12 @@ from qtpy.QtWidgets import QApplication, QPushButton
 
 from slideviz.case.motions.span import SpanMotion
 from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
-from slideviz.gui.viewport.section_views import PlaneHandle, arrangement_for
+from slideviz.gui.viewport.section_views import arrangement_for
 from slideviz.gui.widgets import questions
 from slideviz.samples.table import write_sample
-from slideviz.scene.pick import to_display
+from slideviz.scene import handle
+from slideviz.scene.handle import RING_PX
+from slideviz.scene.pick import Projection, to_display
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.changes import selection_after
@@ -389,11 +391,11 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
     panel.list.setCurrentRow(0)
     panel.handle.click()
     view = window.view
-    assert isinstance(window.section_views.handles.of(view), PlaneHandle)
+    assert has_handle(view)
     undo, redo = window.store.undo, window.store.redo
     assert window.store.can_undo == "handle"
     undo()
-    assert not window.section_views.handles
+    assert not has_handle(view)
     assert not panel.handle.isChecked()
     undo()
     assert panel.list.currentRow() == 1
@@ -405,7 +407,7 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
         redo()
     assert panel.list.currentRow() == 0
     assert panel.handle.isChecked()
-    assert isinstance(window.section_views.handles.of(view), PlaneHandle)
+    assert has_handle(view)
 
 
 @pytest.mark.usefixtures("painted")
@@ -439,52 +441,44 @@ def test_a_cell_of_the_flat_view_is_marked_and_it_shows_the_step(window, driver,
     assert flat.facts.text() != after
 
 
+@pytest.mark.usefixtures("painted")
 def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     driver.click(panel.add["plane"])
     (plane,) = sections(window)
     panel.handle.click()
-    handle = window.section_views.handles.of(window.view)
-    assert handle.widget.GetEnabled()
-    assert handle.shape.GetOrigin() == pytest.approx(plane.origin)
-    interactor = window.view.iren.interactor
-    # As when it is dragged: VTK moves the shape and tells.
-    handle.widget.InvokeEvent("StartInteractionEvent")
-    at = np.array(plane.origin) + 0.1 * np.array(plane.direction)
-    handle.shape.SetOrigin(*at)
-    handle.widget.InvokeEvent("InteractionEvent")
-    driver.qtbot.waitUntil(lambda: sections(window)[0].origin == pytest.approx(tuple(at)))
-    handle.widget.InvokeEvent("EndInteractionEvent")
-    assert not handle.dragging
+    pull(window, ("move", (3,)), plane.basis[2] * 0.1)
+    (moved,) = sections(window)
+    assert moved.position == pytest.approx(plane.position + 0.1, abs=0.005)
+    assert moved.direction == plane.direction
+    assert panel.editor.number.value == pytest.approx(moved.position)
     # And the other way round.
     driver.type(panel.editor.number, "0.3")
-    assert np.dot(handle.shape.GetOrigin(), plane.direction) == pytest.approx(0.3)
+    window.view.snapshot()
+    assert window.viewing.handles[window.view].placed().origin @ plane.basis[2] == pytest.approx(
+        0.3
+    )
     panel.handle.click()
-    assert not window.section_views.handles
-    assert handle.widget.GetInteractor() is None
-    assert interactor is window.view.iren.interactor
+    assert not has_handle(window.view)
 
 
+@pytest.mark.usefixtures("painted")
 def test_the_ball_of_the_handle_moves_the_plane_along_its_normal_and_a_tilt_is_undone(
     window, driver, panel
 ):
-    driver.click(panel.add["plane"])
-    panel.handle.click()
-    handle = window.section_views.handles.of(window.view)
-    for state, then in (("MovingOrigin", "Pushing"), ("Rotating", "Rotating")):
-        handle.shape.SetInteractionState(getattr(handle.shape, state))
-        handle.widget.InvokeEvent("StartInteractionEvent")
-        assert handle.shape.GetInteractionState() == getattr(handle.shape, then)
-        handle.widget.InvokeEvent("EndInteractionEvent")
-    panel.handle.click()
-    driver.click(panel.remove)
     editor = panel.editor
     driver.click(panel.add["plane"])
     driver.choose(editor.axis, "z")
+    (before,) = sections(window)
     panel.handle.click()
-    handle = window.section_views.handles.of(window.view)
-    handle.widget.InvokeEvent("StartInteractionEvent")
-    handle.shape.SetNormal(0.3, 0.0, 0.95)
-    handle.widget.InvokeEvent("EndInteractionEvent")
+    pull(window, ("move", ()), (0.0, 0.0, 0.1))
+    (pushed,) = sections(window)
+    assert pushed.origin[:2] == before.origin[:2]
+    assert pushed.origin[2] == pytest.approx(before.origin[2] + 0.1, abs=0.005)
+    QTest.keyClicks(window.view, "r")
+    QTest.keyClicks(window.view, "17")
+    QTest.keyClick(window.view, Qt.Key.Key_Return)
+    QApplication.processEvents()
+    assert sections(window)[0].direction[2] == pytest.approx(np.cos(np.radians(17.0)), abs=1e-4)
     assert editor.axis.currentData() == "free"
     assert editor.direction.isVisible()
     window.store.undo()
@@ -495,6 +489,7 @@ def test_the_ball_of_the_handle_moves_the_plane_along_its_normal_and_a_tilt_is_u
     assert editor.axis.currentData() == "free"
     # Who types numbers keeps their fields, though for a moment they are those of an axis.
     driver.type(editor.direction.fields[0], "0")
+    driver.type(editor.direction.fields[1], "0")
     assert editor.axis.currentData() == "free"
     assert editor.direction.isVisible()
     driver.click(panel.add["plane"])
@@ -518,7 +513,7 @@ def test_another_mesh_and_a_closed_window_have_no_handle_and_no_flat_view(
     panel.handle.click()
     panel.flat.click()
     driver.open(passage_file)
-    assert not window.section_views.handles
+    assert not has_handle(window.view)
     assert window.section_views.flat is None
     assert sections(window) == ()
     assert panel.add["plane"].text() == "Line"
@@ -533,10 +528,10 @@ def test_another_mesh_and_a_closed_window_have_no_handle_and_no_flat_view(
     panel.handle.click()
     panel.flat.click()
     QApplication.processEvents()
-    section_views, handle = window.section_views, window.section_views.handles.of(window.view)
+    section_views = window.section_views
+    assert has_handle(window.view)
     monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     window.close()
-    assert handle.widget.GetInteractor() is None
     assert section_views.flat is None
     QApplication.processEvents()
 
@@ -636,6 +631,31 @@ def flat_panel(window, driver, sample_folder):
     return window.dock_manager.panels["sections"]
 
 
+def has_handle(view):
+    view.snapshot()
+    return handle.NAME in view.actors
+
+
+def pull(window, grip, shift, view=None):
+    """Drag a part of the handle by a shift (3,) in space."""
+    view = view or window.view
+    view.snapshot()
+    part = next(one for one in window.viewing.handles[view].parts if one.grip == grip)
+    start = part.line.mean(axis=0)
+    point = part.point
+    by = np.diff(to_display(view, np.stack([point, point + shift])), axis=0)[0]
+    for event, share in ((QTest.mousePress, 0.0), (QTest.mouseMove, 0.5), (QTest.mouseMove, 1.0)):
+        x, y = (start + share * by) / view.devicePixelRatioF()
+        where = QPoint(round(x), round(view.height() - 1 - y))
+        if event is QTest.mouseMove:
+            event(view, where)
+        else:
+            event(view, Qt.MouseButton.LeftButton, pos=where)
+        QApplication.processEvents()
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=where)
+    QApplication.processEvents()
+
+
 def drag_in_view(view, start, end):
     """Drag from one place of the mesh to another, through one between."""
     for event, share in ((QTest.mousePress, 0.0), (QTest.mouseMove, 0.5), (QTest.mouseMove, 1.0)):
@@ -652,7 +672,7 @@ def drag_in_view(view, start, end):
 
 
 @pytest.mark.usefixtures("painted")
-def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves_nothing(
+def test_a_line_is_dragged_by_its_middle_turned_by_its_ring_and_its_handle_leaves_nothing(
     window, driver, flat_panel
 ):
     driver.click(flat_panel.add["plane"])
@@ -665,10 +685,14 @@ def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves
     (moved,) = sections(window)
     assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
     assert moved.direction == line.direction
-    end = window.section_views.handles.of(window.view).in_view().ends[1]
-    drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
+    middle = np.array(moved.origin[:2])
+    window.view.snapshot()
+    unit = Projection.of(window.view).pixel_length(np.array(moved.origin))
+    ring = np.array([np.cos(0.7), np.sin(0.7)])
+    end = np.array([-ring[1], ring[0]])
+    drag_in_view(window.view, middle + RING_PX * unit * ring, middle + 2.0 * RING_PX * unit * end)
     (turned,) = sections(window)
-    assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
+    assert abs(np.dot(turned.direction, moved.direction)) < 0.03, "by a quarter of a turn"
     assert turned.origin == pytest.approx(moved.origin, abs=1e-3)
     # The view stayed where it was, and each drag is undone by itself.
     assert window.scene.camera.place[:6] == pytest.approx(camera[:6])
@@ -680,20 +704,19 @@ def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves
     driver.click(flat_panel.remove)
     driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
-    assert any(name.startswith("handle:") for name in window.view.actors)
-    handle = window.section_views.handles.of(window.view)
+    assert has_handle(window.view)
     # What is dragged beside it moves the view, as ever.
     camera = window.scene.camera.place
-    beside = handle.in_view().ends[0] + 0.2
-    drag_in_view(window.view, beside, beside + 0.1)
+    (x, y, _) = sections(window)[0].origin
+    drag_in_view(window.view, np.array([x, y]) + 0.3, np.array([x, y]) + 0.4)
     assert window.scene.camera.place != camera
     # Wherever one looks, it is in reach.
-    (x, y, _), half = sections(window)[0].origin, 0.02
+    half = 0.02
     window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
-    for point in (*handle.in_view().ends, *handle.in_view().middle):
-        assert abs(point[1] - y - 0.3) < half
+    window.view.snapshot()
+    assert abs(window.viewing.handles[window.view].placed().origin[1] - y - 0.3) < half
     flat_panel.handle.click()
-    assert not any(name.startswith("handle:") for name in window.view.actors)
+    assert not has_handle(window.view)
 
 
 def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
@@ -705,11 +728,8 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     flat_panel.handle.click()
     window.view.snapshot()
     centre = np.array(circle.origin[:2])
-    drag_in_view(
-        window.view,
-        window.section_views.handles.of(window.view).in_view().ends[0],
-        centre + np.array([0.2, 0.0]),
-    )
+    edge = window.viewing.handles[window.view].placed().edge[:2]
+    drag_in_view(window.view, edge, centre + 0.2 * np.sqrt(0.5))
     assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)
     assert sections(window)[0].origin == circle.origin
     driver.type(flat_panel.editor.centre.fields[1], "0.05")
@@ -742,25 +762,21 @@ def compare(window, driver):
     return window.viewing.second
 
 
+@pytest.mark.usefixtures("painted")
 def test_of_two_views_each_has_a_handle(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.handle.click()
-    handles = window.section_views.handles
-    first = handles.of(window.view)
-    second_view = compare(window, driver)
-    second = handles.of(second_view)
+    second = compare(window, driver)
     (plane,) = sections(window)
-    at = np.array(plane.origin) + 0.1 * np.array(plane.direction)
-    second.widget.InvokeEvent("StartInteractionEvent")
-    second.shape.SetOrigin(*at)
-    second.widget.InvokeEvent("EndInteractionEvent")
-    assert sections(window)[0].origin == pytest.approx(tuple(at))
-    assert first.shape.GetOrigin() == pytest.approx(tuple(at)), "the other follows"
+    pull(window, ("move", (3,)), 0.1 * plane.basis[2], second)
+    (moved,) = sections(window)
+    assert moved.position == pytest.approx(plane.position + 0.1, abs=0.01)
+    for view in (window.view, second):
+        assert has_handle(view)
+        assert window.viewing.handles[view].placed().section == moved, "the other follows"
     window.store.change(changes.show_beside, None)
-    assert second.widget.GetInteractor() is None
-    assert handles.of(second_view) is None
-    assert handles.of(window.view) is first
-    assert first.widget.GetEnabled()
+    assert second not in window.viewing.handles
+    assert has_handle(window.view)
 
 
 def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
@@ -774,7 +790,7 @@ def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
     assert sections(window)[0].origin[:2] == pytest.approx(tuple(start + shift), abs=0.02)
     flat_panel.handle.click()
     for view in (window.view, second_view):
-        assert not any(name.startswith("handle:") for name in view.actors)
+        assert not has_handle(view)
 
 
 def test_a_picture_of_the_section_is_saved_or_it_is_told_why_not(

@@ -14,7 +14,6 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, laid_flat, section_picture
-from slideviz.scene.axis_handle import dragged_size, frame_of
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -271,34 +270,16 @@ def test_another_axis_or_apex_leaves_it_where_it_cuts():
     assert low < across.half_angle_deg < high
 
 
-def test_the_frame_lies_on_it_around_what_is_cut():
+def test_the_places_of_its_handle_lie_on_it_where_it_is_cut():
     mesh = sector(75.0)
     cut = Cutter.of(mesh).cut(mesh.points, CUT)
     patch = CUT.patch(cut.points)
-    lines = np.concatenate(frame_of(CUT, patch))
-    assert np.abs(away(CUT, lines)).max() < 1e-12
-    assert lines[:, 2].min() < cut.points[:, 2].min()
+    places = CUT.surface(np.concatenate([[patch.middle], patch.places]), ANGLE)
+    assert np.abs(away(CUT, places)).max() < 1e-12
+    assert places[:, 2].min() == pytest.approx(cut.points[:, 2].min())
     right, up, to_eye = CUT.facing(cut.points)
     assert np.cross(right, up) == pytest.approx(to_eye)
     assert to_eye[2] == pytest.approx(-np.sin(np.radians(ANGLE)))
-
-
-def parallel(points):
-    """Seen along y, a hundred pixels for a unit."""
-    return 100.0 * points[:, [0, 2]]
-
-
-def test_the_ball_follows_the_mouse_around_the_apex():
-    place = (0.3, 1.2)
-    ends = (CUT.surface(np.array([place]), angle) for angle in (ANGLE, 41.0))
-    start, end = (parallel(point)[0] for point in ends)
-    held = np.array([3.0, -2.0])
-    assert dragged_size(parallel, CUT, place, start=start + held, now=end + held) == pytest.approx(
-        41.0
-    )
-    far = 1e6 * (end - start)
-    assert 0.0 < dragged_size(parallel, CUT, place, start=start, now=start - far) < 1.0
-    assert 80.0 < dragged_size(parallel, CUT, place, start=start, now=start + far) < 90.0
 
 
 def test_in_2d_it_says_what_it_needs():

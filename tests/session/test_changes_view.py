@@ -311,9 +311,9 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
     store.change(changes.add_section, Section("cylinder", radius=0.5))
     assert store.session.view.section.kind == "cylinder"
     store.change(changes.choose_section, 0)
-    store.change(changes.show_handle, True)
+    store.change(changes.show_handle, "section")
     store.change(changes.remove_section, 0)
-    assert (store.session.view.section_index, store.session.view.handle) == (0, True)
+    assert (store.session.view.section_index, store.session.view.handle) == (0, "section")
     assert store.session.view.section.kind == "cylinder"
     told = []
     while store.can_undo:
@@ -322,22 +322,22 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
         view = store.session.view
         told.append((view.section and view.section.kind, view.handle))
     assert told == [
-        *("removing a section", ("plane", True)),
-        *("handle", ("plane", False)),
-        *("choice of a section", ("cylinder", False)),
-        *("new section", ("plane", False)),
-        *("new section", (None, False)),
+        *("removing a section", ("plane", "section")),
+        *("handle", ("plane", "")),
+        *("choice of a section", ("cylinder", "")),
+        *("new section", ("plane", "")),
+        *("new section", (None, "")),
     ]
     for _ in range(4):
         store.redo()
-    assert (store.session.view.section_index, store.session.view.handle) == (0, True)
+    assert (store.session.view.section_index, store.session.view.handle) == (0, "section")
 
 
 def test_a_mesh_opens_with_the_section_chosen_that_lies_flat(square):
     sections = (("plane", (1.0, 0, 0, 0.5, 0, 0), False, flat, True) for flat in (False, True))
     case = Case(view={"VIEW_SECTIONS": tuple(sections)})
     session = open_mesh(StepFrame(square, quality(square)), None, (), case)
-    assert (session.view.section_index, session.view.handle) == (1, False)
+    assert (session.view.section_index, session.view.handle) == (1, "")
     case = Case(view={"VIEW_SECTIONS": (("plane", (1.0, 0, 0, 0.5, 0, 0), False, False, True),)})
     assert open_mesh(StepFrame(square, quality(square)), None, (), case).view.section_index == 0
 

@@ -168,6 +168,7 @@ def test_each_change_that_can_be_undone_has_words():
         "isolate": "hidden boundaries",
         "lay_flat": "flat view",
         "move_motion": "order of motions",
+        "place": "drag",
         "remove_motion": "removing a motion",
         "remove_run": "removing a run",
         "remove_section": "removing a section",
@@ -185,7 +186,7 @@ def test_each_change_that_can_be_undone_has_words():
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
     passing = {"selected", "frame", "marked_cell", "marked_in", "beside", "swapped", "ranges"}
-    passing |= {"color_by"}
+    passing |= {"color_by", "motion_index"}
     other_changes = {"section_index", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)

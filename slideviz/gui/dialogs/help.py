@@ -72,6 +72,11 @@ PANELS = (
     ("Worst cells: remove the mark", "Esc", ""),
     ("Worst cells: copy", "Ctrl+C", "The selected rows, or all."),
     ("Histogram: show all cells", "Esc", ""),
+    ("Handle: move, turn, enlarge what is chosen", "G, R, S", "While the view has the focus."),
+    ("Handle: along an axis; in a machine axial, radial, tangential", "X, Y, Z; A, R, T", ""),
+    ("Handle: in a plane", "Shift+X, Shift+Y, Shift+Z", ""),
+    ("Handle: type the number; snap; go finely", "0 to 9; Ctrl; Shift", ""),
+    ("Handle: keep what was done, take it back", "Return, Esc", ""),
     ("A field: undo and redo typing", "Ctrl+Z, Ctrl+Y", ""),
     ("A list: its menu", "Menu", ""),
 )
@@ -79,6 +84,7 @@ PANELS = (
 MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
     ("Shift+Drag, middle button", "move"),
+    ("Drag a handle", "move, turn or enlarge what is chosen"),
     ("Wheel", "zoom about the mouse"),
     ("Rest on a cell", "see its quality, shape and place"),
     ("Double click, Alt+Click", "mark the cell below the mouse"),

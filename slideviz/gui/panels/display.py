@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -260,7 +261,8 @@ def _shown(session: Session) -> object:
     view = session.view
     periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
     runs = session.runs if view.color_by == "displacement" else ()
-    return session.mesh, session.pairs, view.style, periodic, runs
+    style = replace(view.style, handle="")
+    return session.mesh, session.pairs, style, periodic, runs
 
 
 def _worse_half(session: Session) -> tuple[float, float]:

@@ -171,7 +171,7 @@ class MotionPanel(Panel):
         self.list.setMaximumHeight(140)
         self.list.setAlternatingRowColors(True)
         elide_items(self.list)
-        self.list.currentRowChanged.connect(lambda _: self._row_changed())
+        self.list.currentRowChanged.connect(self._row_changed)
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
         self.editor = MotionEditor(SpanWalls(store))
@@ -229,17 +229,17 @@ class MotionPanel(Panel):
         said = (describe(motion, dim, self._extent) for motion in motions)
         texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
         with QSignalBlocker(self.list):
-            current = self.list.currentRow()
-            if self.list.count() != len(texts):
+            chosen = session.motion_index
+            row = -1 if chosen is None else chosen
+            if self.list.count() != len(texts) or row != self.list.currentRow():
                 self.editor.show_another()
-                # A new motion is the one to be edited; after a removal, its neighbour is.
-                current = len(texts) - 1 if len(texts) > self.list.count() else current
+            if self.list.count() != len(texts):
                 self.list.clear()
                 self.list.addItems(texts)
-            for row, text in enumerate(texts):
-                self.list.item(row).setText(text)
-                self.list.item(row).setToolTip(wrapped(text))
-            self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
+            for place, text in enumerate(texts):
+                self.list.item(place).setText(text)
+                self.list.item(place).setToolTip(wrapped(text))
+            self.list.setCurrentRow(row)
         self.editor.machine = machine_axis(session)
         self.editor.boxes = box_names(session)
         self.editor.straight = session.case.ffd_system == "CARTESIAN"
@@ -300,11 +300,9 @@ class MotionPanel(Panel):
         self.hint.setVisible(any(hints))
 
     # Widgets to state ------------------------------------------------------------------
-    def _row_changed(self) -> None:
+    def _row_changed(self, row: int) -> None:
         self.editor.show_another()
-        session = self.session
-        self._sync_editor(session)
-        self._sync_buttons(session, session.case.markers_with("moving"))
+        self.change(changes.choose_motion, row)
 
     def _add(self, kind: type[Motion], *_checked: bool) -> None:
         self._add_for(new_target(self.session), kind)
@@ -334,7 +332,6 @@ class MotionPanel(Panel):
     def _insert(self, motion: Motion) -> None:
         row = self.list.currentRow() + 1
         self.change(changes.add_motion, motion, row)
-        self.list.setCurrentRow(row)
 
     def _duplicate(self) -> None:
         self._insert(self.session.case.motions[self.list.currentRow()])
@@ -403,9 +400,7 @@ class MotionPanel(Panel):
         self.change(changes.remove_motion, self.list.currentRow())
 
     def _move(self, by: int) -> None:
-        row = self.list.currentRow()
-        self.change(changes.move_motion, row, by)
-        self.list.setCurrentRow(row + by)
+        self.change(changes.move_motion, self.list.currentRow(), by)
 
     def sizeHint(self) -> QSize:
         # Independent of the shown form, so that the panel above does not jump.

@@ -328,7 +328,9 @@ class SectionsPanel(Panel):
     def _make_tools(self) -> None:
         self.handle = check_box("Handle", "")
         self.flat = check_box("Flat view", "")
-        self.handle.clicked.connect(lambda on: self.change(changes.show_handle, on))
+        self.handle.clicked.connect(
+            lambda on: self.change(changes.show_handle, "section" if on else "")
+        )
         views = self.services.section_views
         self.flat.clicked.connect(views.want_flat)
         self.look = tool_button("", views.look_along, image="along")
@@ -420,7 +422,7 @@ class SectionsPanel(Panel):
             box.setText(name)
             box.setEnabled(shown)
             box.setToolTip(tip if shown else UNSEEN)
-        self.handle.setChecked(session.view.handle)
+        self.handle.setChecked(session.view.handle == "section")
         self.flat.setChecked(selected is not None and selected.flat)
         self.look.setToolTip(words.look)
         self.look.setVisible(bool(words.look))

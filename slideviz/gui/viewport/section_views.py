@@ -1,195 +1,20 @@
-"""The views of the selected section: its handles in the 3D views, and its flat views."""
+"""The 3D views, and the flat views of the selected section beside them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pyvista as pv
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QSplitter, QWidget
-from vtkmodules.vtkInteractionWidgets import vtkImplicitPlaneRepresentation, vtkImplicitPlaneWidget2
 
-from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
-from slideviz.gui.responsiveness.timers import single_shot
-from slideviz.gui.viewport.canvas import View3D
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.flat_views import FRAME_PX, CurveView, FlatView, FlatViews
-from slideviz.gui.viewport.point_handle import (
-    HANDLE_COLOR,
-    POINT_PX,
-    AxisHandle,
-    Dragging,
-    InPlaneHandle,
-    Moved,
-)
 from slideviz.gui.viewport.viewing import Viewing
-from slideviz.mesh.model import Mesh
-from slideviz.scene.axis_handle import points_near
-from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.panes import second_session
+from slideviz.session.placed import points_near
 from slideviz.session.section_cuts import can_cut
 from slideviz.session.state import Session
-
-_MARGIN = 0.03
-"""Margin between the mesh and the frame of a plane handle, relative to the mesh's length."""
-
-
-class Handles:
-    """The handles of a section, one in each view, by which it is dragged.
-
-    ``moved`` and ``dragging``: see `Moved` and `Dragging`.
-    """
-
-    def __init__(self, moved: Moved, dragging: Dragging) -> None:
-        self._moved = moved
-        self._dragging = dragging
-        self._of: dict[View3D, Handle] = {}
-
-    def of(self, view: View3D) -> Handle | None:
-        """Return the handle in a view; None if it has none."""
-        return self._of.get(view)
-
-    def __bool__(self) -> bool:
-        return bool(self._of)
-
-    def show(
-        self,
-        views: list[tuple[View3D, Scene, Mesh]],
-        section: Section,
-        mesh: Mesh,
-        scheme: ColorScheme,
-    ) -> None:
-        """Show a handle of a section in every view.
-
-        ``views``: each view, its scene, and the mesh as deformed in the step it shows. ``mesh``:
-        the undeformed mesh.
-        """
-        kind = kind_of(section, mesh)
-        for view, scene, deformed in views:
-            if not isinstance(self._of.get(view), kind):
-                self.drop(view)
-                self._of[view] = kind(view, scene, self._moved, self._dragging)
-            self._of[view].show(section, scheme, mesh, deformed)
-            view.render_soon()
-
-    def drop(self, view: View3D) -> None:
-        handle = self._of.pop(view, None)
-        if handle is not None:
-            handle.close()
-            view.render_soon()
-
-    def clear(self) -> None:
-        for view in list(self._of):
-            self.drop(view)
-
-
-class PlaneHandle:
-    """The handle of a plane section: VTK's plane widget, with frame, normal arrow and ball.
-
-    ``moved`` and ``dragging``: see `Moved` and `Dragging`.
-    """
-
-    def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:
-        self.view = view
-        self.scene = scene
-        self._moved = moved
-        self._dragging = dragging
-        self.section: Section | None = None
-        self.shape = vtkImplicitPlaneRepresentation()
-        self.shape.SetPlaceFactor(1.0)
-        self.shape.OutlineTranslationOff()
-        self.shape.ScaleEnabledOff()
-        self.shape.OutsideBoundsOff()
-        self.shape.SetDrawOutline(False)
-        self.shape.SetHandleSize(POINT_PX)
-        self.widget = vtkImplicitPlaneWidget2()
-        self.widget.SetRepresentation(self.shape)
-        self.widget.SetInteractor(view.iren.interactor)
-        self._bounds: list[float] = []
-        self.dragging = False
-        self._soon = single_shot(None, self.report)
-        for event, call in (
-            ("StartInteractionEvent", lambda *_: self._grab(True)),
-            ("InteractionEvent", lambda *_: self._soon.start()),
-            ("EndInteractionEvent", lambda *_: self._grab(False)),
-        ):
-            self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
-
-    def show(self, section: Section, scheme: ColorScheme, mesh: Mesh, _deformed: Mesh) -> None:
-        self.section = section
-        self._color(scheme)
-        low = mesh.points.min(axis=0)
-        high = mesh.points.max(axis=0)
-        margin = _MARGIN * (high - low).max()
-        bounds = np.stack([low - margin, high + margin], axis=1).ravel().tolist()
-        if bounds != self._bounds:
-            self._bounds = bounds
-            self.shape.PlaceWidget(bounds)
-        if not self.dragging:
-            self.shape.SetOrigin(*section.origin)
-            self.shape.SetNormal(*section.basis[2])
-        if not self.widget.GetEnabled():
-            self.widget.On()
-
-    def close(self) -> None:
-        self._soon.stop()
-        self.dragging = False
-        self.widget.Off()
-        self.widget.RemoveAllObservers()
-        self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
-
-    def report(self) -> None:
-        """Call ``moved`` with the section at origin and normal of the dragged plane."""
-        section = self.section
-        if section is None:
-            return
-        # Nobody aims at more decimals, and they would fill the fields of the normal.
-        normal = np.array(self.shape.GetNormal()).round(4) + 0.0
-        origin = np.array(self.shape.GetOrigin())
-        moved = replace(section, origin=tuple(origin.tolist()), direction=tuple(normal.tolist()))
-        if not np.allclose(moved.origin, section.origin) or not np.allclose(
-            moved.basis[2], section.basis[2]
-        ):
-            self._moved(moved)
-
-    def _grab(self, dragging: bool) -> None:
-        self.dragging = dragging
-        if (
-            dragging
-            and self.shape.GetInteractionState() == vtkImplicitPlaneRepresentation.MovingOrigin
-        ):
-            # VTK drags the ball within the plane, which changes nothing visible: push instead.
-            self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
-        if not dragging:
-            self._soon.stop()
-            self.report()
-        self._dragging(dragging)
-
-    def _color(self, scheme: ColorScheme) -> None:
-        strong = pv.Color(SELECTED_COLOR).float_rgb
-        plain = pv.Color(scheme.text).float_rgb
-        shape = self.shape
-        shape.SetForegroundColor(*plain)
-        shape.SetEdgeColor(*plain)
-        shape.SetHandleColor(*pv.Color(HANDLE_COLOR).float_rgb)
-        shape.SetInteractionColor(*strong)
-        shape.GetPlaneProperty().SetColor(*plain)
-        shape.GetPlaneProperty().SetOpacity(0.06)
-        shape.GetSelectedPlaneProperty().SetColor(*strong)
-        shape.GetSelectedPlaneProperty().SetOpacity(0.12)
-
-
-Handle = PlaneHandle | InPlaneHandle | AxisHandle
-
-
-def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
-    """Return the class of the handle for a section: by the mesh's dimension, then by its shape."""
-    if mesh.dim == 2:
-        return InPlaneHandle
-    return PlaneHandle if section.handle == "push" else AxisHandle
-
 
 BESIDE_PX = 1000
 """Width of the splitter, in pixels, below which the flat view is always below the 3D view."""
@@ -209,21 +34,12 @@ class SectionViews(QSplitter):
         self.store = viewing.store
         self.addWidget(viewing)
         self._multi_samples = multi_samples
-        self.handles = Handles(self._replaced, self.store.set_dragging)
-        """The handles of the selected section, one in each 3D view while they are switched on."""
         self.flats: FlatViews | None = None
         """The flat views; None while no section is laid flat."""
-        self._closed = False
         self._kind: tuple[object, ...] = ()
         self.scheme = viewing.scene.scheme
-        """The colors of handles and flat views."""
+        """The colors of the flat views."""
         self.store.listen(self._session_changed)
-        viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
-        viewing.second_leaves.connect(self._second_leaves)
-
-    def _second_leaves(self) -> None:
-        assert self.viewing.second is not None
-        self.handles.drop(self.viewing.second)
 
     # What is wanted --------------------------------------------------------------------
     @property
@@ -261,43 +77,18 @@ class SectionViews(QSplitter):
 
     # What is shown ---------------------------------------------------------------------
     def _session_changed(self, old: Session, new: Session) -> None:
-        if old.mesh is not new.mesh:
+        another = old.mesh is not new.mesh
+        if another:
             # A 2D mesh has a curve where a 3D one has flat views.
             self._drop_flats()
-        idle = self.flats is None and not self.handles and not new.view.handle
-        if not idle or old.mesh is not new.mesh or old.view.sections != new.view.sections:
-            self._sync()
+        if another or self.flats is not None or old.view.sections != new.view.sections:
+            self._sync_flat(new)
 
     def redraw(self) -> None:
         """Draw the sections again, after their cells were read from the mesh's file."""
         session = self.store.session
         self.viewing.sync(session, session)
-        self._sync()
-
-    def _sync(self) -> None:
-        session = self.store.session
-        self._sync_handles(session)
         self._sync_flat(session)
-
-    def _sync_handles(self, session: Session) -> None:
-        mesh = session.mesh
-        section = self.section
-        wanted = session.view.handle and session.frame is not None and not self._closed
-        usable = section is not None and section.shown and can_cut(mesh, section)
-        if wanted and usable and section is not None and mesh is not None:
-            self.handles.show(self._shown(session), section, mesh, self.scheme)
-        else:
-            self.handles.clear()
-
-    def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
-        sessions = (session, second_session(session) or session)
-        pairs = zip(self.viewing.views_and_scenes(), sessions, strict=False)
-        return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
-
-    def _replaced(self, section: Section) -> None:
-        if self.section is not None and section != self.section:
-            at = self.store.session.view.section_index
-            self.store.change(changes.replace_section, at, section)
 
     def _sync_flat(self, session: Session) -> None:
         at = session.view.flat_index
@@ -352,15 +143,12 @@ class SectionViews(QSplitter):
         self.scheme = scheme
         if self.flats is not None:
             self.flats.set_scheme(scheme)
-        self._sync()
 
     def close_views(self) -> None:
         """Release the graphics resources; call this before the 3D views are closed."""
-        self.handles.clear()
         if self.flats is not None:
             self.flats.close_views()
             self.flats = None
-        self._closed = True
 
 
 def arrangement_for(extent: tuple[float, float], available: tuple[int, int]) -> tuple[bool, float]:

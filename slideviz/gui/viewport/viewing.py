@@ -23,6 +23,7 @@ from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.panels.worst import info_text
 from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, single_shot
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.handle_mouse import HandleMouse
 from slideviz.gui.widgets.build import ElidedLabel, tool_button
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
@@ -262,14 +263,14 @@ class CameraLink:
 class Viewing(QWidget):
     """The 3D views: one, or two side by side with linked cameras and the same range of colors."""
 
-    second_made = Signal()
-    second_leaves = Signal()
-    """`second_made`, `second_leaves`: the second view was made; it is about to be closed."""
+    status_changed = Signal(str)  # what the handle does, in words
 
     def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.store = store
         self._multi_samples = multi_samples
+        self.handles: dict[View3D, HandleMouse] = {}
+        """The handle in each view."""
         self._ghosts: Ghosts | None = None
         self.surfaces: tuple = ()
         self.coarse: tuple = ()
@@ -317,6 +318,8 @@ class Viewing(QWidget):
         CoarseWhileMoving(view, scene)
         CellMouse(view, scene, self.store)
         BoundaryMouse(view, scene, self.store)
+        # The last to watch the view is the first to get its events.
+        self.handles[view] = HandleMouse(view, scene, self.store, self.status_changed.emit)
         view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
@@ -337,7 +340,6 @@ class Viewing(QWidget):
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self._rearranged(not detail)
         self.second.unveil()
-        self.second_made.emit()
 
     def _swap(self, swapped: bool) -> None:
         if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
@@ -397,7 +399,6 @@ class Viewing(QWidget):
     def _drop_second(self) -> None:
         if self.second is None:
             return
-        self.second_leaves.emit()
         second = self.second
         self.second = None
         self.second_scene = None
@@ -409,6 +410,7 @@ class Viewing(QWidget):
         self._grid.addWidget(self.view, 1, 0)
         for column, stretch in enumerate((1, 0)):
             self._grid.setColumnStretch(column, stretch)
+        del self.handles[second]
         second.close()
         second.deleteLater()
         for title in self.titles:

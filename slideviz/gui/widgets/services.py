@@ -40,7 +40,7 @@ class Services(QMainWindow):
     viewing: Viewing
     section_views: SectionViews
     """`exports`, `viewing`, `section_views`: what writes pictures, films and more; the 3D views;
-    the handles and flat views of the selected section."""
+    the flat views of the selected section."""
     dock_manager: Docks
     """The docks with the panels."""
 
