@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.model import Case
+from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.motion import Motion
 from slideviz.case.motions.onto import Onto
@@ -191,6 +192,18 @@ def handle(window: MainWindow, place: Path) -> None:
     _look(window, 30.0, -8.0)
 
 
+def box(window: MainWindow, place: Path) -> None:
+    """Show a free-form box around the blade of the stator, a column of its points moved."""
+    _open(window, _stator(place))
+    store = window.store
+    moved = Ffd("BLADE", "", (2, 1, -1), (0.006, 0.0, 0.0))
+    store.change(changes.set_case, motions=(moved,))
+    store.change(changes.add_box, 0)
+    store.change(changes.choose_motion, 0)
+    store.change(changes.show_boundaries, OUTER, False)
+    _look(window, 30.0, -8.0)
+
+
 def wheel(window: MainWindow, place: Path) -> None:
     """Show all passages of the stator after a run."""
     _open(window, _stator(place))
@@ -316,6 +329,7 @@ STATES = (
     ShotState("quality", quality),
     ShotState("twist", twist),
     ShotState("handle", handle),
+    ShotState("box", box),
     ShotState("wheel", wheel),
     ShotState("onto", onto),
     ShotState("section", section),

@@ -9,17 +9,22 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.case.model import Case
-from slideviz.case.motions.box import box_changes, box_definition, box_motions, boxes_for
-from slideviz.color_scheme import INTERSECTION_COLOR
-from slideviz.errors import SlidevizError
-from slideviz.ffd.box import Box
+from slideviz.case.motions.box import box_definition, box_motions
+from slideviz.color_scheme import INTERSECTION_COLOR, SELECTED_COLOR
+from slideviz.ffd.box import Box, points_at
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
 from slideviz.scene import actors
 from slideviz.scene.actors import draw_in_front
 from slideviz.scene.legend import set_letters
 from slideviz.scene.stage import KeyedLayer, Layer
-from slideviz.session.motions import support_case, support_key, support_of
+from slideviz.session.motions import (
+    chosen_control,
+    lattices,
+    support_case,
+    support_key,
+    support_of,
+)
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
@@ -27,7 +32,9 @@ BASE = "boxes:undeformed"
 MOVED = "boxes:moved"
 BEHIND = "boxes:behind"
 LABELS = "boxes:-labels"
-"""Names of actors: undeformed boxes, moved ones, parts behind the mesh, labels."""
+CHOSEN = "boxes:chosen"
+"""Names of actors: undeformed boxes, moved ones, parts behind the mesh, labels, and the control
+points that the chosen motion moves."""
 
 ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
 """Indices of a box's first control point, and of those at the ends of its edges in i, j and k."""
@@ -44,14 +51,15 @@ class BoxLayer(KeyedLayer):
     first control point, and i, j and k are at the other ends of the edges from there.
     """
 
-    names = (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS)
+    names = (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS, CHOSEN)
 
     def key(self, session: Session) -> tuple[object, ...]:
         if session.mesh is None or "ffd" not in session.view.drawn:
             return ()
         case = session.case
         style = (self.stage.scheme, self.stage.pixel_scale)
-        return session.mesh, box_motions(case), box_definition(case), style
+        chosen = chosen_control(session)
+        return session.mesh, box_motions(case), box_definition(case), chosen, style
 
     def draw(self, session: Session) -> None:
         mesh = session.mesh
@@ -80,6 +88,14 @@ class BoxLayer(KeyedLayer):
                 draw_in_front(behind.mapper)
         if boxes:
             self._label(boxes, mesh.dim, lift)
+        name, index = chosen_control(session) or ("", (0, 0, 0))
+        if name in boxes and not boxes[name].problem(index):
+            points = moved.get(name, boxes[name]).points[points_at(index)].reshape(-1, 3)
+            size = 14.0 * self.stage.pixel_scale
+            shape = pv.PolyData(lifted(points[:, : mesh.dim], lift))
+            chosen = self.stage.mark(shape, CHOSEN, SELECTED_COLOR, size=size)
+            chosen.prop.opacity = 0.99  # drawn after the moved ones, which are transparent
+            draw_in_front(chosen.mapper)
 
     def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
         at = []
@@ -101,23 +117,6 @@ class BoxLayer(KeyedLayer):
         # The text property belongs to the filter that precedes the mapper.
         letters = labels.mapper.GetInputConnection(0, 0).GetProducer().GetTextProperty()
         set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
-
-
-def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
-    """Return the undeformed boxes, and the deformed ones of those that motions move, by name.
-
-    None of both if a box is not valid, which is reported elsewhere.
-    """
-    try:
-        boxes = boxes_for(case, mesh)
-    except SlidevizError:
-        return {}, {}
-    moved = {}
-    for name, changes in box_changes(case, mesh, boxes).items():
-        total = np.sum([change for _, _, change in changes], axis=0)
-        if total.any():
-            moved[name] = boxes[name].moved(total)
-    return boxes, moved
 
 
 def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: float) -> Any:

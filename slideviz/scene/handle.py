@@ -17,8 +17,10 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
+from slideviz.ffd.box import Index
 from slideviz.mesh.model import FloatArray, row_dots, row_norms
 from slideviz.scene.pick import Projection
+from slideviz.session.motions import chosen_control, lattices
 from slideviz.session.placed import Act, Grip, Number, Placed
 from slideviz.session.state import Session
 
@@ -196,9 +198,11 @@ class Drag:
             numbers = numbers + change
             if np.abs(change).max() < 1e-4 * unit:
                 break
-        size = nice((2.0 if self.fine else 20.0) * unit)
-        even = [self._even(0.0, value, unit, size, size) for value in numbers]
-        kept = np.where(np.abs(numbers - first) > 1e-9 * unit, even, first)
+        units = unit / np.linalg.norm(slopes, axis=0)
+        sizes = [nice((2.0 if self.fine else 20.0) * each) for each in units]
+        pairs = zip(numbers, units, sizes, strict=True)
+        even = [self._even(0.0, value, each, size, size) for value, each, size in pairs]
+        kept = np.where(np.abs(numbers - first) > 1e-9 * units, even, first)
         words = ", ".join(f"{value:.10g}" for value in kept)
         return Result(placed.put(kept), f"{WORDS['move']}: ({words})", placed.at(kept))
 
@@ -355,6 +359,43 @@ def part_at(parts: list[Part], pixel: FloatArray, ratio: float) -> Part | None:
         if far <= REACH_PX * ratio:
             return parts[k]
     return None
+
+
+def control_at(
+    session: Session, projection: Projection, pixel: FloatArray, reach: float, *, row: bool
+) -> tuple[str, Index] | None:
+    """Return box and index (i, j, k) of the control point at a pixel (2,), or None.
+
+    ``row``: of the row of control points there; where it is chosen already, of a plane with it.
+    """
+    mesh = session.mesh
+    if mesh is None or "ffd" not in session.view.drawn:
+        return None
+    boxes, moved = lattices(session.case, mesh)
+    best: tuple[float, str, tuple[int, ...]] = (reach, "", ())
+    for name, box in (boxes | moved).items():
+        layers = box.points if mesh.dim == 3 else box.points[:, :, :1] * [1.0, 1.0, 0.0]
+        seen = projection.pixels(layers.reshape(-1, 3)).reshape(*layers.shape[:3], 2)
+        for axis in range(mesh.dim):
+            ends = np.moveaxis(seen, axis, 0)
+            last = ends[1:] if row else ends[:-1]
+            way = last - ends[:-1]
+            share = ((pixel - ends[:-1]) * way).sum(-1) / np.maximum((way * way).sum(-1), 1e-30)
+            near = ends[:-1] + np.clip(share, 0.0, 1.0)[..., None] * way if row else ends
+            far = np.linalg.norm(near - pixel, axis=-1)
+            place = np.unravel_index(int(np.argmin(far)), far.shape)
+            here = [int(one) for one in place[1:]]
+            here.insert(axis, -1 if row else int(place[0]))
+            best = min(best, (float(far[place]), name, tuple(here)))
+    if not best[1]:
+        return None
+    _, name, at = best
+    i, j, k = (*at[: mesh.dim], -1)[:3]
+    planes = [(-1, j, k), (i, -1, k), (i, j, -1)]
+    shown = [(name, index) for index in ((i, j, k), *planes[: mesh.dim] * row)]
+    kinds = list(dict.fromkeys(shown))  # a row, then the planes with it, in turns
+    now = chosen_control(session)
+    return kinds[(kinds.index(now) + 1) % len(kinds)] if row and now in kinds else kinds[0]
 
 
 def _distance(line: FloatArray, at: FloatArray) -> float:

@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from slideviz.case.model import Case
+from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, named
+from slideviz.ffd.box import Index
 from slideviz.sections.polygons import ONLY_INVERTED
-from slideviz.session.motions import with_new_box
+from slideviz.session.motions import new_target, with_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
 from slideviz.session.reach import scaled
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import Handle, PanelPlace, Run, Session, StepFrame, ViewState
-from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
+from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, FfdSystem, Role
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -339,8 +341,35 @@ def replace_motion(session: Session, index: int, motion: Motion) -> Session:
 @undoable("new box")
 def add_box(session: Session, index: int) -> Session:
     """Return the session with a new FFD box around the boundaries of a motion, which uses it."""
-    changed = replace(session, case=with_new_box(session, index))
+    changed = replace(session, case=with_box(session, index))
     return replace(changed, view=changed.view.with_drawn({"ffd": True}))
+
+
+@undoable("box")
+def shape_box(
+    session: Session, index: int, degrees: Index | None, system: FfdSystem | None
+) -> Session:
+    """Return the session with other degrees or coordinates of a motion's box; None: the same."""
+    return replace(session, case=with_box(session, index, degrees, system))
+
+
+@undoable("control point")
+def choose_control(session: Session, box: str, index: Index) -> Session:
+    """Return the session with the motion of a box's control points (i, j, k) chosen.
+
+    Unless there is one, the chosen motion of the box takes them if it moves nothing yet; else a new
+    one is added.
+    """
+    motions = session.case.motions
+    mine = {at: one for at, one in enumerate(motions) if isinstance(one, Ffd) and one.box == box}
+    same = next((at for at, one in mine.items() if one.index == index), None)
+    if same is not None:
+        return choose_motion(session, same)
+    chosen = session.motion_index
+    if chosen in mine and not any(mine[chosen].vector):
+        return replace_motion(session, chosen, replace(mine[chosen], index=index))
+    marker = next((one.marker for one in reversed(mine.values())), new_target(session))
+    return add_motion(session, Ffd(marker, box, index, (0.0, 0.0, 0.0))) if marker else session
 
 
 @undoable("scaled motion")

@@ -8,18 +8,26 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
-from slideviz.case.motions.box import box_definition, boxes_for
+from slideviz.case.motions.box import (
+    BoxMotion,
+    box_changes,
+    box_definition,
+    boxes_for,
+    system_of,
+)
 from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.motions.motion import Axis, Target, applies_to, direction_words, named
 from slideviz.case.motions.onto import is_laid
 from slideviz.case.moving_nodes import displacements, moved_together, placed_displacements
 from slideviz.errors import CaseError, SlidevizError
+from slideviz.ffd.box import CORNERS, Box, CoordinateSystem, Index
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import marker_zones
@@ -27,6 +35,7 @@ from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.solver.rims import are_ready, on_walls
 from slideviz.system.atomic import atomic_write
+from slideviz.terms import FfdSystem
 
 PLACEHOLDER = Path("table")
 """Stands for the file in messages of `parsed_displacements`; `TableRows.check` replaces it."""
@@ -212,40 +221,89 @@ def box_names(session: Session) -> tuple[str, ...]:
         return ()
 
 
+def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
+    """Return the undeformed boxes, and the deformed ones of those that motions move, by name.
+
+    None of both if a box is not valid, which is reported elsewhere.
+    """
+    try:
+        boxes = boxes_for(case, mesh)
+    except SlidevizError:
+        return {}, {}
+    moved = {}
+    for name, changes in box_changes(case, mesh, boxes).items():
+        total = np.sum([change for _, _, change in changes], axis=0)
+        if total.any():
+            moved[name] = boxes[name].moved(total)
+    return boxes, moved
+
+
+def chosen_control(session: Session) -> tuple[str, Index] | None:
+    """Return the box and the index of the control points that the chosen motion moves, or None."""
+    index = session.motion_index
+    motion = None if index is None else session.case.motions[index]
+    if session.mesh is None or session.view.handle != "motion" or not isinstance(motion, BoxMotion):
+        return None
+    return motion.box, motion.lattice_index(session.mesh.dim)
+
+
 BOX_MARGIN = 0.05  # margin of a new box around a boundary, over its longest side
 BOX_DEGREE = 5  # its degree along its longest side; in proportion along the others
 
 
-def with_new_box(session: Session, index: int) -> Case:
-    """Return the case with a new FFD box, around the boundaries of a motion, which uses it then."""
+def with_box(
+    session: Session, index: int, degrees: Index | None = None, system: FfdSystem | None = None
+) -> Case:
+    """Return the case with an FFD box around the boundaries of a motion, which uses it then.
+
+    A box of the case that the motion has already gets other ``degrees``, or coordinates in which it
+    is straight; None: as they are.
+    """
     case = session.case
     mesh = session.mesh
     assert mesh is not None
-    motion = case.motions[index]
-    names = named(motion.marker) or case.markers_with("moving")
-    points = mesh.points[np.unique(np.concatenate([mesh.marker(n).nodes for n in names]))]
-    low = points.min(axis=0)
-    high = points.max(axis=0)
-    sides = high - low
-    margin = BOX_MARGIN * sides.max()
-    rounded = [[float(f"{v:.6g}") for v in corner] for corner in (low - margin, high + margin)]
-    (x0, y0, *z0), (x1, y1, *z1) = rounded
-    ring = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
-    # In SU2's order; in 2D the corners above are 0.
-    layers = [(*corner, *(z or (0.0,))) for z in (z0, z1) for corner in ring]
-    corners = layers if mesh.dim == 3 else [*layers[:4], *[(0.0, 0.0, 0.0)] * 4]
-    degrees = [max(1, round(BOX_DEGREE * side / sides.max())) for side in sides]
-    i, j, k = (*degrees, 0)[:3]
-    taken = {*box_names(session), *(name for name, _ in case.ffd_boxes)}
+    motion: Any = case.motions[index]
+    boxes = dict(case.ffd_boxes)
+    shapes = dict(zip(boxes, case.ffd_degrees, strict=False))
+    taken = {*box_names(session), *boxes}
     offered = chain(["BOX"], (f"BOX_{number}" for number in count(2)))
-    name = next(one for one in offered if one not in taken)
+    name = motion.box if motion.box in boxes else next(n for n in offered if n not in taken)
+    case = case if system is None else case.change(ffd_system=system)
+    if name not in boxes or system is not None:
+        names = named(motion.marker) or case.markers_with("moving")
+        nodes = np.unique(np.concatenate([mesh.marker(one).nodes for one in names]))
+        corners, usual = _around(mesh.points[nodes], system_of(case))
+        boxes[name] = tuple(corners.ravel().tolist())
+        shapes.setdefault(name, usual)
+    shapes[name] = degrees or shapes[name]
     motions = list(case.motions)
     motions[index] = replace(motion, box=name)
     return case.change(
-        ffd_boxes=(*case.ffd_boxes, (name, tuple(v for corner in corners for v in corner))),
-        ffd_degrees=(*case.ffd_degrees, (i, j, k)),
+        ffd_boxes=tuple(boxes.items()),
+        ffd_degrees=tuple(shapes[name] for name in boxes),
         motions=tuple(motions),
     )
+
+
+def _around(points: FloatArray, system: CoordinateSystem) -> tuple[FloatArray, Index]:
+    """Return the corners (8, 3) of a box around points (n, d), in SU2's order, and its degrees.
+
+    In 2D the last four corners are 0.
+    """
+    dim = points.shape[1]
+    q = points if dim == 2 else system.q_of(points)
+    low = q.min(axis=0)
+    high = q.max(axis=0)
+    lengths = np.ones(dim) if system.kind == "CARTESIAN" else np.array([1.0, high[0], 1.0])
+    sides = (high - low) * lengths
+    margin = BOX_MARGIN * sides.max() / lengths
+    first = [float(f"{v:.6g}") for v in low - margin]
+    last = [float(f"{v:.6g}") for v in high + margin]
+    corners = np.array(first) + CORNERS[:, :dim] * np.subtract(last, first)
+    i, j, k = (*(max(1, round(BOX_DEGREE * side / sides.max())) for side in sides), 0)[:3]
+    at = np.zeros((8, 3))
+    at[: 4 * (dim - 1), :dim] = corners[: 4 * (dim - 1)] if dim == 2 else system.points_of(corners)
+    return at, (i, j, k)
 
 
 def boxes_hint(session: Session) -> str:

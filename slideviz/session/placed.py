@@ -14,15 +14,17 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 import numpy as np
 
+from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate, rotated
+from slideviz.ffd.box import CoordinateSystem, points_at
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.around_axis import AboutAxis
 from slideviz.sections.model import Section
 from slideviz.sections.shape import triple
 from slideviz.session import changes
-from slideviz.session.motions import machine_axis, new_target
+from slideviz.session.motions import lattices, machine_axis, new_target
 from slideviz.session.section_cuts import Cuts, can_cut
 from slideviz.session.state import Session
 
@@ -325,6 +327,43 @@ class PlacedRadius(PlacedBoundary):
 
 
 @dataclass(frozen=True, eq=False)
+class PlacedControl(Placed):
+    """Control points of a box, which a motion moves along the axes of the box's coordinates."""
+
+    index: int  # the place of the motion in the case
+    q: FloatArray  # (3,): the mean of the control points as they are moved, in these coordinates
+    system: CoordinateSystem
+    dim: int
+
+    @property
+    def motion(self) -> Ffd:
+        """Return the motion."""
+        motion = self.session.case.motions[self.index]
+        assert isinstance(motion, Ffd)
+        return motion
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        if self.dim == 2:
+            return FLAT
+        return SPACE if self.system.kind == "CARTESIAN" else (_BALL, *_SHOVES)
+
+    @property
+    def numbers(self) -> FloatArray:
+        return np.array(self.motion.vector)
+
+    def put(self, numbers: FloatArray) -> Session:
+        moved = replace(self.motion, vector=triple(numbers))
+        return changes.replace_motion(self.session, self.index, moved)
+
+    def at(self, numbers: FloatArray) -> FloatArray:
+        return self.system.points_of(self.q + numbers - self.numbers)
+
+    def way(self, axis: int) -> FloatArray:
+        return self.axes[axis] if self.system.kind == "CARTESIAN" else np.eye(3)[axis]
+
+
+@dataclass(frozen=True, eq=False)
 class PlacedSection(Placed):
     """A section of the view; its axes are x, y, z, its normal or axis, and two across."""
 
@@ -448,6 +487,8 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
     by_motion = session.view.handle == "motion"
     index = session.motion_index if by_motion else None
     motion = None if index is None else session.case.motions[index]
+    if isinstance(motion, Ffd) and index is not None:
+        return _control(session, index, motion)
     if by_motion and not isinstance(motion, Translate | Rotate | Scale | Radial):
         return None
     marker = new_target(session) if motion is None else motion.marker
@@ -460,3 +501,23 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
     origin = padded(np.concatenate(moved)[once].mean(axis=0)[None])[0]
     kind = PlacedRadius if isinstance(motion, Radial) else PlacedBoundary
     return kind(session, origin, *_axes(session, origin), index, marker, mesh.dim)
+
+
+def _control(session: Session, index: int, motion: Ffd) -> PlacedControl | None:
+    mesh = session.mesh
+    assert mesh is not None
+    boxes, moved = lattices(session.case, mesh)
+    box = moved.get(motion.box) or boxes.get(motion.box)
+    if box is None or box.problem(motion.index):
+        return None
+    system = box.system
+    q = box.q[points_at(motion.index)].reshape(-1, 3).mean(axis=0)
+    origin = system.points_of(q)
+    axes, names = _axes(session, origin)
+    if system.kind != "CARTESIAN":
+        ways = system.pushed(np.tile(q, (3, 1)), np.eye(3))
+        axes = ways / np.linalg.norm(ways, axis=1)[:, None]
+        names = "rta"
+        if mesh.dim == 2:
+            return None
+    return PlacedControl(session, origin, axes, names, index, q, system, mesh.dim)

@@ -6,11 +6,14 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
+from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.samples.table import write_sample
 from slideviz.scene import handle
+from slideviz.scene.ghosts import CHOSEN
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
+from slideviz.session.motions import lattices
 
 pytestmark = pytest.mark.window("shared")
 
@@ -249,3 +252,76 @@ def test_in_2d_it_moves_in_the_plane(window, driver, passage_file):
     window.view.setFocus()
     keys(window, "r-3.5")
     assert motions(window)[-1].angle_deg == -3.5
+
+
+@pytest.fixture
+def boxed(window, driver, blade):
+    """A box around the blade, of which nothing is moved yet."""
+    window.motions._add(Ffd)
+    driver.click(window.motions.editor.new_box)
+    window.view.snapshot()
+    return blade
+
+
+def control(window, *index):
+    """The pixel of a control point."""
+    session = window.store.session
+    boxes, moved = lattices(session.case, session.mesh)
+    window.view.snapshot()
+    return to_display(window.view, (boxes | moved)["BOX"].points[index][None])[0]
+
+
+def press(window, pixel, modifier=Qt.KeyboardModifier.NoModifier):
+    QTest.mouseClick(window.view, Qt.MouseButton.LeftButton, modifier, where(window.view, pixel))
+    QApplication.processEvents()
+
+
+def test_a_control_point_is_chosen_by_a_click_marked_at_zero_and_dragged(window, driver, boxed):
+    form = window.motions.editor
+    assert form.degree.isVisible()
+    for field, text in zip(form.degree.fields, "212", strict=True):
+        driver.type(field, text)
+    assert window.store.session.case.ffd_degrees == ((2, 1, 2),)
+    selected = window.store.session.view.selected
+    press(window, control(window, 2, 1, 2))
+    (motion,) = motions(window)
+    assert (motion.index, motion.vector) == ((2, 1, 2), (0.0, 0.0, 0.0))
+    assert window.store.session.view.selected == selected
+    window.view.snapshot()
+    assert CHOSEN in window.view.actors
+    start = control(window, 2, 1, 2)
+    drag(boxed, ("move", ()), (25, 15))
+    assert control(window, 2, 1, 2) - start == pytest.approx((25, 15), abs=1.0)
+    (motion,) = motions(window)
+    assert form.vector.value == motion.vector
+    assert any(
+        np.abs(
+            points
+            - window.store.session.mesh.points[window.store.session.mesh.marker("BLADE").nodes]
+        ).max()
+        > 1e-6
+        for points in window.scene.motion_ghosts.values()
+    )
+    # Another point has a motion of its own, and the first one its own again.
+    press(window, control(window, 0, 0, 0))
+    assert [one.index for one in motions(window)] == [(2, 1, 2), (0, 0, 0)]
+    press(window, control(window, 2, 1, 2))
+    assert len(motions(window)) == 2
+    assert window.motions.list.currentRow() == 0
+    keys(window, "gz0.002")
+    assert motions(window)[0].vector[2] == 0.002
+
+
+def test_alt_takes_a_row_and_again_a_plane(window, driver, boxed):
+    alt = Qt.KeyboardModifier.AltModifier
+    ends = control(window, 0, 0, 0), control(window, 0, 0, 1)
+    middle = 0.5 * (ends[0] + ends[1])
+    seen = []
+    for _ in range(2):
+        press(window, middle, alt)
+        seen.append(motions(window)[0].index)
+    assert sum(index == -1 for index in seen[0]) == 1
+    assert sum(index == -1 for index in seen[1]) == 2
+    assert len(motions(window)) == 1
+    assert window.store.session.view.marked_cell is None
+    assert window.store.can_undo == "control point"

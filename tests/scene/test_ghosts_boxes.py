@@ -13,7 +13,7 @@ from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
-from slideviz.scene.ghosts import BASE, LABELS, MOVED
+from slideviz.scene.ghosts import BASE, CHOSEN, LABELS, MOVED
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
@@ -114,3 +114,16 @@ def test_boxes_are_drawn_at_first_where_a_motion_is_of_one(boxed):
     gone = changes.set_view(added, ffd=False)
     other = changes.replace_motion(gone, 0, sv.Ffd("y_low", "BOX", (2, 1, -1), (0.0, 0.1, 0.0)))
     assert "ffd" not in other.view.drawn
+
+
+def test_the_chosen_control_points_are_marked_at_zero_and_none_that_is_not_there(boxed, scene):
+    session = session_of(boxed, sv.Ffd("y_low", "BOX", (2, -1, -1), (0.0, 0.0, 0.0)))
+    session = changes.set_view(session, ffd=True)
+    scene.open(session, find_surfaces(boxed))
+    assert CHOSEN not in scene.plotter.actors
+    chosen = changes.choose_motion(session, 0)
+    scene.update(chosen)
+    assert scene.stage.shapes[CHOSEN].n_points == 4
+    lacking = sv.Ffd("y_low", "BOX", (9, -1, -1), (0.0, 0.0, 0.0))
+    scene.update(changes.replace_motion(chosen, 0, lacking))
+    assert CHOSEN not in scene.plotter.actors

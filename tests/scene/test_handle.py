@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slideviz.case.motions.box import Ffd, boxes_for
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
+from slideviz.case.moving_nodes import displacements
 from slideviz.mesh.quality import quality
-from slideviz.scene.handle import Drag, nice, on_path, part_at, parts_of, rounded
+from slideviz.scene.handle import Drag, control_at, nice, on_path, part_at, parts_of, rounded
 from slideviz.scene.pick import Projection
 from slideviz.session import changes
 from slideviz.session.motions import Ghosts
@@ -342,3 +344,116 @@ def test_lines_and_circles_of_a_2d_mesh():
     radius = circle.view.sections[0].radius
     more = pulled.session.view.sections[0].radius - radius
     assert more == pytest.approx(20.0 * np.sqrt(2.0) * unit, abs=unit)
+
+
+# Boxes ------------------------------------------------------------------------------------
+def boxed(mesh, degrees=(2, 2, 2), system="CARTESIAN"):
+    """A mesh with a box of the case around the first boundary, and a motion of it."""
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = changes.set_role(session, mesh.marker_names, "fixed")
+    session = changes.set_role(session, mesh.marker_names[:1], "moving")
+    name = mesh.marker_names[0]
+    session = changes.add_motion(session, Ffd(name, "", (0, 0, 0), (0.0, 0.0, 0.0)))
+    session = changes.add_box(session, 0)
+    return changes.shape_box(session, 0, degrees, system)
+
+
+def about_x():
+    """A sector of a ring about x."""
+    mesh = grid((4, 6, 5), place=ring((4, 6, 5), 0.5, 1.0, 60.0, -30.0))
+    points = mesh.points[:, [2, 0, 1]]
+    return replace(mesh, points=points)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("system", ["CARTESIAN", "CYLINDRICAL"])
+def test_a_control_point_stays_under_the_mouse(view, system):
+    mesh = grid((3, 3, 3)) if system == "CARTESIAN" else about_x()
+    session = boxed(mesh, (2, 2, 2), system)
+    session = changes.choose_control(session, "BOX", (1, 2, 1))
+    now = handle_of(session)
+    box = boxes_for(session.case, session.mesh)["BOX"]
+    assert now.origin == pytest.approx(box.points[1, 2, 1])
+    drag = ended(take(now, view, ("move", ())), (40.0, -25.0))
+    moved = drag.result()
+    assert len(moved.session.case.motions) == 1
+    after = handle_of(moved.session)
+    assert after.origin == pytest.approx(moved.origin)
+    shift = view.pixels(np.stack([now.origin, after.origin]))
+    assert shift[1] - shift[0] == pytest.approx((40.0, -25.0), abs=1.5)
+    for axis in range(3):
+        typed = replace(drag, axes=(axis,), typed="0.05").result().session.case.motions[0]
+        assert typed.vector == pytest.approx(0.05 * np.eye(3)[axis])
+
+
+def test_in_cylindrical_coordinates_an_arrow_goes_around_the_axis():
+    view = look((1.0, 0.0, 0.0), False, (0.5, 0.7, 0.0))
+    session = changes.choose_control(boxed(about_x(), (2, 2, 2), "CYLINDRICAL"), "BOX", (2, 1, 1))
+    now = handle_of(session)
+    assert now.names == "rta"
+    drag = take(now, view, ("move", (1,)))
+    there = now.along(1).path(0.3, drag.point)
+    vector = replace(drag, now=view.pixels(there[None])[0]).result().session.case.motions[0].vector
+    assert vector == pytest.approx((0.0, 0.3, 0.0), abs=5e-3)
+    box = boxes_for(session.case, session.mesh)["BOX"]
+    around = now.along(1).path(0.3, now.origin)
+    assert np.linalg.norm(around[1:]) == pytest.approx(np.linalg.norm(box.points[2, 1, 1][1:]))
+
+
+def test_a_box_around_a_boundary_has_its_nodes_and_other_degrees_keep_its_corners():
+    for mesh, system in ((grid((3, 3, 3)), "CARTESIAN"), (about_x(), "CYLINDRICAL")):
+        session = boxed(mesh, (3, 1, 2), system)
+        case = session.case
+        assert case.ffd_degrees == ((3, 1, 2),)
+        assert case.ffd_system == system
+        motion = replace(case.motions[0], index=(-1, -1, -1), vector=(0.1, 0.0, 0.0))
+        found = displacements(case.change(motions=(motion,)), mesh)
+        assert (np.linalg.norm(found.vectors, axis=1) > 0.09).all()
+        other = changes.shape_box(session, 0, (1, 1, 1), None).case
+        assert other.ffd_boxes == case.ffd_boxes
+
+
+def test_control_points_are_chosen_by_one_by_row_and_by_plane():
+    session = boxed(grid((3, 3, 3)))
+    box = boxes_for(session.case, session.mesh)["BOX"]
+    view = VIEWS[3]
+    at = view.pixels(box.points[2, 0, 1][None])[0]
+
+    def picked(now, pixel, row):
+        return control_at(now, view, pixel, 8.0, row=row)
+
+    assert picked(session, at + 3.0, False) == ("BOX", (2, 0, 1))
+    assert picked(session, at + 400.0, False) is None
+    beside = view.pixels((0.4 * box.points[2, 0, 1] + 0.6 * box.points[2, 0, 2])[None])[0]
+    assert picked(session, beside, True) == ("BOX", (2, 0, -1))
+    seen = []
+    for _ in range(4):
+        name, index = picked(session, beside, True)
+        session = changes.choose_control(session, name, index)
+        assert len(session.case.motions) == 1, "what moves nothing yet is taken again"
+        seen.append(index)
+    assert seen == [(2, 0, -1), (-1, 0, -1), (2, -1, -1), (2, 0, -1)]
+    moved = changes.replace_motion(session, 0, replace(session.case.motions[0], vector=(0.1, 0, 0)))
+    more = changes.choose_control(moved, "BOX", (0, 0, 0))
+    assert [motion.index for motion in more.case.motions] == [(2, 0, -1), (0, 0, 0)]
+    again = changes.choose_control(more, "BOX", (2, 0, -1))
+    assert again.motion_index == 0
+    assert len(again.case.motions) == 2
+    hidden = changes.set_view(session, ffd=False)
+    assert picked(hidden, at, False) is None
+
+
+def test_a_point_of_a_2d_box_is_both_layers():
+    mesh = square_mesh(4)
+    session = boxed(mesh, (2, 1, 0))
+    view = look((0.0, 0.0, 1.0), False, (2.0, 2.0, 0.0), 3.0)
+    box = boxes_for(session.case, mesh)["BOX"]
+    at = view.pixels(box.points[1, 1, 0][None] * [1.0, 1.0, 0.0])[0]
+    name, index = control_at(session, view, at, 8.0, row=False)
+    assert (name, index) == ("BOX", (1, 1, -1))
+    session = changes.choose_control(session, name, index)
+    drag = ended(take(handle_of(session), view, ("move", ())), (20.0, 10.0))
+    vector = drag.result().session.case.motions[0].vector
+    assert vector[2] == 0.0
+    unit = view.pixel_length(drag.placed.origin)
+    assert vector[:2] == pytest.approx((20.0 * unit, 10.0 * unit), abs=unit)

@@ -162,6 +162,7 @@ def test_each_change_that_can_be_undone_has_words():
         "add_box": "new box",
         "add_motion": "new motion",
         "add_section": "new section",
+        "choose_control": "control point",
         "choose_section": "choice of a section",
         "confirm_guesses": "confirming guesses",
         "fit_colors": "color range",
@@ -179,6 +180,7 @@ def test_each_change_that_can_be_undone_has_words():
         "set_role": "role",
         "set_view": "view",
         "show_boundaries": "hidden boundaries",
+        "shape_box": "box",
         "show_handle": "handle",
         "adopt_settings": "settings of a run",
     }

@@ -84,6 +84,7 @@ PANELS = (
 MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
     ("Shift+Drag, middle button", "move"),
+    ("Click, Alt+Click on a box", "choose a control point, a row, a plane"),
     ("Drag a handle", "move, turn or enlarge what is chosen"),
     ("Wheel", "zoom about the mouse"),
     ("Rest on a cell", "see its quality, shape and place"),

@@ -22,6 +22,7 @@ from slideviz.case.motions.motion import (
     named,
 )
 from slideviz.case.motions.span import curve_text, read_curve
+from slideviz.ffd.box import MOST_DEGREE
 from slideviz.gui.widgets.build import Choice, as_widget, grow_fields, in_row, push_button
 from slideviz.gui.widgets.fields import (
     CheckedText,
@@ -35,7 +36,7 @@ from slideviz.gui.widgets.fields import (
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.session.motions import radial
-from slideviz.terms import SIDES, SPAN_KINDS
+from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem
 
 ABOUT = {
     "centroid": "its centroid (mean of nodes)",
@@ -55,6 +56,10 @@ Z = (0.0, 0.0, 1.0)  # axis of rotations in 2D
 KIND_LABELS = {kind: kind.kind_term.label for kind in KINDS}
 
 
+whole_degrees = unless(
+    lambda degrees: all(n == int(n) and 1 <= n <= MOST_DEGREE for n in degrees),
+    f"degrees are whole numbers from 1 to {MOST_DEGREE}",
+)
 Check = Callable[[Any], str]  # returns why a value is not allowed; "" if it is
 FieldFactory = Callable[[], QWidget]  # makes a field
 
@@ -190,6 +195,8 @@ class MotionEditor(QWidget):
     """The user wants to edit the rows of the motion's displacement file."""
     box_wanted = Signal()
     """The user wants a new box around the motion's boundaries."""
+    box_changed = Signal(object, object)
+    """Other degrees (int, int, int) of the motion's box, or other coordinates; None: the same."""
 
     def __init__(self, walls: SpanWalls) -> None:
         super().__init__()
@@ -210,8 +217,10 @@ class MotionEditor(QWidget):
         """The axis about which the mesh repeats; None if it does not."""
         self.boxes: tuple[str, ...] = ()
         """The names of the boxes for free-form deformation that can be chosen."""
-        self.straight = True
-        """Whether boxes are straight in Cartesian coordinates."""
+        self.degrees: Mapping[str, tuple[int, ...]] = {}
+        """The degrees of those that are of the case, by name."""
+        self.system: FfdSystem = "CARTESIAN"
+        """The coordinates in which boxes are straight."""
         self._as_point = False
         self._connect()
         self.show_motion(None, (), 3)
@@ -233,6 +242,9 @@ class MotionEditor(QWidget):
         tip = "Make a box of control points around the boundary: they are few, and can be moved."
         self.new_box = push_button("", tip, self.box_wanted, "new_box")
         self.new_box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.degree = VectorField((1, 1, 1), whole_degrees, "ijk", "Degree along each direction.")
+        tip = "In which coordinates the boxes are straight, about an axis along x."
+        self.coordinates = Choice({"CARTESIAN": "x, y, z", "CYLINDRICAL": "r, θ, x"}, tip)
         tip = "Type or paste the rows, or change them, and save them as the file."
         self.table = push_button("Table…", tip, self.table_wanted, "motion_table")
 
@@ -243,21 +255,32 @@ class MotionEditor(QWidget):
         line.setStretch(1, 3)
         self.form.addRow("Motion", as_widget(line))
         file = as_widget(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
+        both = (self.box, self.coordinates)
+        joined = {"path": file, "box": as_widget(in_row(*both, wide=both, spacing=4))}
         self._rows: dict[str, QWidget] = {}
         self._titles = {name: QLabel(row.title) for name, row in ROWS.items()}
         for name, title in self._titles.items():
-            self._rows[name] = file if name == "path" else getattr(self, name)
+            self._rows[name] = joined.get(name, getattr(self, name))
             self.form.addRow(title, self._rows[name])
             if name == "curve":
                 self.form.addRow(self.drawn)
             if name == "box":
                 self.form.addRow("", self.new_box)
+                self.form.addRow("Degrees", self.degree)
         self.form.addRow("Hub, shroud", self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
         widest = max(label.sizeHint().width() for label in self._titles.values())
         for label in self._titles.values():
             label.setMinimumWidth(widest)
-        for choice in (self.kind, self.marker, self.about, self.box, self.side, self.change):
+        for choice in (
+            self.kind,
+            self.marker,
+            self.about,
+            self.box,
+            self.side,
+            self.change,
+            self.coordinates,
+        ):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def _connect(self) -> None:
@@ -270,6 +293,8 @@ class MotionEditor(QWidget):
         self._checked = [each for each in self._rows.values() if isinstance(each, kinds)]
         for field in self._checked:
             field.changed.connect(lambda _: self._emit_changed())
+        self.degree.changed.connect(self._degree_typed)
+        self.coordinates.chosen.connect(lambda system: self.box_changed.emit(None, system))
         self.drawn.changed.connect(self.changed)
         self.path.textEdited.connect(lambda _: self._emit_changed())
 
@@ -303,8 +328,14 @@ class MotionEditor(QWidget):
         for shared in (self.drawn, self.walls):
             self.form.setRowVisible(shared, "curve" in shown)
         box = getattr(motion, ROWS["box"].attribute, "")
-        lacks = "box" in shown and self.straight and box not in self.boxes
+        lacks = "box" in shown and self.system == "CARTESIAN" and box not in self.boxes
         self.form.setRowVisible(self.new_box, lacks)
+        mine = "box" in shown and box in self.degrees
+        self.form.setRowVisible(self.degree, mine)
+        self.degree.set_count(dim)
+        self.degree.show_value(self.degrees.get(box, (1, 1, 1)))
+        self.coordinates.show_value(self.system)
+        self.coordinates.setVisible(mine and dim == 3)
         self.new_box.setText(f"New box around {target_words(motion.marker)}")
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
@@ -457,6 +488,11 @@ class MotionEditor(QWidget):
         # In 2D, indices and vectors of a box keep what is not shown of them.
         boxed = hasattr(self._motion, "box") and isinstance(value, tuple)
         return (*value, *before[len(value) :]) if boxed else value
+
+    def _degree_typed(self, values: tuple[float, ...]) -> None:
+        before = self.degrees[self._motion.box]
+        i, j, k = (*map(int, values), *before[len(values) :])
+        self.box_changed.emit((i, j, k), None)
 
     def _browse(self) -> None:
         title = self._motion.file_words.capitalize()

@@ -181,6 +181,9 @@ class MotionPanel(Panel):
         self.editor.drawn.dragging.connect(self.store.set_dragging)
         self.editor.table_wanted.connect(self.edit_table)
         self.editor.box_wanted.connect(lambda: self.change(changes.add_box, self.list.currentRow()))
+        self.editor.box_changed.connect(
+            lambda *shape: self.change(changes.shape_box, self.list.currentRow(), *shape)
+        )
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
         parts = (buttons, self.list, self.editor, self.hint, None)
         layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))
@@ -242,7 +245,10 @@ class MotionPanel(Panel):
             self.list.setCurrentRow(row)
         self.editor.machine = machine_axis(session)
         self.editor.boxes = box_names(session)
-        self.editor.straight = session.case.ffd_system == "CARTESIAN"
+        case = session.case
+        names = (name for name, _ in case.ffd_boxes)
+        self.editor.degrees = dict(zip(names, case.ffd_degrees, strict=False))
+        self.editor.system = case.ffd_system
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 

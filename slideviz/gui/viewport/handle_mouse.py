@@ -12,7 +12,16 @@ from qtpy.QtGui import QKeyEvent, QMouseEvent
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.handle import EDGE_PX, Drag, HandleActor, Part, part_at, parts_of
+from slideviz.scene.handle import (
+    EDGE_PX,
+    REACH_PX,
+    Drag,
+    HandleActor,
+    Part,
+    control_at,
+    part_at,
+    parts_of,
+)
 from slideviz.scene.pick import Projection
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
@@ -118,19 +127,22 @@ class HandleMouse(QObject):
         if kind == QEvent.Type.MouseMove:
             return self._moved(where, event)
         if kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick):
-            return self._press(where, event.button() == Qt.MouseButton.LeftButton)
+            row = bool(event.modifiers() & Qt.KeyboardModifier.AltModifier)
+            return self._press(where, event.button() == Qt.MouseButton.LeftButton, row=row)
         if kind == QEvent.Type.MouseButtonRelease and self.drag is not None:
             if not self._by_key:
                 self._end()
             return True
         return False
 
-    def _press(self, where: QPoint, left: bool) -> bool:
+    def _press(self, where: QPoint, left: bool, *, row: bool) -> bool:
         if self.drag is not None:
             self._end(keep=left)
             self._by_key = False
             return True
         part = self.part_at(where) if left else None
+        if left and (part is None or row) and self._choose_control(where, row=row):
+            part = next((one for one in self.parts if one.grip == ("move", ())), None)
         if part is None:
             return False
         self.view.setFocus()
@@ -139,6 +151,17 @@ class HandleMouse(QObject):
         act, axes = part.grip
         self._begin(act, axes, self._pixel(where), part.point)
         return True
+
+    def _choose_control(self, where: QPoint, *, row: bool) -> bool:
+        """Choose the control points of a box at a position in the view; return whether any are."""
+        session = self.scene.session
+        reach = REACH_PX * self.view.devicePixelRatioF()
+        seen = Projection.of(self.view)
+        found = control_at(session, seen, self._pixel(where), reach, row=row)
+        if found is not None:
+            self.store.change(changes.choose_control, *found)
+            self.put()
+        return found is not None
 
     def _moved(self, where: QPoint, event: QMouseEvent) -> bool:
         if self.drag is not None:
