@@ -25,14 +25,6 @@ LEVELS = 6  # how often a hexahedron is cut before it is called unproven
 
 Status = NDArray[np.uint8]  # codes (m,) VALID, INVERTED or UNPROVEN
 
-# Matrices that turn the coefficients of a quadratic into those on each half of its interval.
-_HALVES = np.array(
-    [
-        [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.25, 0.5, 0.25]],
-        [[0.25, 0.5, 0.25], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]],
-    ]
-)
-
 
 def decide_unproven(vtk: int, coords: FloatArray, signs: Signs) -> Status:
     """Return the status (m,) of cells with positive corner Jacobians, but not all coefficients.
@@ -56,22 +48,60 @@ def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:
     times. A polynomial is positive in a part if all its coefficients there are positive. Corner
     coefficients are values of the polynomial: if one is not positive, the status is ``INVERTED``.
     """
-    inverted = np.zeros(coefficients.shape[-1], bool)
-    owner = np.arange(coefficients.shape[-1])
-    parts = coefficients
-    for _ in range(levels):
-        parts = np.einsum("xai,ijkp->xajkp", _HALVES, parts)
-        parts = np.einsum("ybj,xajkp->xyabkp", _HALVES, parts)
-        parts = np.einsum("zck,xyabkp->abcxyzp", _HALVES, parts)
-        parts = parts.reshape(3, 3, 3, -1)
-        owner = np.tile(owner, 8)
-        inverted[owner[~(parts[::2, ::2, ::2] > 0).all(axis=(0, 1, 2))]] = True
-        open_ = ~(parts > 0).all(axis=(0, 1, 2)) & ~inverted[owner]
-        parts = parts[..., open_]
-        owner = owner[open_]
-    status = np.where(inverted, INVERTED, VALID).astype(np.uint8)
-    status[owner] = UNPROVEN
+    status = np.empty(coefficients.shape[-1], np.uint8)
+    _write_status(np.ascontiguousarray(np.moveaxis(coefficients, -1, 0)), levels, status)
     return status
+
+
+@njit
+def _write_status(polynomials, levels, status):  # type: ignore[no-untyped-def]
+    left = np.empty((7 * levels + 1, 3, 3, 3))  # parts that are still to be cut
+    depth = np.zeros(len(left), np.int64)
+    halves = np.empty((5, 5, 5))
+    for p in range(len(polynomials)):
+        status[p] = VALID
+        left[0] = polynomials[p]
+        depth[0] = 0
+        count = 1
+        while count > 0 and status[p] != INVERTED:
+            count -= 1
+            level = depth[count] + 1
+            if level > levels:
+                status[p] = UNPROVEN
+                continue
+            _halve(left[count], halves)
+            if not (halves[::2, ::2, ::2] > 0.0).all():
+                status[p] = INVERTED
+                continue
+            for i in range(0, 3, 2):
+                for j in range(0, 3, 2):
+                    for k in range(0, 3, 2):
+                        part = halves[i : i + 3, j : j + 3, k : k + 3]
+                        if not (part > 0.0).all():
+                            left[count] = part
+                            depth[count] = level
+                            count += 1
+
+
+@njit
+def _halve(whole, out):  # type: ignore[no-untyped-def]
+    """Write the coefficients (5, 5, 5) of a polynomial's eight parts, which share their sides."""
+    out[::2, ::2, ::2] = whole
+    for j in range(0, 5, 2):
+        for k in range(0, 5, 2):
+            _halve_line(out[:, j, k])
+    for i in range(5):
+        for k in range(0, 5, 2):
+            _halve_line(out[i, :, k])
+        for j in range(5):
+            _halve_line(out[i, j])
+
+
+@njit
+def _halve_line(line):  # type: ignore[no-untyped-def]
+    line[1] = 0.5 * (line[0] + line[2])
+    line[3] = 0.5 * (line[2] + line[4])
+    line[2] = 0.5 * (line[1] + line[3])
 
 
 LANES = 64
