@@ -154,7 +154,7 @@ class Command:
         if not has_mesh(now):
             return self.why_not or NO_MESH
         return now.session.lacks_cells or (
-            WAIT if now.busy else self.why_not or "Not possible now."
+            WAIT if now.busy else self.why_not or "Not possible with this mesh."
         )
 
 
@@ -395,17 +395,17 @@ _FILE = Menu("file", "&File", entries=(
 ), tooltips=True)
 
 _COPY_AS = Menu("copy_as", "&Copy as", "Copy what makes again what is shown, to be pasted.", tuple(
-    Command(f"copy_{what}_{place}", f"{title} {words}",
+    Command(f"copy_{what}_{place}", f"Copy {title} {words}",
             f"Copy {about} {words}: what differs from the case file is in it.",
             call("exports.copy_as", what, place), keys, enabled=able, why_not=why)
     for place, words in enumerate(("as a command", "as Python"))
     for what, title, about, keys, able, why in (
-        ("picture", "&View", "the picture of the view, with the run it shows,",
+        ("picture", "&view", "the picture of the view, with the run it shows,",
          (("Ctrl+Alt+C", "Ctrl+Alt+P")[place],), has_file, _NO_FILE),
-        ("section", "&Section", "the picture of the selected section", (), has_section,
+        ("section", "&section", "the picture of the selected section", (), has_section,
          "Select a section of a saved case first."),
-        ("film", "&Film", "the film of the steps", (), has_run_of_file, _NO_STEPS),
-        ("run", "&Run", "the run", (), has_file, _NO_FILE),
+        ("film", "&film", "the film of the steps", (), has_run_of_file, _NO_STEPS),
+        ("run", "&run", "the run", (), has_file, _NO_FILE),
     )
 ), tooltips=True)
 
@@ -579,13 +579,12 @@ _VIEW = Menu("view", "&View", entries=(
 ))
 
 _HELP = Menu("help", "&Help", entries=(
-    Command("palette", "&Find anything…",
-            "Find commands, boundaries, runs, keys of the case and pages of the manual.",
-            call("help.palette"), ("Ctrl+Shift+P",), short="Find…"),
     Command("manual", "&Manual", "Read and search the pages of the documentation.",
             call("help.manual"), ("Shift+F1",)),
-    Command("shortcuts", "&Keyboard and mouse", "Show all keys and what the mouse does.",
-            call("help.shortcuts"), ("F1",)),
+    Command("palette", "&Find anything…",
+            "Find commands, boundaries, runs, keys of the case, pages of the manual, and what keys "
+            "and mouse do.",
+            call("help.palette"), ("F1", "Ctrl+Shift+P"), short="Find…"),
     Command("case_keys", "Case &keys", "Show and search the keys of a case file.",
             call("help.case_keys")),
     Command("copy_details", "&Copy details for a bug report",

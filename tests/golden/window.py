@@ -230,7 +230,7 @@ def tell_dialogs(desk: Desk, window, place: Path) -> None:
         for able in (("session",), ("session", "case"), ("session", "case", "mesh"), ("table",)):
             ask_unsaved(window, "Save it?\nIt would be lost.", able)
         window.exports.picture()
-    window.help.shortcuts()
+    window.help.palette()
     window.help.about()
     window.exports.make_film()
     settle(window)

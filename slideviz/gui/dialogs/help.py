@@ -22,7 +22,6 @@ from qtpy.QtWidgets import (
     QApplication,
     QDialog,
     QDialogButtonBox,
-    QHeaderView,
     QLabel,
     QLineEdit,
     QPlainTextEdit,
@@ -40,7 +39,7 @@ from slideviz import __version__
 from slideviz.case.cfg import describe_keys
 from slideviz.case.keys import KEYS, Key
 from slideviz.case.words import counted
-from slideviz.gui.commands import COMMANDS, MENUS, CommandState
+from slideviz.gui.commands import COMMANDS, CommandState
 from slideviz.gui.widgets.build import (
     dialog_buttons,
     fixed_font,
@@ -56,7 +55,6 @@ from slideviz.gui.widgets.theme import logo
 from slideviz.session import changes
 from slideviz.session.panes import run_title
 
-NATIVE = QKeySequence.SequenceFormat.NativeText
 RECENT = 12  # entries that the palette has first, as they were chosen last
 LOG_LINES = 40  # number of the log's last lines in a bug report
 CLOSE = QDialogButtonBox.StandardButton.Close
@@ -107,9 +105,6 @@ class Help(QObject):
         self.window = window
         self._shown: dict[str, Any] = {}
 
-    def shortcuts(self) -> None:
-        self._show("shortcuts", lambda: ShortcutsDialog(self.window))
-
     def case_keys(self, wanted: str = "") -> None:
         """Show all keys of a case, at a wanted text."""
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
@@ -129,9 +124,8 @@ class Help(QObject):
             self._shown["manual"].pages.show_page(page)
 
     def palette(self) -> None:
-        dialog = PaletteDialog(self)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
+        self._show("palette", lambda: PaletteDialog(self))
+        self._shown["palette"].refresh()
 
     def show_key(self, key: Key) -> None:
         """Go to the field of a key of the case, or else show it among all keys."""
@@ -206,79 +200,39 @@ def show_matching(above: QTreeWidgetItem, matches: Callable[[QTreeWidgetItem], b
     return count
 
 
-class ShortcutsDialog(SearchDialog):
-    """The dialog with the shortcuts of all commands, by menu, and of the mouse, with a filter."""
-
-    def __init__(self, window: Services) -> None:
-        title = "Keyboard and mouse"
-        super().__init__(window, title, QSize(1060, 700), "Find an action or a key")
-        self.count.setText("Nothing found")
-        self.count.hide()
-        self.tree = QTreeWidget()
-        self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
-        self.tree.setRootIsDecorated(False)
-        self.tree.setIndentation(14)
-        self.tree.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        for title, rows in shortcut_rows(window):
-            self._add(title, rows)
-        self._add("In the panels", list(PANELS))
-        self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
-        header = self.tree.header()
-        for column in (0, 1):
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        self.lay_out(self.tree)
-
-    def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
-        top = QTreeWidgetItem(self.tree, [title])
-        font = top.font(0)
-        font.setBold(True)
-        top.setFont(0, font)
-        top.setFlags(Qt.ItemFlag.ItemIsEnabled)
-        for text, keys, tip in rows:
-            row = QTreeWidgetItem(top, [text, keys, tip])
-            row.setToolTip(2, tip)
-        top.setExpanded(True)
-
-    def look_for(self, wanted: str) -> None:
-        words = wanted.strip().lower()
-
-        def matches(row: QTreeWidgetItem) -> bool:
-            texts = " ".join(row.text(column) for column in range(3))
-            return row.parent() is not None and words in texts.lower()
-
-        self.count.setVisible(not show_matching(self.tree.invisibleRootItem(), matches))
-
-
 class Entry(NamedTuple):
     """A row of the palette."""
 
     title: str
+    keys: str
     about: str
-    """Its shortcut, or what it is; of what cannot be done now, why."""
-    do: Callable[..., object]
-    able: bool = True
+    """What it does or is; of a command that is disabled, why."""
+    do: Callable[..., object] | None = None
+    """Does it; None where that is not possible from here."""
 
 
 def palette_entries(helper: Help) -> Iterator[Entry]:
-    """Yield commands, boundaries, runs, keys of the case and pages of the manual, in this order."""
+    """Yield commands, boundaries, runs, keys of the case, pages, and what keys and mouse do."""
     window = helper.window
-    for name in COMMANDS:
-        act = window.findChild(QAction, name)
-        able = act.isEnabled()
-        about = act.shortcut().toString(NATIVE) if able else act.whatsThis()
-        if act.isVisible():
-            yield Entry(_plain(act.text()), about, act.trigger, able)
     session = window.store.session
+    now = CommandState(session)  # a plain one: no title such as “Undo role”
+    for name, command in COMMANDS.items():
+        act = window.findChild(QAction, name)
+        about, do = (command.tip, act.trigger) if act.isEnabled() else (act.whatsThis(), None)
+        keys = act.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+        yield Entry(command.called(now).replace("&", "").rstrip("…"), keys, about, do)
     change = partial(partial, window.store.change)
     for name in session.mesh.marker_names if session.mesh is not None else ():
-        yield Entry(name, "boundary", change(changes.select, [name]))
+        yield Entry(name, "", "boundary", change(changes.select, [name]))
     for run in session.runs:
-        yield Entry(run_title(run, session.runs), "run", change(changes.show_run, run.number))
+        yield Entry(run_title(run, session.runs), "", "run", change(changes.show_run, run.number))
     for key in KEYS.values():
-        yield Entry(key.name, key.label or "key of the case", partial(helper.show_key, key))
+        yield Entry(key.name, "", key.meaning, partial(helper.show_key, key))
     folder = manual_folder()
     for _, path in manual_pages(folder) if folder is not None else ():
-        yield Entry(page_title(path), "page of the manual", partial(helper.manual, path))
+        yield Entry(page_title(path), "", "page of the manual", partial(helper.manual, path))
+    yield from (Entry(what, keys, about or "in its panel") for what, keys, about in PANELS)
+    yield from (Entry(what, keys, "mouse") for keys, what in MOUSE)
 
 
 class PaletteDialog(SearchDialog):
@@ -286,20 +240,25 @@ class PaletteDialog(SearchDialog):
 
     def __init__(self, helper: Help) -> None:
         words = "Find a command, boundary, run, key or page (Enter does it)"
-        super().__init__(helper.window, "Find anything", QSize(820, 520), words)
-        self.settings = helper.window.settings
-        self.entries = list(palette_entries(helper))
+        super().__init__(helper.window, "Find anything", QSize(1060, 700), words)
+        self.count.setText("Nothing found")
+        self.helper = helper
         self.tree = QTreeWidget()
-        self.tree.setHeaderLabels(["Name", "Key, or what it is"])
-        self.tree.setColumnWidth(0, 400)
+        self.tree.setHeaderLabels(["Name", "Keys", "What it does"])
+        for column, width in enumerate((360, 170)):
+            self.tree.setColumnWidth(column, width)
         self.tree.setRootIsDecorated(False)
         self.tree.itemActivated.connect(self._do)
         self.lay_out(self.tree)
-        self.look_for("")
+
+    def refresh(self) -> None:
+        """Take the present commands, boundaries and runs."""
+        self.entries = list(palette_entries(self.helper))
+        self.look_for(self.search.text())
 
     @property
     def _recent(self) -> list[str]:
-        return list(self.settings.value("palette") or ())
+        return list(self.helper.window.settings.value("palette") or ())
 
     def look_for(self, wanted: str) -> None:
         recent = self._recent
@@ -308,15 +267,17 @@ class PaletteDialog(SearchDialog):
 
         def rank(entry: Entry) -> tuple[bool, bool, int]:
             done = recent.index(entry.title) if entry.title in recent else RECENT
-            return near not in entry.title.lower(), not entry.able, done
+            return near not in entry.title.lower(), entry.do is None, done
 
         self.tree.clear()
         for entry in sorted(self.entries, key=rank):
-            if letters.search(entry.title.lower()) or near in entry.about.lower():
-                item = QTreeWidgetItem(self.tree, entry[:2])
+            others = f"{entry.keys} {entry.about}".lower()
+            if letters.search(entry.title.lower()) or near in others:
+                item = QTreeWidgetItem(self.tree, entry[:3])
                 item.setData(0, PATH, entry)
-                item.setToolTip(1, entry.about)
-                item.setDisabled(not entry.able)
+                item.setToolTip(2, entry.about)
+                item.setDisabled(entry.do is None)
+        self.count.setVisible(not self.tree.topLevelItemCount())
         self.tree.setCurrentIndex(self.tree.model().index(0, 0))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -325,9 +286,9 @@ class PaletteDialog(SearchDialog):
 
     def _do(self, item: QTreeWidgetItem) -> None:
         entry = item.data(0, PATH)
-        if entry.able:
+        if entry.do is not None:
             recent = dict.fromkeys([entry.title, *self._recent])
-            self.settings.setValue("palette", list(recent)[:RECENT])
+            self.helper.window.settings.setValue("palette", list(recent)[:RECENT])
             self.accept()
             entry.do()
 
@@ -382,25 +343,6 @@ class AboutDialog(QDialog):
         self.copy.clicked.connect(lambda: QApplication.clipboard().setText(versions()))
         head = in_row(picture, 8, title, wide=[title])
         self.setLayout(in_column(head, self.text, licence, buttons))
-
-
-def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """Return per menu its title, and title, first key and tip of each command that has a key."""
-    # A plain `CommandState`: no title such as “Undo role”.
-    now = CommandState(window.store.session)
-    rows = {
-        menu.title: [
-            (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(NATIVE), one.tip)
-            for one in menu.commands()
-            if one.keys
-        ]
-        for menu in MENUS
-    }
-    return [(_plain(title), found) for title, found in rows.items() if found]
-
-
-def _plain(title: str) -> str:
-    return title.replace("&", "").rstrip("…")
 
 
 def details(window: Services) -> str:
