@@ -33,6 +33,8 @@ THIN = 0.3
 
 WORST = 5.0  # kappa
 
+LEAST = 1e-3  # part of a cell's largest curvature that others have at least
+
 FLAT = 1e-12  # Jacobian of an undeformed corner over the product of its edges; flatter are left out
 
 
@@ -104,6 +106,34 @@ class Distortion:
 
     def product(self, x: FloatArray, t: FloatArray) -> FloatArray:
         """Return the Hessian at x (n, d), where no cell is folded, times t (n, d)."""
+        return self._by_node(self._products(x, t))
+
+    def stiffness(self, x: FloatArray) -> FloatArray:
+        """Return the mean curvatures of cells at x (n, d) by rows of their maps F, (m, d, d, d).
+
+        Of each cell, the matrix of each row; what is not positive in it is left out.
+        """
+        d = x.shape[1]
+        out = np.empty((self.count, d, d, d))
+        for i, j in np.ndindex(d, d):
+            stretch = np.zeros_like(x)
+            stretch[:, i] = self.points[:, j]
+            each = self._products(x, stretch)[:, i]
+            first = 0
+            cell = 0
+            for part in self.parts:
+                m, n = part.nodes.shape
+                edges = self.points[part.nodes] - self.points[part.nodes[:, :1]]
+                pulls = each[first : first + m * n].reshape(m, n)
+                out[cell : cell + m, i, j] = np.einsum("mn,mnk->mk", pulls, edges)
+                first += m * n
+                cell += m
+        size, along = np.linalg.eigh(out)
+        size = np.maximum(size, LEAST * np.abs(size).max(axis=-1, keepdims=True))
+        return np.einsum("mixk,mik,miyk->mixy", along, size, along)
+
+    def _products(self, x: FloatArray, t: FloatArray) -> FloatArray:
+        """Return the Hessians of cells at x (n, d) times t (n, d), for the corners of each."""
         x = sealed(np.ascontiguousarray(x))
         t = sealed(np.ascontiguousarray(t))
 
@@ -119,7 +149,7 @@ class Distortion:
                 out,
             )
 
-        return self._by_node(self._by_corner(add))
+        return self._by_corner(add)
 
     def _by_corner(self, add: Callable[[Part, slice, slice, FloatArray], None]) -> FloatArray:
         """Return what ``add`` writes for the corners of all cells, one after the other."""
@@ -430,26 +460,40 @@ def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ig
 
 
 @njit
-def write_laplacians(points, nodes, table, coupling, out):  # type: ignore[no-untyped-def]
-    """Write ``1 + lam`` times the mean over corners of grad N_a . grad N_b to ``out`` (m, n, n)."""
+def write_laplacians(points, nodes, table, weight, out):  # type: ignore[no-untyped-def]
+    """Write the mean over corners of grad N_a . W grad N_b, with W (m, d, d), to out (m, n, n)."""
     n = nodes.shape[1]
     d = points.shape[1]
     start = np.zeros((3, n, LANES))
     entries = np.empty((n, n, LANES))
     scale = np.empty(LANES)
     products = np.empty((3, 3, LANES))
+    w = np.zeros((3, 3, LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, start)
+        for c in range(count):
+            for a in range(d):
+                for b in range(d):
+                    w[a, b, c] = weight[first + c, a, b] / len(table)
         entries[:] = 0.0
         for corner in table:
             ends = _ends(corner)
             _write_scales(start, ends, scale)
             for c in range(LANES):
                 duals = _duals(start, ends, scale[c], c)
-                for a in range(3):
-                    for b in range(3):
-                        products[a, b, c] = dot3(duals[a], duals[b])
+                for b in range(3):
+                    x, y, z = duals[b]
+                    one = _mixed(
+                        x,
+                        (w[0, 0, c], w[1, 0, c], w[2, 0, c]),
+                        y,
+                        (w[0, 1, c], w[1, 1, c], w[2, 1, c]),
+                        z,
+                        (w[0, 2, c], w[1, 2, c], w[2, 2, c]),
+                    )
+                    for a in range(3):
+                        products[a, b, c] = dot3(duals[a], one)
             o = corner[0]
             for a in range(d):
                 for b in range(d):
@@ -464,7 +508,6 @@ def write_laplacians(points, nodes, table, coupling, out):  # type: ignore[no-un
                     for c in range(LANES):
                         entries[o, o, c] += products[a, b, c]
         for c in range(count):
-            share = (1.0 + coupling[first + c]) / len(table)
             for i in range(n):
                 for j in range(n):
-                    out[first + c, i, j] = share * entries[i, j, c]
+                    out[first + c, i, j] = entries[i, j, c]

@@ -86,17 +86,31 @@ class LaplacianCycle:
 
     @classmethod
     def of(
-        cls, body: Distortion, place: IntArray, held: np.ndarray, axes: FloatArray
+        cls,
+        body: Distortion,
+        place: IntArray,
+        held: np.ndarray,
+        axes: FloatArray,
+        at: FloatArray | None = None,
     ) -> LaplacianCycle:
-        """Return the cycle of an elastic body.
+        """Return the cycle of an elastic body, or of its curvatures at positions ``at`` (n, d).
 
         ``place`` (n,) is the number of each node's unknown, -1 for known nodes.
         ``held`` (k, d): which components of the unknowns stay zero. Rows of ``axes`` (k, d, d) or
         (d, d) are the axes of these components: orthonormal, (d, d) for Cartesian ones.
         """
-        matrix = laplacian(body, place, len(held))
-        columns = {column.tobytes(): column for column in held.T}  # each once
-        group = [list(columns).index(column.tobytes()) for column in held.T]
+        names: list[object] = [column.tobytes() for column in held.T]
+        weights: list[FloatArray | None] = [None]
+        if at is not None:
+            stiffness = body.stiffness(at)
+            if axes.ndim == 3:
+                stiffness[:] = stiffness.mean(axis=1, keepdims=True)
+            names = list(range(held.shape[1]))
+            weights = [stiffness[:, component] for component in range(held.shape[1])]
+        each = [laplacian(body, place, len(held), weight) for weight in weights]
+        matrix = *each[0][:2], np.concatenate([data for *_, data in each], axis=1)
+        columns = dict(zip(names, held.T, strict=True))  # each once
+        group = [list(columns).index(name) for name in names]
         free = ~np.stack(list(columns.values()), axis=1)
         levels, factors = _hierarchy(matrix, free.astype(float))
         # A plane has a third component, which is zero.
@@ -232,8 +246,12 @@ def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:
     return indptr, indices, data
 
 
-def laplacian(body: Distortion, place: IntArray, count: int) -> Sparse:
+def laplacian(
+    body: Distortion, place: IntArray, count: int, weight: FloatArray | None = None
+) -> Sparse:
     """Return the matrix (count, count) of the Laplacian; ``place`` as of `LaplacianCycle.of`.
+
+    ``weight`` (m, d, d): what the gradients in each cell are multiplied by; None: 1 + lam.
 
     Each row has its diagonal, which is less the sum of the others and of those of known nodes:
     entries are rounded to single precision, but constants still have no energy.
@@ -241,11 +259,14 @@ def laplacian(body: Distortion, place: IntArray, count: int) -> Sparse:
     sizes = np.array([part.nodes.shape for part in body.parts], np.int64).reshape(-1, 2)
     entries = np.empty(int((sizes[:, 0] * sizes[:, 1] ** 2).sum()), np.float32)
     first = 0
+    cell = 0
     for part in body.parts:
         m, a = part.nodes.shape
+        own = None if weight is None else weight[cell : cell + m]
+        cell += m
         mine = entries[first : first + m * a * a].reshape(m, a, a)
         first += m * a * a
-        in_parts(partial(_write_part, body.points, part, mine), m)
+        in_parts(partial(_write_part, body.points, part, own, mine), m)
     corners = np.concatenate([place[part.nodes].ravel() for part in body.parts]).astype(np.int32)
     starts, order = by_node(corners + 1, count + 1)
     graph = starts[1:], order, corners, sizes
@@ -259,8 +280,12 @@ def laplacian(body: Distortion, place: IntArray, count: int) -> Sparse:
     return indptr, indices, data
 
 
-def _write_part(points: FloatArray, part: Part, out: np.ndarray, rows: slice) -> None:
-    write_laplacians(points, part.nodes[rows], CORNERS[part.vtk], part.coupling[rows], out[rows])
+def _write_part(
+    points: FloatArray, part: Part, weight: FloatArray | None, out: np.ndarray, rows: slice
+) -> None:
+    plain = (1.0 + part.coupling[rows])[:, None, None] * np.eye(points.shape[1])
+    own = plain if weight is None else np.ascontiguousarray(weight[rows])
+    write_laplacians(points, part.nodes[rows], CORNERS[part.vtk], own, out[rows])
 
 
 def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> LaplacianLevel:

@@ -38,28 +38,33 @@ from slideviz.rbf.tape import Array, multiply, put, recorded, take, value
 WINDOW = 3
 NEAR = 0.15
 
-RESIDUAL = 1e-2
-SMALL = 5000
+SOON = 0.05
+SMALL = 10_000
+RESIDUAL = 1.4e-2
 LOOSE = 0.1
-"""The residual at which a run ends: its square is the part of the energy that an iteration takes
-away, the mean over the last `WINDOW`. `RESIDUAL` is that of meshes of up to `SMALL` cells; it grows
-with the root of their number up to `LOOSE`, since the time grows, and what could be gained concerns
-fewer and fewer of them. `NEAR`: the one at which the term for the worst cells joins."""
+"""The residual at which L-BFGS ends: its square is the part of the energy that an iteration takes
+away, the mean over the last `WINDOW`. `SOON`: where derivatives are wanted, for which Newton's
+method goes on. `RESIDUAL`: that of meshes of up to `SMALL` cells, where it goes on as well, if not
+as far. That of others grows with the root of their number up to `LOOSE`, since the time grows, and
+what could be gained concerns fewer and fewer of them. `NEAR`: the one at which the term for the
+worst cells joins."""
 
 SURE = 0.1
 """An iteration that promises to take away less than this part of that is the last one."""
 
-CLOSE = 1e-3
 NEWTON = 40
+ALIKE = 3e-11
 STILL = 1e-14
 SEEN = 1e-6
-"""The residual from which Newton's method goes on where derivatives are wanted; its most steps; the
-step, as a part of the extent, that ends it; and that from which on energies differ by more than
-rounding, so that the step is searched."""
+"""Most steps of Newton's method; how far from the least energy it ends, as a part of the extent, so
+that the same mesh in other axes or numbers has the same result, and where derivatives are wanted;
+and the step from which on energies differ by more than rounding, so that the step is searched."""
 
 BEND = 1e-6  # step, as a part of the extent, by which changes of walls are found
 
-FORCING = 1e-3  # residual of its linear systems
+FORCING = 0.03
+SHARP = 1e-3
+"""Largest and smallest residual of its linear systems."""
 
 PAIRS = 6  # of steps and changes of the gradient that are remembered
 
@@ -74,8 +79,9 @@ AT_REST = 1e-20  # energy of a cell that counts as nothing
 SOLVED = 1e-13
 PRODUCTS = 5000
 STEPS = 300
+SURELY = 100
 """Residual of the linear systems of derivatives, most products with the Hessian, and most of a step
-of Newton's method."""
+of Newton's method where derivatives are wanted, and in a run."""
 
 Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
 """Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
@@ -167,9 +173,14 @@ class Relaxation:
             if self.converged and problem.curved:
                 walls = problem.choose("walls", lambda: way_on(walls).frozen_walls(tick))
             way = way_on(walls)
-            way.go(tick, CLOSE if self.converged else _residual(made.energy.count))
             if self.converged:
-                way.finish()
+                way.go(tick, SOON)
+                way.finish(STILL)
+            else:
+                size = max(1.0, made.energy.count / SMALL)
+                unfolded = way.go(tick, min(RESIDUAL * np.sqrt(size), LOOSE))
+                if unfolded and size == 1.0:
+                    way.finish(ALIKE)
             start = points(self.body.frame, problem.coords + displacement)
             end = recorded(
                 way.x,
@@ -215,6 +226,7 @@ class _Way:
         self._frame = relaxation.body.frame
         self._energy = made.energy
         self._cycle = made.cycle
+        self._wanted = made.wanted
         self._walls = walls
         self._extent = relaxation.mesh.extent
         self._sliding = np.concatenate([problem.edge, problem.surface])
@@ -230,8 +242,11 @@ class _Way:
         self.iterations = 0
         self.residual = 0.0
 
-    def go(self, tick: Tick, residual: float) -> None:
-        """Go to the least energy, with regularisation as long as corners are folded."""
+    def go(self, tick: Tick, residual: float) -> bool:
+        """Go near the least energy, with regularisation as long as corners are folded.
+
+        Return whether none is.
+        """
         memory = Memory(len(self._unknowns.owner) * self.x.shape[1], self._preconditioned, PAIRS)
         least = self._energy.slopes(self.x, 0.0, 1.0)[2]
         folded = np.count_nonzero(least <= 0.0)
@@ -244,15 +259,16 @@ class _Way:
         if least.min() > 0.0:
             self._descend(memory, tick, NEAR, 0.0)
             self._descend(memory, tick, residual, WORST)
-            return
+            return True
         self.residual = 1.0
         if np.count_nonzero(least <= 0.0) > folded:
             self._go_to(self._begin)
+        return False
 
     def frozen_walls(self, tick: Tick) -> Walls:
         """Return the walls of sliding nodes, flat as they are where these come to lie."""
-        self.go(tick, CLOSE)
-        self.finish()
+        self.go(tick, SOON)
+        self.finish(STILL)
         nodes = self._sliding
         end = self._coords_of(self.x, nodes) - self._coords[nodes]
         d = end.shape[1]
@@ -275,23 +291,42 @@ class _Way:
         anchor = self._coords[nodes] + end
         return Walls(lambda _: rows, FlatWalls(anchor, free @ np.swapaxes(free, 1, 2)))
 
-    def finish(self) -> None:
-        """Go on by Newton's method, until rounding is all that moves."""
+    def finish(self, still: float) -> None:
+        """Go on by Newton's method, until all nodes are within ``still`` of their places.
+
+        ``still``: a part of the extent. A run ends where a step is not found in `SURELY` products
+        with the Hessian, as with cells 1e5 times as long as they are thick.
+        """
+        most = STEPS if still == STILL else SURELY
+        before = 0.0
+        last = np.inf
+        left = 1.0
         for _ in range(NEWTON):
-            now, slopes, _ = self._energy.slopes(self.x)
-            gradient = self._unknowns.collected(slopes)
-            step = -self._solved(gradient, FORCING)
-            farthest = np.abs(self._unknowns.moved(step)).max()
+            if left == 1.0:
+                self._cycle = LaplacianCycle.of(self._energy, *self._wanted, self.x)
+            along = self._function(WORST, 0.0)
+            nothing = np.zeros((len(self._unknowns.owner), self.x.shape[1]))
+            now, gradient = along(nothing)
+            step, size, left = self._solved(-gradient, most, before)
+            found_all = left < 1.0
+            farthest = float(np.abs(self._unknowns.moved(step)).max())
+            slope = dot(gradient.ravel(), step.ravel())
             if farthest > SEEN * self._extent:
-                slope = dot(gradient.ravel(), step.ravel())
-                along = self._function(WORST, 0.0)
-                found = line_search(along, np.zeros_like(step), now, step, slope, 1.0)
+                found = line_search(along, nothing, now, step, slope, 1.0)
                 if found is None:
                     break
                 step *= found[0]
+                left = left if found[0] == 1.0 else 1.0
             self._go_to(self._placed(self.x + self._unknowns.moved(step)))
-            if farthest <= STILL * self._extent:
+            self.iterations += 1
+            if farthest * max(left, farthest / last) <= still * self._extent:
+                nothing_left = AT_REST * self._energy.count
+                self.residual = float(np.sqrt(max(-slope, 0.0) / max(now, nothing_left)))
                 break
+            if not (found_all or still == STILL):
+                break
+            before = size
+            last = farthest
 
     def _function(self, worst: float, epsilon: float) -> Function:
         """Return the energy and its slopes by the unknowns, after a step of these (k, d)."""
@@ -374,11 +409,11 @@ class _Way:
         """Return how positions at the least energy change as those at the start do by t (n, d)."""
         known = np.where(self._unknowns.place[:, None] < 0, t, 0.0)
         right = self._unknowns.collected(self._energy.product(self.x, known))
-        return known - self._unknowns.moved(self._solved(right))
+        return known - self._unknowns.moved(self._solved(right)[0])
 
     def pulled(self, g: FloatArray) -> FloatArray:
         """Return the transpose of `pushed`, times g (n, d)."""
-        left = self._unknowns.moved(self._solved(self._unknowns.collected(g)))
+        left = self._unknowns.moved(self._solved(self._unknowns.collected(g))[0])
         out = g - self._energy.product(self.x, left)
         return np.where(self._unknowns.place[:, None] < 0, out, 0.0)
 
@@ -409,10 +444,15 @@ class _Way:
         change = self._unknowns.collected(self._energy.product(self.x, self._unknowns.moved(step)))
         return change + np.einsum("kij,kj->ki", self._bends, self._unknowns.within(step))
 
-    def _solved(self, right: FloatArray, residual: float = SOLVED) -> FloatArray:
+    def _solved(
+        self, right: FloatArray, most: int = PRODUCTS, before: float | None = None
+    ) -> tuple[FloatArray, float, float]:
         """Return the solution (k, d) of the Hessian of the unknowns, by conjugate gradients.
 
-        A step of Newton's method ends where the energy is not convex (Steihaug 1983).
+        And the size of the right-hand side, and the part of it that is left. ``before``, of a step
+        of Newton's method: the size at the step before, or 0. The nearer the least energy, the less
+        is left (Eisenstat and Walker 1996); and it ends where the energy is not convex (Steihaug
+        1983). ``most``: products with the Hessian.
         """
         found = np.zeros_like(right)
         left = right.copy()
@@ -420,33 +460,32 @@ class _Way:
         along = steep
         size = dot(left.ravel(), steep.ravel())
         first = size
-        newton = residual > SOLVED
-        for _ in range(STEPS if newton else PRODUCTS):
-            if size <= residual**2 * first:
-                return found
+        newton = before is not None
+        goal = SOLVED
+        if before is not None:
+            goal = float(np.clip(first / before if before else 1.0, SHARP, FORCING))
+        for _ in range(most):
+            if size <= goal**2 * first:
+                return found, first, goal
             change = self._hessian(along)
             curvature = dot(along.ravel(), change.ravel())
             if not np.isfinite(curvature):  # of a cell that is folded still
                 break
             if curvature <= 0.0 and newton:
-                return found if found.any() else along
+                return found if found.any() else along, first, 1.0
             length = size / curvature
             found += length * along
             left -= length * change
             steep = self._preconditioned(left)
-            before = size
-            size = dot(left.ravel(), steep.ravel())
-            along = steep + size / before * along
+            after = dot(left.ravel(), steep.ravel())
+            along = steep + after / size * along
+            size = after
         if newton:
-            return found
+            return found, first, 1.0
         raise DeformError(
             "the relaxed mesh does not converge to where its energy is least, which derivatives "
             "need; use a smaller motion, or RELAX= NO"
         )
-
-
-def _residual(cells: int) -> float:
-    return float(np.clip(RESIDUAL * np.sqrt(cells / SMALL), RESIDUAL, LOOSE))
 
 
 def _held(axes: FloatArray, unknowns: Unknowns) -> np.ndarray:
