@@ -198,7 +198,9 @@ class _Writer:
             return {"class": made.__name__, **fields}
         if isinstance(value, Mapping):
             return {key: self.encoded(each, f"{place}/{key}") for key, each in value.items()}
-        if isinstance(value, tuple | Set):
+        if isinstance(value, Set):
+            value = tuple(sorted(value))  # the same session makes the same file
+        if isinstance(value, tuple):
             return [self.encoded(each, f"{place}/{k}") for k, each in enumerate(value)]
         return {"path": str(value)} if isinstance(value, Path) else value
 
