@@ -30,9 +30,10 @@ ARROW_PX = 86.0
 HEAD_PX = 15.0
 RING_PX = 62.0
 BOX_PX = 104.0
+SIZE_PX = 25.0
 SQUARE_PX = (24.0, 40.0)
-"""Lengths in pixels from the middle: an arrow's tip, its head, a ring, the box that enlarges, and
-the near and far side of the square that moves in a plane."""
+"""Lengths in pixels from the middle: an arrow's tip, its head, a ring, the box that enlarges, the
+tips of the two arrows that change a size, near and far side of the square that moves in a plane."""
 BALL_PX = 7.0
 HALF_PX = 5.0  # `BALL_PX`, `HALF_PX`: radius of a ball, half a box, in pixels
 WIDE_PX = 3.0  # width of shafts and rings
@@ -40,7 +41,7 @@ REACH_PX = 8.0  # distance up to which the mouse takes a part
 EDGE_PX = 22.0  # distance that the middle keeps from the edges of the view
 SHORT = 0.15  # foreshortening from which on an arrow or a square is not there
 STEEP = 0.15  # slope in pixels, relative to that across the line of sight, that is too small
-STEPS = {"move": 20.0, "grow": 20.0}  # least distance in pixels of snapped values
+STEP_PX = 20.0  # least distance of snapped values, in pixels; finely a tenth
 ANGLES = (5.0, 1.0)  # degrees to which angles snap, and finely
 FINE = 0.1  # how far the mouse moves things with Shift, relative to without
 _TURNS = 64  # straight pieces of a ring
@@ -169,7 +170,7 @@ class Drag:
         value, unit = on_path(
             projection, lambda to: number.path(to, self.point), number.value, at + by
         )
-        step = ANGLES if number.circle else (nice(STEPS["move"] * unit), nice(2.0 * unit))
+        step = ANGLES if number.circle else (nice(STEP_PX * unit), nice(FINE * STEP_PX * unit))
         return self._even(0.0, value, unit, *step)
 
     def _even(self, start: float, value: float, unit: float, step: float, small: float) -> float:
@@ -199,7 +200,7 @@ class Drag:
             if np.abs(change).max() < 1e-4 * unit:
                 break
         units = unit / np.linalg.norm(slopes, axis=0)
-        sizes = [nice((2.0 if self.fine else 20.0) * each) for each in units]
+        sizes = [nice((FINE if self.fine else 1.0) * STEP_PX * each) for each in units]
         pairs = zip(numbers, units, sizes, strict=True)
         even = [self._even(0.0, value, each, size, size) for value, each, size in pairs]
         kept = np.where(np.abs(numbers - first) > 1e-9 * units, even, first)
@@ -271,15 +272,9 @@ def _move(placed: Placed, projection: Projection, grip: Grip, scale: Scale) -> P
     way = placed.axes[axes[0]]
     if np.linalg.norm(np.cross(way, sight)) < SHORT:
         return None
-    lengths = (BALL_PX, ARROW_PX - HEAD_PX, ARROW_PX)
-    points = origin + unit * np.outer(lengths, way)
-    root, neck, tip = projection.pixels(points)
-    side = _across(neck - root)
-    wing = 0.4 * HEAD_PX * ratio * side
-    shapes = [
-        _bar(np.stack([root, neck]), WIDE_PX * ratio)[0],
-        np.stack([tip, neck + wing, neck - wing]),
-    ]
+    points = origin + unit * np.outer((BALL_PX, ARROW_PX), way)
+    root, tip = projection.pixels(points)
+    shapes = _arrow(root, tip, ratio)
     return Part(grip, shapes, np.stack([root, tip]), AXIS_COLORS[axes[0]], points[1])
 
 
@@ -297,10 +292,10 @@ def _grow(placed: Placed, projection: Projection, grip: Grip, scale: Scale) -> P
         there = projection.pixels(number.path(number.value + step * unit, edge)[None])[0] - middle
         length = float(np.linalg.norm(there))
         way = there / length if length > STEEP * ratio else np.array([0.0, 1.0])
-        shapes = [_disc(BALL_PX * ratio)]
+        shapes = [middle + _disc(BALL_PX * ratio)]
         for sign in (1.0, -1.0):
-            shapes += [sign * ratio * arrow @ np.stack([way, _across(way)]) for arrow in _DOUBLE]
-        return Part(grip, [middle + shape for shape in shapes], middle[None], AXIS_COLORS[2], edge)
+            shapes += _arrow(middle, middle + sign * SIZE_PX * ratio * way, 0.6 * ratio)
+        return Part(grip, shapes, middle[None], AXIS_COLORS[2], edge)
     way = placed.axes[grip[1][0]]
     if np.linalg.norm(np.cross(way, sight)) < SHORT:
         return None
@@ -343,11 +338,6 @@ def _turn(placed: Placed, projection: Projection, grip: Grip, scale: Scale) -> P
 _PARTS: dict[Act, Callable[[Placed, Projection, Grip, Scale], Part | None]] = {
     "move": _move, "turn": _turn, "grow": _grow,
 }  # fmt: skip
-_DOUBLE = (
-    np.array([(0.0, -1.25), (17.0, -1.25), (17.0, 1.25), (0.0, 1.25)]),
-    np.array([(25.0, 0.0), (17.0, 4.0), (17.0, -4.0)]),
-)
-"""Shaft and head of an arrow that points right: polygons (k, 2) in pixels from the middle."""
 
 
 def part_at(parts: list[Part], pixel: FloatArray, ratio: float) -> Part | None:
@@ -411,6 +401,18 @@ def _distance(line: FloatArray, at: FloatArray) -> float:
 def _disc(radius: float) -> FloatArray:
     angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
     return np.asarray(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def _arrow(root: FloatArray, tip: FloatArray, ratio: float) -> list[FloatArray]:
+    """Return shaft and head of an arrow between pixels (2,), its head as long as fits."""
+    way = tip - root
+    length = float(np.linalg.norm(way))
+    neck = tip - min(HEAD_PX * ratio, 0.5 * length) / max(length, 1e-30) * way
+    wing = 0.4 * HEAD_PX * ratio * _across(way)
+    return [
+        *_bar(np.stack([root, neck]), WIDE_PX * ratio),
+        np.stack([tip, neck + wing, neck - wing]),
+    ]
 
 
 def _across(way: FloatArray) -> FloatArray:

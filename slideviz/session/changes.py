@@ -114,10 +114,11 @@ def set_view(session: Session, **values: Any) -> Session:
 def select(session: Session, names: Iterable[str]) -> Session:
     """Return the session with the boundaries ``names`` highlighted, and no others.
 
-    They have a handle if all of them move, and else no boundary has one.
+    They have a handle if all of them move; else that of a motion or section stays.
     """
     chosen = tuple(names)
-    handle: Handle = "section" if session.view.handle == "section" else ""
+    handle: Handle = session.view.handle
+    handle = "" if handle == "boundary" else handle
     if chosen and all(session.role(name) == "moving" for name in chosen):
         handle = "boundary"
     return set_view(session, selected=chosen, handle=handle)

@@ -215,6 +215,31 @@ def test_it_comes_and_goes_with_what_is_chosen(window, driver, blade):
     assert handle.NAME not in window.view.actors
 
 
+def test_a_click_beside_it_gives_the_view_its_keys_and_escape_puts_it_away(window, blade):
+    window.motions._add(Translate)
+    press(window, (5.0, 5.0))
+    assert window.view.hasFocus()
+    assert window.store.session.view.handle == "motion"
+    keys(window, "gz0.01")
+    assert motions(window)[0].vector == (0.0, 0.0, 0.01)
+    QTest.keyClick(window.view, Qt.Key.Key_Escape)
+    QApplication.processEvents()
+    assert window.store.session.view.handle == ""
+    window.view.snapshot()
+    assert handle.NAME not in window.view.actors
+
+
+def test_another_field_ends_what_a_key_began(window, blade):
+    for letter in "gz0.01":
+        QTest.keyClicks(window.view, letter)
+    QApplication.processEvents()
+    window.motions.editor.vector.fields[0].setFocus()
+    QApplication.processEvents()
+    assert blade.drag is None
+    assert not window.store.dragging
+    assert motions(window)[0].vector == (0.0, 0.0, 0.01)
+
+
 def test_what_is_dragged_beside_it_turns_the_view(window, blade):
     camera = window.scene.camera.place
     start = place_of(blade, ("move", ())) + np.array([0, 160.0])

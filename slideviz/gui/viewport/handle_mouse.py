@@ -120,6 +120,8 @@ class HandleMouse(QObject):
         kind = event.type()
         if isinstance(event, QKeyEvent):
             return self._key(event)
+        if kind == QEvent.Type.FocusOut and self.drag is not None:
+            self._end()  # what a panel changes now must not be lost by the next move
         if not isinstance(event, QMouseEvent):
             return False
         where = event.position().toPoint()

@@ -98,12 +98,14 @@ class CellMouse(QObject):
         self.store.change(changes.mark_cell, None if cell == marked else cell)
 
     def _escape(self) -> bool:
-        """Remove the mark of a cell, or else the threshold; return whether there was either."""
+        """Remove the mark of a cell, else the threshold, else the handle; return whether any."""
         view = self.store.session.view
         if view.marked_cell is not None:
             self.store.change(changes.mark_cell, None)
         elif view.threshold is not None:
             self.store.change(changes.set_view, threshold=None)
+        elif view.handle:
+            self.store.change(changes.show_handle, "")
         else:
             return False
         return True
