@@ -26,7 +26,7 @@ def caught(window):
     window.error_reporter.count = 0
 
 
-def boom(*_):
+def boom(*_, **_named):
     raise ZeroDivisionError("strange")
 
 
