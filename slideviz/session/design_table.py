@@ -18,14 +18,12 @@ from slideviz.design.sweeps.table import (
     case_values,
     cells_of,
     columns_of,
-    design_columns,
     head_of,
     numbers_of,
     read_designs,
-    result_of,
 )
 from slideviz.errors import CaseError
-from slideviz.system.csv_table import csv_rows, write_csv
+from slideviz.system.csv_table import write_csv
 
 MOST = 100_000  # most designs of a table in the window
 FINE = 1e-5  # rounding error allowed for the values of a range, over the step between them
@@ -259,20 +257,3 @@ def write_results(path: Path, table: DesignTable) -> None:
         for number, values in enumerate(table.rows, start=1)
     ]
     write_csv(path, [head_of(table.columns, _WORDS), *lines], CaseError)
-
-
-def read_results(path: Path) -> DesignTable:
-    """Return the table that `write_results` wrote, with its results.
-
-    Raises CaseError if the file cannot be read, or is not a table of results.
-    """
-    try:
-        head, *lines = csv_rows(path.read_text(encoding="utf-8"))
-        results = [replace(result_of(head, c), design=k) for k, c in enumerate(lines, start=1)]
-    except (OSError, ValueError, KeyError) as problem:
-        raise CaseError(f"{path}: is not a table of results ({problem})") from problem
-    columns = design_columns(head)
-    done = [row for row in results if row.problem or row.steps]
-    return DesignTable(tuple(head[columns]), tuple(tuple(c[columns]) for c in lines)).with_results(
-        done
-    )

@@ -55,7 +55,6 @@ from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera
 from slideviz.session.session_file import (
     ENDING,
-    StoredRun,
     StoredSession,
     read_case_of,
     read_picture,
@@ -283,7 +282,7 @@ def open_file(
     """Return a mesh, or the case or session in a file or picture with its mesh, ready to be shown.
 
     ``mesh_file``: the mesh of a session, where it is neither beside it nor where it was.
-    ``unpacked``: the folder for copies of files that a session has; by default a new one. Raises
+    ``unpacked``: the folder for copies of files that a session has; by default its own. Raises
     SlidevizError if the file cannot be used; the message says what and where.
     """
     case = None
@@ -293,7 +292,7 @@ def open_file(
     if ending in (".cfg", ENDING):
         report(JobProgress(f"Reading {path.name}"))
     if ending == ENDING:
-        case, moved = read_case_of(path, unpacked, mesh_file)
+        case, moved = read_case_of(path, unpacked or path.parent, mesh_file)
     elif ending == ".png":
         case = read_picture(path, mesh_file)
     elif ending == ".cfg":
@@ -313,8 +312,8 @@ def open_file(
     opened = prepare(mesh, mesh_path, case, report, stopped)
     if ending != ENDING:
         return opened
-    content = read_session(path, mesh, moved)
     session = opened.session
+    content = read_session(path, session.first, moved)
     runs = [_restored(run, mesh, report, stopped) for run in content.runs]
     remark = ""
     if content.shown is not None and not runs:
@@ -322,20 +321,19 @@ def open_file(
     return replace(opened, session=content.put_into(session, runs), content=content, remark=remark)
 
 
-def _restored(run: StoredRun, mesh: Mesh, report: Report, stopped: Stopped) -> Run:
+def _restored(run: Run, mesh: Mesh, report: Report, stopped: Stopped) -> Run:
     """Return a run of a session file, with the quality of its steps."""
     tick = _tick(f"Run {run.number}: {PHASES['quality']}", report, stopped)
     frames = []
-    metric = run.case.quality_metric
-    for k, one in enumerate(run.steps):
-        tick(k / len(run.steps))
-        limits = run.case.limits if one.step.index == one.step.total else ()
-        measured = quality(one.step.mesh, mesh, metric)
-        frame = _frame_of(one.step, measured, run.case, mesh, limits)
-        frames.append(replace(frame, label=one.label))
-    return Run(
-        run.number, run.case, tuple(frames), run.end, saved=True, name=run.name, panels=run.panels
-    )
+    for k, one in enumerate(run.frames):
+        tick(k / len(run.frames))
+        step = one.step
+        if step is not None:
+            limits = run.case.limits if step.index == step.total else ()
+            measured = quality(step.mesh, mesh, run.case.quality_metric)
+            frame = _frame_of(step, measured, run.case, mesh, limits)
+            frames.append(replace(frame, label=one.label))
+    return replace(run, frames=tuple(frames))
 
 
 def save_session(

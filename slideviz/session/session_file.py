@@ -10,14 +10,12 @@ on a damaged file.
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, is_dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
-from tempfile import mkdtemp
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 from zipfile import ZIP_STORED, ZipFile
@@ -34,8 +32,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.changes import show_frame
 from slideviz.session.design_table import DesignTable
 from slideviz.session.saving import Camera, view_to_case
-from slideviz.session.state import Guess, Run, Session, ViewState
-from slideviz.solver.steps import Step
+from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
 
@@ -45,33 +42,13 @@ VERSION = 1  # of the form of the file
 _LARGEST_TEXT = 100_000_000  # most bytes of a text in it
 _CASE = "case.cfg"
 _HEAD = "session.json"
-_COPY = re.compile(r"files/\d+/[^/\\\0]*[^/\\\0.][^/\\\0]*")  # not only dots
+_OF_FRAMES = ("step", "label")  # fields of frames; others are computed again from their points
 _OF_POINTS = ("control", "nodes")  # fields that are numbers of points; others are of cells
 _VIEW = (
     "drawn", "selected", "frame", "marked_cell", "marked_in", "beside", "swapped", "ranges",
     "section_index", "handle",
 )  # fmt: skip
 """The fields of a view that a case file lacks, or has only where they differ from a default."""
-
-
-@dataclass(frozen=True)
-class StoredStep:
-    """A step of a run, and its label in films."""
-
-    step: Step
-    label: str = ""
-
-
-@dataclass(frozen=True)
-class StoredRun:
-    """A run without what is computed again from its points: quality and walls."""
-
-    number: int
-    case: Case
-    steps: tuple[StoredStep, ...]
-    end: Literal["done", "cancelled", "failed"]
-    name: str = ""
-    panels: Case | None = None
 
 
 @dataclass(frozen=True)
@@ -82,7 +59,7 @@ class StoredSession:
     mesh_file: Path = Path()
     source: Path | None = None  # the file that the case was saved to
     guesses: Mapping[str, Guess] = field(default_factory=dict)
-    runs: tuple[StoredRun, ...] = ()
+    runs: tuple[Run, ...] = ()  # of frames only steps and labels
     shown: int | None = None
     newest: int = 0
     view: ViewState = field(default_factory=ViewState)  # only `_VIEW`
@@ -119,7 +96,7 @@ def stored_session(
         mesh_file=session.case.mesh_file or Path(),
         source=session.case.source,
         guesses=session.guesses,
-        runs=tuple(_stored_run(run) for run in runs if run.end),
+        runs=tuple(replace(run, saved=True) for run in runs if run.end),
         shown=session.shown,
         newest=max((session.newest, *(run.number for run in session.runs))),
         view=session.view,
@@ -127,12 +104,6 @@ def stored_session(
         designs=designs,
         designs_case=designs_case,
     )
-
-
-def _stored_run(run: Run) -> StoredRun:
-    steps = tuple(StoredStep(one.step, one.label) for one in run.frames if one.step is not None)
-    assert run.end
-    return StoredRun(run.number, run.case, steps, run.end, run.name, run.panels)
 
 
 def digest(mesh: Mesh) -> str:
@@ -193,7 +164,7 @@ class _Writer:
         if is_dataclass(value):
             # Not those whose types only mypy knows: sections, and functions.
             made: Any = type(value)
-            names = annotations_of(made)
+            names = _OF_FRAMES if made is StepFrame else annotations_of(made)
             fields = {name: self.encoded(getattr(value, name), f"{place}/{name}") for name in names}
             return {"class": made.__name__, **fields}
         if isinstance(value, Mapping):
@@ -214,33 +185,21 @@ class _Writer:
 
 # Reading ---------------------------------------------------------------------------------
 class MissingMeshError(CaseError):
-    """The mesh of a session file or a picture is not there.
-
-    ``path`` is the file, ``mesh`` where its mesh was.
-    """
-
-    def __init__(self, path: Path, mesh: Path) -> None:
-        super().__init__(
-            f"{printable(path)}: its mesh {printable(mesh.name)} is neither beside it nor in "
-            f"{printable(mesh.parent)}; put it there, or choose the file"
-        )
-        self.path = path
+    """The mesh of a session file or a picture is not there."""
 
 
 def read_case_of(
-    path: Path, unpacked: Path | None = None, mesh: Path | None = None
+    path: Path, unpacked: Path, mesh: Path | None = None
 ) -> tuple[Case, dict[Path, Path]]:
     """Return the case in a session file, and where its files are now, by where they were.
 
-    Copies of files that the session has are written to the folder ``unpacked``; None: a new one.
-    ``mesh``: as of
+    Copies of files that the session has are written to the folder ``unpacked``. ``mesh``: as of
     `placed`. Raises CaseError if the file is damaged.
     """
     with _archive(path) as archive:
         reader = _Reader(archive, path)
         copies = [name for name in archive.namelist() if name.startswith("files/")]
-        folder = unpacked or Path(mkdtemp() if copies else "")
-        moved = {path.parent / name: reader.unpack(name, folder) for name in copies}
+        moved = {path.parent / name: reader.unpack(name, unpacked) for name in copies}
         return placed(reader.decoded(_CASE, Case), path, moved, mesh)
 
 
@@ -276,24 +235,28 @@ def placed(
         raise CaseError(f"{printable(path)}: the case in it names no mesh; open the mesh itself")
     there[was] = mesh or there[was]
     if not there[was].is_file():
-        raise MissingMeshError(path, was)
+        raise MissingMeshError(
+            f"{printable(path)}: its mesh {printable(was.name)} is neither beside it nor in "
+            f"{printable(was.parent)}; put it there, or choose the file"
+        )
     return case.with_paths(lambda file: there.get(file, file)), there
 
 
 def read_session(
-    path: Path, mesh: Mesh | None = None, moved: Mapping[Path, Path] | None = None
+    path: Path, first: StepFrame | None = None, moved: Mapping[Path, Path] | None = None
 ) -> StoredSession:
     """Return what a session file has besides its case.
 
-    ``mesh`` is its undeformed mesh; without runs if that is another one now, or not known.
-    ``moved``: as of `read_case_of`. Raises CaseError if the file is damaged.
+    ``first`` is its undeformed mesh; without runs if that is another one now, or not known. Their
+    frames have its quality, until theirs is computed. ``moved``: as of `read_case_of`. Raises
+    CaseError if the file is damaged.
     """
     with _archive(path) as archive:
-        reader = _Reader(archive, path, mesh, moved or {})
+        reader = _Reader(archive, path, first, moved or {})
         head = json.loads(reader.text(_HEAD))
         if head["version"] > VERSION:
             raise CaseError(f"{path}: was saved by a newer slideviz; update slideviz to open it")
-        if mesh is None or head["mesh"] != digest(mesh):
+        if first is None or head["mesh"] != digest(first.mesh):
             head["runs"] = []
         content: StoredSession = reader.decoded(head, StoredSession)
         return content
@@ -330,7 +293,7 @@ def _archive(path: Path) -> Iterator[ZipFile]:
 class _Reader:
     archive: ZipFile
     path: Path
-    mesh: Mesh | None = None
+    first: StepFrame | None = None
     moved: Mapping[Path, Path] = field(default_factory=dict)  # where files of cases are now
     known: dict[str, NDArray] = field(default_factory=dict)  # arrays, by their members
 
@@ -340,8 +303,11 @@ class _Reader:
         return self.archive.read(name).decode()
 
     def unpack(self, name: str, folder: Path) -> Path:
-        """Write a copy of a file that the session has into a folder of its own, and return it."""
-        if not _COPY.fullmatch(name):
+        """Write a copy of a file that the session has into a folder of its own, and return it.
+
+        Only the last part of its name counts, so that it cannot be elsewhere.
+        """
+        if Path(name).name == "..":
             raise ValueError(f"{name!r} is not the name of a file")
         info = self.archive.getinfo(name)
         target = folder / f"{info.CRC:08x}-{info.file_size}" / Path(name).name
@@ -363,10 +329,11 @@ class _Reader:
             return value
         if kind is Case and isinstance(value, str):
             return self._case(self.text(value))
-        if kind is Mesh and self.mesh is not None:
+        if kind is Mesh and self.first is not None:
             points = self._array(value, np.float64)
-            if points.shape == self.mesh.points.shape and np.isfinite(points).all():
-                return self.mesh.with_points(points)
+            mesh = self.first.mesh
+            if points.shape == mesh.points.shape and np.isfinite(points).all():
+                return mesh.with_points(points)
         if kind is np.ndarray:
             return self._numbers(value, get_args(inner[1])[0], name)
         if is_dataclass(kind) and isinstance(value, dict):
@@ -396,24 +363,21 @@ class _Reader:
         """Return a value as one of the first of some types that it fits."""
         if value is None and NoneType in kinds:
             return None
-        for kind in kinds[:-1]:
-            try:
+        *others, last = (kind for kind in kinds if kind is not NoneType)
+        for kind in others:
+            with suppress(ValueError):
                 return self.decoded(value, kind, name)
-            except ValueError:
-                continue
-        return self.decoded(value, kinds[-1], name)
+        return self.decoded(value, last, name)
 
     def _dataclass(self, fields: dict[str, Any], kind: Any) -> Any:
         known = {each.__name__: each for each in (kind, *kind.__subclasses__())}
         made = known[fields.pop("class")]
         hints = annotations_of(made)
-        return made(
-            **{
-                name: self.decoded(each, hints[name], name)
-                for name, each in fields.items()
-                if name in hints
-            }
-        )
+        some = ((name, each) for name, each in fields.items() if name in hints)
+        values = {name: self.decoded(each, hints[name], name) for name, each in some}
+        if made is StepFrame and self.first is not None:
+            values |= {"mesh": values["step"].mesh, "quality": self.first.quality}
+        return made(**values)
 
     def _array(self, name: str, kind: Any) -> NDArray:
         """Return a read-only array of a member; ValueError if it is not of that type and size."""
@@ -431,8 +395,9 @@ class _Reader:
     def _numbers(self, name: str, kind: Any, of: str) -> NDArray:
         """Return an array; numbers of points or cells must be of the mesh."""
         values = self._array(name, kind)
-        if values.dtype == np.int64 and self.mesh is not None and values.size:
-            most = len(self.mesh.points if of in _OF_POINTS else self.mesh.cells)
+        if values.dtype == np.int64 and self.first is not None and values.size:
+            mesh = self.first.mesh
+            most = len(mesh.points if of in _OF_POINTS else mesh.cells)
             if values.ndim != 1 or values.min() < 0 or values.max() >= most:
                 raise ValueError(f"{name} has numbers beyond the mesh")
         return values

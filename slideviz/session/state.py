@@ -21,7 +21,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import Walls, walls
-from slideviz.solver.steps import safe_fraction_of
+from slideviz.solver.steps import Step, safe_fraction_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
@@ -40,7 +40,6 @@ from slideviz.terms import (
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
-    from slideviz.solver.deform import Step
 
 
 Handle = Literal["", "section", "motion", "boundary"]

@@ -34,7 +34,6 @@ from slideviz.design.sweeps.table import (
 )
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
-from slideviz.session.design_table import read_results
 
 
 @pytest.fixture(scope="module")
@@ -509,5 +508,3 @@ def test_fields_of_endless_length_are_told(passage, here, tmp_path):
     table.write_text(f"{table.read_text()}{long}\n")
     with pytest.raises(CaseError, match=r"results.csv: is not a table of a sweep \(field larger"):
         sv.sweep(passage.case, {"STEPS": [1]}, here, **asked)
-    with pytest.raises(CaseError, match=r"results.csv: is not a table of results \(field larger"):
-        read_results(table)

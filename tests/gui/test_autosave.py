@@ -65,7 +65,7 @@ def kept(window, qtbot):
 
 def case_in(path):
     """The case in the file of a session."""
-    return read_case_of(path)[0]
+    return read_case_of(path, path.parent)[0]
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ from slideviz.session import design_table
 from slideviz.session.design_table import (
     DesignTable,
     column_choices,
-    read_results,
     read_table,
     values_of,
     write_results,
@@ -121,19 +120,9 @@ def test_files(passage, tmp_path):
         first, second = csv.DictReader(found)
     assert (first["min"], first["STEPS"]) == ("", "2")
     assert (second["design"], second["min"], second["mean"]) == ("2", "0.25", "0.5")
-    assert read_results(tmp_path / "out.csv") == table
     # Of a table with results the designs are read.
     again = read_table(passage.case, tmp_path / "out.csv")
     assert (again.columns, again.rows) == (table.columns, table.rows)
-
-
-@pytest.mark.parametrize("text", ["", "a,b\n1\n", "design,STEPS\n1,2\n"])
-def test_other_files_are_no_results(tmp_path, text):
-    (tmp_path / "out.csv").write_text(text)
-    with pytest.raises(CaseError, match="is not a table of results"):
-        read_results(tmp_path / "out.csv")
-    with pytest.raises(CaseError, match="is not a table of results"):
-        read_results(tmp_path / "missing.csv")
 
 
 def test_only_what_has_no_result_is_run(passage, monkeypatch):
