@@ -250,6 +250,8 @@ def film_steps(
         if len(one.frames) < 2:
             raise SlidevizError("there are no steps to make a film of; run the case first")
         check_film(file, film_options, frames=len(one.frames), overwrite=overwrite)
+    if titles is None and len(runs) == 2:
+        titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
     write = titles or _titles(runs[0], options)
     longest = max(runs, key=lambda one: len(one.frames))
     yield from aim_at_largest(renderer, options)
@@ -372,7 +374,7 @@ def _titles_of_runs(
         run = session.run_shown
         text = caption(place, stats, what)
         if pair and run is not None:
-            return f"{run.name}{DETAIL if detail else ''}\n{text}"
+            return f"{run.name or run.label}{DETAIL if detail else ''}\n{text}"
         return text + (DETAIL if detail else "")
 
     def longest_place(frames: Sequence[StepFrame]) -> str:

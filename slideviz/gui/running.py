@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -127,6 +127,7 @@ class Running(QObject):
         wanted = result_settings(case)
         for run in self.store.session.runs:
             known = run.panels is not None and result_settings(run.case) == wanted
+            known = known and not (run.last is not None and run.last.label)
             if known and (run.end == "done" or (not run.end and self._next is None)):
                 self.store.change(changes.show_design, run.number, name)
                 return True
@@ -138,6 +139,15 @@ class Running(QObject):
         self._shows_design = True
         self._start_run(case, name)
         return True
+
+    def show_designs(self, case: Case, cases: Mapping[int, Case]) -> None:
+        """Start the run whose steps are designs, by number; ``case`` is that of their table."""
+        self._show_started(case, "designs")
+        session = self.store.session
+        said = f"The steps of run {session.shown} are the designs"
+        done = partial(self.status_changed.emit, said)
+        whole = {number: session.with_chosen_roles(one) for number, one in cases.items()}
+        self.start_job("Starting", lambda _: done(), jobs.compute_designs, whole, session.mesh)
 
     def _show_started(self, case: Case, name: str = "") -> None:
         """Show a new run, without steps yet."""

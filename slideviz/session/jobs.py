@@ -8,7 +8,7 @@ any thread, with progress and results, and raises `slideviz.errors.Cancelled` so
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -32,7 +32,7 @@ from slideviz.case.words import counted
 from slideviz.case.zone_cases import each_zone, with_marker_names
 from slideviz.design.deformed_wheel import write_wheel
 from slideviz.design.sweeps.sweep import sweep
-from slideviz.errors import Cancelled, CaseError, MeshError, Message, SlidevizError
+from slideviz.errors import Cancelled, CaseError, DeformError, MeshError, Message, SlidevizError
 from slideviz.formats.files import read, write
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
@@ -439,6 +439,26 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
         report(_frame_of(step, measured, case, mesh, () if unfinished else case.limits))
         going_on()
+
+
+def compute_designs(
+    cases: Mapping[int, Case], mesh: Mesh, report: Report, stopped: Stopped
+) -> None:
+    """Deform the mesh for designs, by number; report the last step of each as a `StepFrame`.
+
+    They are numbered like the steps of one run.
+    """
+    total = len(cases)
+    for k, (number, case) in enumerate(cases.items(), start=1):
+        report(JobProgress(f"Design {number}, {k} of {total}", (k - 1) / total))
+        try:
+            *_, step = deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped))
+        except (CaseError, DeformError) as problem:
+            raise SlidevizError(*problem.within(f"design {number}")) from problem
+        step = replace(step, index=k, total=total)
+        measured = quality(step.mesh, mesh, case.quality_metric)
+        frame = _frame_of(step, measured, case, mesh, case.limits)
+        report(replace(frame, label=f"design {number} of {total}"))
 
 
 def repair(

@@ -108,7 +108,7 @@ def to_mend(session: Session) -> StepFrame | None:
     None where all its cells are proved valid and above the limit of the case.
     """
     frame = session.deformed or session.first
-    if frame is None or session.lacks_cells:
+    if frame is None or session.lacks_cells or frame.label:  # that of a design has another case
         return None
     found = frame.quality
     bad = found.inverted + found.unproven or found.min < session.case.repair_below

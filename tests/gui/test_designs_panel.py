@@ -158,6 +158,49 @@ def test_a_design_is_shown_only_when_it_is_whole_and_computed_once(window, passa
     assert status.text() == "Design 1 is shown."
 
 
+def test_all_designs_are_the_steps_of_a_run_to_film_and_to_save(
+    window, passage, driver, qtbot, answers, tmp_path
+):
+    fill(passage, "airfoil.rotate.angle_deg", "-3, -1, 1")
+    passage.every.click()
+    driver.settle()
+    session = driver.session
+    run = session.run_shown
+    assert (run.name, run.end, len(run.frames), run.planned) == ("designs", "done", 3, 3)
+    assert [frame.label for frame in run.frames] == [f"design {k} of 3" for k in (1, 2, 3)]
+    assert window.statusBar().currentMessage() == "The steps of run 1 are the designs"
+    # Each is the mesh of its design, as a click on it shows.
+    passage.show_design(2)
+    driver.settle()
+    shown = driver.session.run_shown
+    assert shown.name == "design 2"
+    assert (shown.last.mesh.points == run.frames[1].mesh.points).all()
+    window.store.change(changes.show_run, 1)
+    assert window.actions_table.by_name["export_film"].isEnabled()
+    answers("ask_numbered", tmp_path / "design.su2")
+    window.actions_table.by_name["export_steps"].trigger()
+    driver.settle()
+    assert [path.name for path in sorted(tmp_path.glob("design_*.su2"))] == [
+        f"design_{k}.su2" for k in (1, 2, 3)
+    ]
+    # With another case than the panel, a repair would not know what it mends.
+    assert not window.actions_table.by_name["repair"].isEnabled()
+    # It stays in a session.
+    answers("ask_session", (tmp_path / "a.slideviz", False))
+    window.files.save_session()
+    driver.settle()
+    again = driver.open(tmp_path / "a.slideviz").run_shown
+    assert [frame.label for frame in again.frames] == [frame.label for frame in run.frames]
+
+
+def test_a_design_that_fails_is_named_when_all_are_shown(window, passage, driver):
+    fill(passage, "SLIDING_MODE", "ps, none")
+    passage.every.click()
+    driver.settle()
+    assert "design 2: " in window.banner.text.text()
+    assert [frame.label for frame in driver.session.run_shown.frames] == ["design 1 of 2"]
+
+
 def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     passage, qtbot, in_a_thread, window, tmp_path
 ):

@@ -305,6 +305,37 @@ def test_a_film_is_made_while_the_window_goes_on(ran, film, answers, tmp_path, q
     assert ran.session.view.frame == 1
 
 
+@pytest.mark.usefixtures("painted")
+def test_a_film_of_two_runs_has_both_side_by_side(with_runs, answers, tmp_path, qtbot):
+    driver = with_runs({"steps": 3}, {"steps": 1})
+    window = driver.window
+    window.store.change(changes.show_beside, 1)
+    window.exports.make_film()
+    film = window.exports.film
+    assert film.form.both.isVisibleTo(film)
+    assert film.form.frames == 2
+    film.form.both.setChecked(True)
+    assert film.form.frames == 4, "of the run with more steps"
+    film.form.kind.show_value(".gif")
+    film.form._kind_chosen(".gif")
+    film.form.width_px.setValue(200)
+    film.form.height_px.setValue(200)
+    film.form.both.setChecked(True)
+    assert "too narrow for two runs" in film.words.text()
+    film.form.width_px.setValue(480)
+    film.form.between.setValue(0)
+    answers("ask_save", tmp_path / "pair.gif")
+    with qtbot.waitSignal(film.made):
+        film.make.click()
+    with Image.open(tmp_path / "pair.gif") as image:
+        assert image.size == (480, 200)
+        assert image.n_frames == 4
+    window.store.change(changes.show_beside, changes.UNDEFORMED)
+    window.exports.make_film()
+    assert not window.exports.film.form.both.isVisibleTo(window.exports.film)
+    window.exports.film.reject()
+
+
 def test_pictures_of_a_film_get_a_new_folder(ran, film, answers, tmp_path, qtbot):
     (tmp_path / "passage_steps").mkdir()
     answers("ask_folder", tmp_path)

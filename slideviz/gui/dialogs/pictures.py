@@ -32,6 +32,7 @@ from slideviz.export.film import (
     aim_at_largest,
     check_film,
     film_steps,
+    require_pair_width,
 )
 from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
@@ -439,7 +440,7 @@ class FilmForm(PixelFields, QWidget):
     def __init__(self, renderer: OffscreenRenderer) -> None:
         super().__init__()
         self.renderer = renderer
-        self.frames = len(renderer.session.frames)
+        steps = len(renderer.session.frames)
         self.kind = Choice(FILM_KINDS)
         self.kind.chosen.connect(self._kind_chosen)
         self._make_pixels(SIZE_WORDS)
@@ -456,7 +457,7 @@ class FilmForm(PixelFields, QWidget):
             0,
             100,
             # With few steps, a film of about three seconds needs images in between.
-            0 if self.frames > 15 else round(3 * FPS / self.frames) - 1,
+            0 if steps > 15 else round(3 * FPS / steps) - 1,
             self._changed,
             tip="Images between two steps, with the nodes on straight lines from one to the next.",
         )
@@ -468,6 +469,7 @@ class FilmForm(PixelFields, QWidget):
         )
         self.fill.setChecked(renderer.fills)
         self.mark = check_box("Marked cell", "Its outline, with its number and its value.")
+        self.both = check_box(*OPTIONS["both"])
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow("Kind", self.kind)
@@ -476,9 +478,13 @@ class FilmForm(PixelFields, QWidget):
         form.addRow("Frames per second", self.fps)
         form.addRow("Interpolated frames between steps", self.between)
         form.addRow("Last frame stays", self.hold)
-        for option in (self.white, self.fill, self.mark):
+        for option in (self.white, self.fill, self.mark, self.both):
             option.toggled.connect(self._changed)
             form.addRow("", option)
+        compared = (
+            renderer.beside is not None and renderer.session.view.beside != changes.UNDEFORMED
+        )
+        form.setRowVisible(self.both, compared)
         form.setRowVisible(self.mark, renderer.session.view.marked_cell is not None)
         self._kind_chosen(self.kind.currentData())
 
@@ -496,11 +502,18 @@ class FilmForm(PixelFields, QWidget):
             "white" if self.white.isChecked() else "shown",
             title=True,
             fill=self.fill.isChecked(),
-            both=False,
+            both=self.both.isChecked(),
             letters=1.25,
             film=True,
             marked=self.mark.isChecked(),
+            lines=1 + self.both.isChecked(),
         ).like(view)
+
+    @property
+    def frames(self) -> int:
+        """Return the number of steps with the undeformed mesh, of the run with more of them."""
+        shown = self.renderer.shown(self.renderer.session, self.picture_options)
+        return max(len(one.frames) for one in shown)
 
     def _kind_chosen(self, kind: str) -> None:
         width, height = SIZES[kind or ".png"]
@@ -516,6 +529,8 @@ class FilmForm(PixelFields, QWidget):
         try:
             # A placeholder: the real file name is asked for later.
             check_film(Path(f"film{kind}").absolute(), self.film_options, overwrite=True)
+            if self.both.isChecked():
+                require_pair_width(self.pixels)
         except SlidevizError as error:
             return str(error)
         return ""

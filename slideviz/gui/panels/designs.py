@@ -467,6 +467,12 @@ class DesignsPanel(Panel):
         self.save = push_button(
             "Save table…", "Save designs and results as CSV.", self.save_table, "save_designs"
         )
+        self.every = push_button(
+            "As steps",
+            "Deform the mesh for every design, and show them as the steps of a run: to play them, "
+            "or to film and save them (File > Export).",
+            self.show_all,
+        )
         self.run = push_button("Run", RUN, self.start, "run_designs")
         self.stop = push_button("Stop", "Stop; the results so far are kept.", self.runner.cancel)
         self.bar = QuietBar()
@@ -474,7 +480,7 @@ class DesignsPanel(Panel):
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(110)
         self.status = WideLabel(lines=3)
-        files = (self.load, self.remove, self.save, self.plot.save)
+        files = (self.every, self.load, self.remove, self.save, self.plot.save)
         return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
 
     # State to widgets ------------------------------------------------------------------
@@ -516,6 +522,7 @@ class DesignsPanel(Panel):
             (self.rows.add, opened and not busy),
             (self.load, opened and not busy),
             (self.remove, rows and not busy),
+            (self.every, rows and opened),
             (self.run, count > 0 and opened and not busy),
             (self.save, rows),
         ):
@@ -666,6 +673,21 @@ class DesignsPanel(Panel):
         self._show_status(f"Design {number} is being computed.")
         self._say_shown(self.session)
         self._sync()
+
+    def show_all(self) -> None:
+        """Show the meshes of all designs that did not fail, as the steps of a run."""
+        if self.services.running.runner.busy:
+            self._show_status("Another job runs; wait for it, or cancel it.", wrong=True)
+            return
+        case = self.case if self.table.results and self.case is not None else self.session.case
+        failed = {number for number, row in self.table.results.items() if row.problem}
+        try:
+            rows = read_designs(case, self.table.designs()).rows
+        except CaseError as error:
+            self._show_status(str(error), wrong=True)
+            return
+        cases = {row.number: row.case for row in rows if row.number not in failed}
+        self.services.running.show_designs(case, cases)
 
     def _say_shown(self, session: Session) -> None:
         """Say that the design asked for is shown, once it is; or how far its run came."""
