@@ -363,11 +363,11 @@ class _Reader:
         """Return a value as one of the first of some types that it fits."""
         if value is None and NoneType in kinds:
             return None
-        *others, last = (kind for kind in kinds if kind is not NoneType)
-        for kind in others:
+        some = [kind for kind in kinds if kind is not NoneType]
+        for kind in some[:-1]:
             with suppress(ValueError):
                 return self.decoded(value, kind, name)
-        return self.decoded(value, last, name)
+        return self.decoded(value, some[-1], name)
 
     def _dataclass(self, fields: dict[str, Any], kind: Any) -> Any:
         known = {each.__name__: each for each in (kind, *kind.__subclasses__())}
