@@ -25,6 +25,7 @@ class CaseFields(CheckedFields):
 
     mesh_file: Path | None = None
     mesh_out: Path | None = None
+    reference_file: Path | None = None
     mesh_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     mesh_out_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     zone: int | None = None
@@ -85,6 +86,6 @@ class CaseFields(CheckedFields):
         for marker, role in self.roles.items():
             if role not in terms.ROLES:
                 raise CaseError(f"roles: {marker!r}: {not_one_of(role, terms.ROLES)}")
-        for name in ("mesh_file", "mesh_out", "source"):
+        for name in ("mesh_file", "mesh_out", "reference_file", "source"):
             if (path := getattr(self, name)) is not None:
                 object.__setattr__(self, name, Path(path))

@@ -1007,6 +1007,15 @@ _FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
 _ROWS = (
     setting(FILES, "MESH_FILENAME", "The mesh to deform.", PATH, field="mesh_file"),
     setting(
+        FILES,
+        "REFERENCE_FILENAME",
+        "The undeformed mesh, of the same cells, if MESH_FILENAME was deformed from it: cells are "
+        "relaxed to its shapes, layers keep its heights, walls are those of it that nodes slid "
+        "along, and qualities compare with it. So a motion and then its reverse lead back.",
+        PATH,
+        field="reference_file",
+    ),
+    setting(
         FILES, "MESH_OUT_FILENAME", "Where the deformed mesh is written.", PATH, field="mesh_out"
     ),
     setting(

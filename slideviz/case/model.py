@@ -32,6 +32,7 @@ class Case(CaseFields):
     Markers of the mesh that are not in ``roles`` are fixed. Paths are absolute, or relative to the
     current folder. Of the other fields, of which ``slideviz keys`` has all:
 
+    * ``reference_file``: the undeformed mesh, if ``mesh_file`` was deformed from it.
     * ``mesh_format``, ``mesh_out_format``: None: by the ending of the file.
     * ``axis``, ``origin``: direction and a point of the axis of rotational periodicity.
     * ``span``: hub and shroud, between which the span is from 0 to 1; None: by their names.
@@ -133,6 +134,8 @@ class Case(CaseFields):
     def inputs(self) -> dict[Path, str]:
         """Return the files that the case is read from or names, with words for what each is."""
         inputs = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
+        if self.reference_file is not None:
+            inputs[self.reference_file] = "the undeformed mesh"
         if self.source is not None:
             inputs[self.source] = "the case file"
         files = (path for motion in self.motions for path in motion.files)
@@ -143,6 +146,7 @@ class Case(CaseFields):
         return self.change(
             mesh_file=change(self.mesh_file) if self.mesh_file else None,
             mesh_out=change(self.mesh_out) if self.mesh_out else None,
+            reference_file=change(self.reference_file) if self.reference_file else None,
             motions=tuple(motion.with_files(change) for motion in self.motions),
         )
 

@@ -34,6 +34,7 @@ from slideviz.design.su2.surface import MovingSurface, at_rest, convex_part, mak
 from slideviz.errors import CaseError, SlidevizError, messages_of
 from slideviz.formats.losses import warning_of_losses
 from slideviz.mesh.model import Mesh
+from slideviz.solver.prepare import referenced
 from slideviz.solver.steps import Step
 
 
@@ -65,7 +66,7 @@ def read_configuration(arguments: Namespace) -> tuple[Su2Config, Mesh]:
             f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
             f"{hint}"
         )
-    mesh = read_mesh(config)
+    mesh = referenced(config.case, read_mesh(config))
     return on_mesh(config, mesh), mesh
 
 

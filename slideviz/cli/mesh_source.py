@@ -24,6 +24,7 @@ from slideviz.errors import CaseError, MeshError, Message, raise_all
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.solver.prepare import referenced
 from slideviz.solver.steps import Progress
 from slideviz.streaming.quality import CellCounts, measure_mesh
 from slideviz.streaming.source import FileSource, MemorySource, MeshSource, has_cells_of
@@ -42,8 +43,11 @@ def read_case(arguments: Namespace) -> Case:
 
 
 def read_mesh(case: Case, path: Path) -> tuple[Case, Mesh]:
-    """Return the case with the names of the boundaries as its mesh has them, and the mesh."""
-    mesh = read(path, zone=case.zone, file_format=case.mesh_format)
+    """Return the case with the names of the boundaries as its mesh has them, and the mesh.
+
+    The mesh has the reference that the case names.
+    """
+    mesh = referenced(case, read(path, zone=case.zone, file_format=case.mesh_format))
     return with_marker_names(case, mesh), mesh
 
 
@@ -216,10 +220,11 @@ def open_mesh(arguments: Namespace, case: Case | None = None) -> Iterator[OpenMe
                         f"{reference} cannot be the reference of {skin.name}: it must have the "
                         "same cells; give the undeformed mesh"
                     )
-            elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
-                base = open_one(case.mesh_file, zone, case.mesh_format)
-                base = base if _same_cells(mesh, base) else None
-                reference = None if base is None else case.mesh_file
+            elif case is not None and (file := case.reference_file or case.mesh_file):
+                kind = case.mesh_format if file == case.mesh_file else None
+                base = open_one(file, zone, kind) if file.is_file() else None
+                base = base if base is not None and _same_cells(mesh, base) else None
+                reference = None if base is None else file
         source = _source(stack, mesh, base, skin)
         if case is not None:
             known = len(case.warnings)

@@ -283,6 +283,7 @@ def silent_timer(seconds: dict[str, float]) -> PhaseTimer:
 def measured(case: Case, mesh: Mesh, steps: Sequence[Step], timer: PhaseTimer) -> RunResult:
     """Return the outcome of a run in memory, with the qualities of its meshes."""
     last = steps[-1].mesh
+    mesh = mesh.undeformed
     with timer.phase("quality"):
         layers = walls(last, mesh, case.walls(mesh.marker_names))  # takes most memory: first
         found = quality(last, reference=mesh, metric=case.quality_metric)

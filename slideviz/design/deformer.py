@@ -570,6 +570,7 @@ class Deformer:
         case: Case,
         displacements: FloatArray | None = None,
         progress: Report | None = None,
+        reference: Mesh | None = None,
     ) -> None:
         """Run the solver at the reference, and keep its choices.
 
@@ -585,6 +586,8 @@ class Deformer:
             else is chosen at the first.
         progress
             Called often with a ``Progress``; an exception it raises ends the work at once.
+        reference
+            The undeformed mesh, if ``mesh`` was deformed from it, as of `slideviz.deform`.
 
         Raises
         ------
@@ -607,7 +610,7 @@ class Deformer:
         case, left_out = without_repair(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
-        prepared = prepare(case, mesh)
+        prepared = prepare(case, mesh if reference is None else mesh.with_reference(reference))
         with beginning_with(prepared.doubts):
             self._choose(prepared, left_out, displacements, progress)
 

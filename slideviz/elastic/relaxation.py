@@ -74,7 +74,7 @@ UNFOLDING = 40
 
 ROUNDS = 10  # most regularisations
 
-AT_REST = 1e-20  # energy of a cell that counts as nothing
+AT_REST = 1e-14  # energy of a cell that counts as nothing: rounding is a hundredth of it
 
 SOLVED = 1e-13
 PRODUCTS = 5000

@@ -271,6 +271,13 @@ def has_steps_and_is_idle(now: CommandState) -> bool:
     return has_steps(now) and is_idle(now)
 
 
+def can_continue(now: CommandState) -> bool:
+    """Return whether the shown run has steps of all zones in memory, and no job runs."""
+    mesh = now.session.mesh
+    whole = mesh is not None and len(mesh.parts) == mesh.zones and not now.session.lacks_cells
+    return whole and has_steps_and_is_idle(now)
+
+
 def has_wheel(now: CommandState) -> bool:
     """Return whether periodic boundaries make the mesh a passage of a wheel, and no job runs."""
     return is_idle(now) and bool(wheel_passages(now.session))
@@ -442,6 +449,11 @@ _RUN = Menu("run", "&Run", entries=(
             call("running.repair"), ("F7",), enabled=needs_repair,
             why_not="No cell needs repair: all are proved valid, and their quality is above the "
             "limit in the method panel."),
+    Command("continue_run", "C&ontinue from this run…",
+            "Save the deformed mesh, and open it with these settings for a further motion: its "
+            "cells are relaxed to the shapes of the undeformed mesh, and compared with them.",
+            call("files.continue_run"), enabled=can_continue,
+            why_not="There are no steps of a whole mesh in memory: run the case first."),
     None,
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "

@@ -24,7 +24,7 @@ from slideviz.samples.table import SAMPLES
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
 from slideviz.session.run_messages import stopped_words
-from slideviz.session.saving import Unsaved, files_beside, view_to_case
+from slideviz.session.saving import Unsaved, continued_case, files_beside, view_to_case
 from slideviz.session.session_file import ENDING, MissingMeshError, files_of
 from slideviz.session.state import Session
 from slideviz.system.atomic import atomic_write
@@ -267,6 +267,18 @@ class Files(QObject):
             frame,
             overwrite,
         )
+
+    def continue_run(self) -> None:
+        """Save the mesh of the last step, and open it with the case, for a further motion."""
+        self.save_mesh(last=True, then=self._open_saved)
+
+    def _open_saved(self) -> None:
+        path = self._saved_to
+        assert path is not None
+        session = self.window.store.session
+        if self.ask_about_unsaved(self._open_saved, "opening the deformed mesh"):
+            job = partial(jobs.open_file, case=continued_case(session, path))
+            self.window.running.start_job(f"Opening {path.name}", self._opened, job, path, None)
 
     def ask_output(self) -> Path | None:
         """Ask for the deformed mesh's file, not that of a mesh that stays in its file; or None."""

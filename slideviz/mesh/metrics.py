@@ -29,11 +29,12 @@ from slideviz.mesh.model import (
     Mesh,
     Signs,
     Skin,
+    checked_reference,
     row_norms,
     sealed,
 )
 from slideviz.mesh.orientation import reference_of
-from slideviz.mesh.quality import Quality, checked_reference, quality
+from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.topology import vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts

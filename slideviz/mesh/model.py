@@ -321,6 +321,9 @@ class Mesh:
     """Warnings of the reader, a sentence each."""
     interfaces: tuple[ZoneInterface, ...] = ()
     """The boundaries that coincide with boundaries of other zones of the file."""
+    reference: Mesh | None = None
+    """The undeformed mesh of the same cells that this one was deformed from; None: it is undeformed
+    itself. `with_reference` gives it one."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -340,6 +343,29 @@ class Mesh:
         points = slice(0, len(self.points))
         cells = slice(0, len(self.cells))
         return (ZonePart(self, points, cells, slice(0, len(self.markers)), 0, 0),)
+
+    @property
+    def undeformed(self) -> Mesh:
+        """Return the mesh with the undeformed cells: its reference, or itself without one."""
+        return self if self.reference is None else self.reference
+
+    @check_types
+    def with_reference(self, reference: Mesh | None) -> Self:
+        """Return the mesh as one that was deformed from ``reference``; None: it was from none.
+
+        Raises MeshError if that has other cells. Its own reference, if it has one, takes its place.
+        """
+        base = None if reference is None else checked_reference(reference, self).undeformed
+        if not isinstance(self, Assembly):
+            return replace(self, reference=base)
+        bases = [None] * len(self.parts) if base is None else [part.mesh for part in base.parts]
+        parts = tuple(
+            replace(
+                part, mesh=part.mesh.with_points(self.points[part.points]).with_reference(of_part)
+            )
+            for part, of_part in zip(self.parts, bases, strict=True)
+        )
+        return replace(self, reference=base, parts=parts)
 
     @property
     def dim(self) -> int:
@@ -417,6 +443,42 @@ class Mesh:
         if moved.shape != self.points.shape:
             raise MeshError(f"points have shape {moved.shape}; expected {self.points.shape}")
         return replace(self, points=moved)
+
+
+def checked_reference(reference: Mesh, mesh: Mesh) -> Mesh:
+    """Return ``reference`` if it has the cells of ``mesh``, and raise MeshError otherwise."""
+    fault = _difference(mesh, reference)
+    if fault:
+        raise MeshError(
+            f"{reference.name} ({len(reference.cells)} cells, {len(reference.points)} points) "
+            f"cannot be the reference of {mesh.name} ({len(mesh.cells)} cells, "
+            f"{len(mesh.points)} points): it must have the same cells, but {fault}; give the "
+            "undeformed mesh"
+        )
+    return reference
+
+
+def _difference(mesh: Mesh, other: Mesh) -> str:
+    """Return how points and cells of ``other`` differ from those of ``mesh``; "" if they do not."""
+    for word, ours, theirs in (
+        ("dimensions", mesh.dim, other.dim),
+        ("zones", len(mesh.parts), len(other.parts)),
+        ("points", len(mesh.points), len(other.points)),
+        ("cells", len(mesh.cells), len(other.cells)),
+    ):
+        if ours != theirs:
+            return f"it has {theirs} {word} instead of {ours}"
+    cells = mesh.cells
+    changed = np.flatnonzero(cells.types != other.cells.types)
+    if len(changed):
+        cell = changed[0]
+        kinds = (ELEMENTS[int(each.types[cell])].name for each in (other.cells, cells))
+        return f"cell {cell} is a {' instead of a '.join(kinds)}"
+    changed = np.flatnonzero(cells.connectivity != other.cells.connectivity)
+    if not len(changed):
+        return ""
+    cell = int(np.searchsorted(cells.offsets, changed[0], "right")) - 1
+    return f"cell {cell} has other nodes, or the same in another order"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

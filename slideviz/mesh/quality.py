@@ -35,6 +35,7 @@ from slideviz.mesh.model import (
     IntArray,
     Mesh,
     Signs,
+    checked_reference,
     sealed,
 )
 from slideviz.mesh.orientation import reference_of
@@ -310,7 +311,8 @@ def quality(
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(SKEW_METRICS)}")
     check_cells(mesh)
     check_size(mesh)
-    sums, signs = reference_of(mesh if reference is None else checked_reference(reference, mesh))
+    base = mesh if reference is None else checked_reference(reference, mesh).undeformed
+    sums, signs = reference_of(base)
     values, size, skew = np.empty((3, len(mesh.cells)))
     status = np.empty(len(mesh.cells), np.uint8)
 
@@ -360,18 +362,6 @@ def cell_quality(
         # 1 is the bound of every formula; a value above it by rounding would be in no bin.
         skew = np.where(good, np.minimum(SKEW_METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
     return size, skew, status
-
-
-def checked_reference(reference: Mesh, mesh: Mesh) -> Mesh:
-    """Return ``reference`` if it has the cells of ``mesh``, and raise MeshError otherwise."""
-    same_points = reference.points.shape == mesh.points.shape
-    if not (same_points and reference.cells.same_as(mesh.cells)):
-        raise MeshError(
-            f"{reference.name} ({len(reference.cells)} cells, {len(reference.points)} points) "
-            f"cannot be the reference of {mesh.name} ({len(mesh.cells)} cells, "
-            f"{len(mesh.points)} points): it must have the same cells; give the undeformed mesh"
-        )
-    return reference
 
 
 def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:

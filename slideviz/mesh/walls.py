@@ -40,8 +40,16 @@ from slideviz.errors import MeshError
 from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, row_dots, row_norms, sealed
-from slideviz.mesh.quality import checked_reference
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    Mesh,
+    Skin,
+    checked_reference,
+    row_dots,
+    row_norms,
+    sealed,
+)
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -505,7 +513,7 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     """
     if isinstance(mesh, Skin):
         raise MeshError(f"{mesh.name}: its walls need all cells in memory; read the whole mesh")
-    base = mesh if reference is None else checked_reference(reference, mesh)
+    base = mesh if reference is None else checked_reference(reference, mesh).undeformed
     chosen = mesh.marker_names if markers is None else tuple(markers)
     for name in chosen:
         mesh.marker(name)
@@ -513,7 +521,7 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
     after = measure_walls(columns, mesh.points)
     before = None
     if reference is not None:
-        before = measure_walls(columns, reference.points)
+        before = measure_walls(columns, base.points)
         with np.errstate(all="ignore"):
             after["height_ratio"] = sealed(after["first_height"] / before["first_height"])
         after["angle_change"] = sealed(np.abs(after["wall_angle"] - before["wall_angle"]))

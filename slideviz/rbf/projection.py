@@ -118,6 +118,14 @@ class Tracks:
     """Whether any track bends or has an end within reach of its own tangent plane: whether
     projection does more than removing the normal component."""
 
+    def farthest(self, coords: FloatArray) -> float:
+        """Return the largest distance of nodes, at ``coords`` (n, d), from their tracks."""
+        out = 0.0
+        for index, track in enumerate(self.tracks):
+            at = coords[self.of_node == index]
+            out = max(out, float(np.linalg.norm(track.query(at) - at, axis=1).max(initial=0.0)))
+        return out
+
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
         """Return the displacements (m, d) from ``coords`` to the closest points on the tracks.
 

@@ -65,6 +65,7 @@ from slideviz.session.session_file import (
 from slideviz.session.state import CheckedLimits, Run, Session, StepFrame
 from slideviz.solver.deform import deform
 from slideviz.solver.interface_motion import check_motions
+from slideviz.solver.prepare import referenced
 from slideviz.solver.repair_stage import mended_frame
 from slideviz.solver.rims import rims_key
 from slideviz.system.cleanup import private_folder
@@ -278,14 +279,15 @@ def open_file(
     stopped: Stopped,
     mesh_file: Path | None = None,
     unpacked: Path | None = None,
+    case: Case | None = None,
 ) -> Opened:
     """Return a mesh, or the case or session in a file or picture with its mesh, ready to be shown.
 
     ``mesh_file``: the mesh of a session, where it is neither beside it nor where it was.
-    ``unpacked``: the folder for copies of files that a session has; by default its own. Raises
+    ``unpacked``: the folder for copies of files that a session has; by default its own.
+    ``case``: that of the mesh at ``path``. Raises
     SlidevizError if the file cannot be used; the message says what and where.
     """
-    case = None
     mesh_path = path
     ending = path.suffix.lower()
     moved = dict[Path, Path]()
@@ -313,6 +315,8 @@ def open_file(
     if ending != ENDING:
         return opened
     session = opened.session
+    assert session.mesh is not None
+    mesh = session.mesh  # with the reference of the case
     content = read_session(path, session.first, moved)
     runs = [_restored(run, mesh, report, stopped) for run in content.runs]
     remark = ""
@@ -361,7 +365,9 @@ def prepare(
     mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
 ) -> Opened:
     """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
-    case = None if case is None else with_marker_names(case, mesh)
+    if case is not None:
+        mesh = referenced(case, mesh)
+        case = with_marker_names(case, mesh)
     going_on = partial(raise_if_cancelled, stopped)
     going_on()
     report(JobProgress("Finding the boundaries"))
@@ -372,7 +378,7 @@ def prepare(
     report(JobProgress("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
     if not isinstance(mesh, Skin):
-        measured = quality(mesh, metric=metric, going_on=going_on)
+        measured = quality(mesh, mesh.reference, metric, going_on)
         periodic = {name for pair in pairs for name in (pair.first, pair.second)}
         names = [name for name in mesh.marker_names if name not in periodic]
         first = StepFrame(mesh, measured, walls=_walls(mesh, mesh, names))

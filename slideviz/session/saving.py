@@ -244,6 +244,16 @@ def bound_sections(
     return tuple(out)
 
 
+def continued_case(session: Session, path: Path) -> Case:
+    """Return the case of the deformed mesh of a session, saved at ``path``, for a further motion.
+
+    The mesh of the session becomes the reference, unless that has one itself.
+    """
+    case = view_to_case(session)
+    reference = case.reference_file or session.path
+    return case.change(mesh_file=path, mesh_format=None, reference_file=reference, source=None)
+
+
 def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
     """Return new paths, beside the case file ``path``, for a case's files that are in ``folder``.
 
@@ -251,7 +261,7 @@ def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
     """
     if folder in path.parents:
         return {}
-    used = [case.mesh_file, *(path for m in case.motions for path in m.files)]
+    used = [case.mesh_file, case.reference_file, *(path for m in case.motions for path in m.files)]
     return {
         file: path.with_suffix(file.suffix)
         if file == case.mesh_file

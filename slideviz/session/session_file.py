@@ -263,8 +263,9 @@ def read_session(
 
 
 def files_of(case: Case) -> list[Path]:
-    """Return the files that a case needs: its mesh, and those of its motions."""
-    files = [case.mesh_file, *(path for motion in case.motions for path in motion.files)]
+    """Return the files that a case needs: its mesh, the reference, and those of its motions."""
+    of_motions = (path for motion in case.motions for path in motion.files)
+    files = case.mesh_file, case.reference_file, *of_motions
     return [file for file in files if file is not None]
 
 

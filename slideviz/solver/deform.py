@@ -46,6 +46,7 @@ def deform(
     setup: Setup | None = None,
     certify: bool = False,
     converged: bool = False,
+    reference: Mesh | None = None,
 ) -> Iterator[Step]:
     """Yield the deformed mesh of each step, with numbers on how it was made.
 
@@ -66,6 +67,10 @@ def deform(
     converged
         Whether relaxation goes on until only rounding is left, as that of a `Deformer`; it takes
         longer, and differences of runs then are those that a derivative predicts.
+    reference
+        The undeformed mesh of the same cells, if ``mesh`` was deformed from it: cells are relaxed
+        to its shapes, layers keep its heights, and the quality of a step's mesh compares with it.
+        So a motion and its reverse, in two runs, lead back.
 
     Raises
     ------
@@ -99,7 +104,8 @@ def deform(
     1 [0.   1.28 2.5 ]
     """
     report = progress or (lambda _: None)
-    prepared = prepare(case, mesh)
+    prepared = prepare(case, mesh if reference is None else mesh.with_reference(reference))
+    mesh = prepared.mesh
     check_limits = partial(rated_limits, prepared.case, mesh)
     with beginning_with(prepared.doubts):
         if isinstance(mesh, Assembly):

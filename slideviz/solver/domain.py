@@ -61,9 +61,13 @@ class Domain:
 def find_domain(case: Case, mesh: Mesh) -> Domain:
     """Return the domain of a mesh with the roles of a case.
 
+    If the mesh has a reference, all is found from that, but for coordinates and normals: where
+    boundaries bend, a node that slides along two of them would else be the corner of a third.
     Raises MeshError if periodic markers do not match, a marker element is not a side of a cell, or
     a coordinate is not finite, or too large to compute with.
     """
+    if mesh.reference is not None:
+        return _deformed(find_domain(case, mesh.reference), mesh)
     case, notes = roles_of_copies(case, mesh)
     _require_finite(mesh)
     check_size(mesh)
@@ -93,6 +97,16 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes, *_ambiguous_period(case, mesh, pairs)),
     )
+
+
+def _deformed(domain: Domain, mesh: Mesh) -> Domain:
+    """Return the domain of a mesh with the coordinates of a deformed one."""
+    _require_finite(mesh)
+    check_size(mesh)
+    before = domain.frame.points(domain.coords)
+    coords = domain.coords + domain.frame.difference(before, mesh.points - before)
+    warnings = tuple(dict.fromkeys((*domain.warnings, *mesh.remarks)))
+    return replace(domain, coords=coords, normals=domain.normals_at(coords), warnings=warnings)
 
 
 def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:

@@ -12,7 +12,14 @@ from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone
 from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.errors import CaseError, DeformError, Doubt, doubts_of, raise_all
-from slideviz.mesh.model import Mesh
+from slideviz.formats.files import read
+from slideviz.mesh.model import Mesh, Skin
+from slideviz.mesh.zones import zones_of
+
+NOT_STREAMED = (
+    "REFERENCE_FILENAME needs both meshes in memory and cannot be streamed; leave it out, or run "
+    "without --stream"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +43,7 @@ class Prepared:
     def zones(self) -> tuple[Prepared, ...]:
         """Each zone with its case; of a mesh of one zone, that."""
         cases = zone_cases(self.alone, self.mesh)
-        each = zip(cases, self.mesh.parts, strict=True)
-        return tuple(Prepared(case, part.mesh) for case, part in each)
+        return tuple(map(Prepared, cases, zones_of(self.mesh)))
 
 
 @contextmanager
@@ -50,11 +56,25 @@ def beginning_with(doubts: tuple[Doubt, ...]) -> Iterator[None]:
         raise
 
 
-def prepare(case: Case, mesh: Mesh) -> Prepared:
-    """Return a case with a mesh that it fits.
+def referenced(case: Case, mesh: Mesh) -> Mesh:
+    """Return the mesh with the reference that a case names, unless it has one.
 
-    Raises CaseError with a line for each problem where it does not fit.
+    Raises MeshError if that cannot be read, or has other cells.
     """
+    if case.reference_file is None or mesh.reference is not None:
+        return mesh
+    if isinstance(mesh, Skin):
+        raise CaseError(NOT_STREAMED)
+    return mesh.with_reference(read(case.reference_file, zone=case.zone))
+
+
+def prepare(case: Case, mesh: Mesh) -> Prepared:
+    """Return a case with a mesh that it fits, which has the reference that the case names.
+
+    Raises CaseError with a line for each problem where it does not fit, and MeshError if the
+    reference cannot be read, or has other cells.
+    """
+    mesh = referenced(case, mesh)
     case = with_marker_names(case, mesh)
     raise_all(check_case(case, mesh))
     return Prepared(case, mesh)

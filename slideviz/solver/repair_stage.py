@@ -25,10 +25,19 @@ from slideviz.elastic.conditions import conditions
 from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Mesh, Skin, sealed
+from slideviz.mesh.model import (
+    Assembly,
+    Cells,
+    FloatArray,
+    IntArray,
+    Mesh,
+    Skin,
+    checked_reference,
+    sealed,
+)
 from slideviz.mesh.nearest import row_groups
 from slideviz.mesh.periodic import find_pairs, pair_up
-from slideviz.mesh.quality import VALID, checked_reference, quality
+from slideviz.mesh.quality import VALID, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, quality_ratings, repair_mesh
 from slideviz.mesh.zones import spellings, with_zones, zones_of
@@ -170,7 +179,7 @@ def mended_step(
     """Return a step of a run with its bad cells mended; ``mesh`` is undeformed."""
     timer = step_timer(report, step.index, step.total)
     with timer.phase("repair") as tick:
-        done = mend(case, mesh, step.mesh, mesh, tick, setup)
+        done = mend(case, mesh, step.mesh, mesh.undeformed, tick, setup)
     seconds = {**step.seconds, "repair": timer.seconds["repair"]}
     return replace(step, mesh=done.mesh, repaired=done, seconds=seconds)
 
@@ -221,7 +230,7 @@ def mend(
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
-    layers = _layers(case, mesh) if setup is None else setup.rigid
+    layers = _layers(case, mesh.undeformed) if setup is None else setup.rigid
     done = repair_mesh(
         domain, freedom, shapes, layers=layers, below=limit, metric=metric, report=tick
     )

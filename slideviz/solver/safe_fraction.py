@@ -6,8 +6,7 @@ from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import SafeFraction, step_safety
-from slideviz.mesh.model import Mesh
-from slideviz.mesh.quality import checked_reference
+from slideviz.mesh.model import Mesh, checked_reference
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import safe_fraction_of
 

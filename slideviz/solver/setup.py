@@ -87,6 +87,8 @@ nearly all candidates are chosen, at a higher cost than that of all at once."""
 
 RELAXED_CELLS = 1_000_000  # most cells of a mesh that RELAX= AUTO relaxes
 
+ON_TRACK = 1e-6  # most distance of a node from the wall it slid along, over the extent
+
 LOOSE = 0.1  # a tolerance above this part of the largest displacement gets a warning
 
 
@@ -313,16 +315,23 @@ def setup_of(
     coords = domain.coords
     axis = domain.axis
     span = span_field(case, mesh) if moves_over_span(case) else None
-    tracks = find_tracks(
-        domain.boundary,
-        domain.fans,
-        domain.classes,
-        lambda nodes: corners_of(coords, nodes, axis),
-        roles=case.roles,
-        feature_angle_deg=case.feature_angle_deg,
-        shift=frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None,
-        holes=domain.boundary.facets[:0] if span is None else span.holes,
-    )
+    undeformed = domain if mesh.reference is None else find_domain(case, mesh.reference)
+
+    def tracks_of(coords: FloatArray) -> Tracks:
+        return find_tracks(
+            domain.boundary,
+            domain.fans,
+            domain.classes,
+            lambda nodes: corners_of(coords, nodes, axis),
+            roles=case.roles,
+            feature_angle_deg=case.feature_angle_deg,
+            shift=frame.shift() if case.periodic in ("fixed", "moving") and domain.pairs else None,
+            holes=domain.boundary.facets[:0] if span is None else span.holes,
+        )
+
+    tracks = tracks_of(undeformed.coords)
+    if undeformed is not domain and tracks.farthest(coords) > ON_TRACK * mesh.extent:
+        tracks = tracks_of(coords)  # walls that were moved themselves
     warnings = (
         *domain.warnings,
         *conditions.warnings,
@@ -331,8 +340,9 @@ def setup_of(
         *file_before_motions(case),
         *motion_doubts(case, mesh),
     )
-    zone = layer_zone(case, mesh, domain, conditions.known)
-    warnings += (*_not_relaxed(case, mesh), *thickness_warnings(case, mesh, domain, zone))
+    zone = layer_zone(case, mesh.undeformed, undeformed, conditions.known)
+    thickness = thickness_warnings(case, mesh.undeformed, undeformed, zone)
+    warnings += (*_not_relaxed(case, mesh), *thickness)
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
@@ -422,7 +432,7 @@ def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Rel
     from slideviz.elastic.relaxation import Relaxation
 
     body = elastic_body(mesh, frame, axis)
-    return Relaxation(mesh, without_halo(mesh)[0], body)
+    return Relaxation(mesh.undeformed, without_halo(mesh.undeformed)[0], body)
 
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:

@@ -38,7 +38,7 @@ from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import stray_warning
 from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone_runs
-from slideviz.solver.prepare import Prepared, beginning_with, prepare
+from slideviz.solver.prepare import NOT_STREAMED, Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step, step_timer
@@ -666,7 +666,7 @@ class _ZoneRuns:
 def require_stream(case: Case) -> None:
     """Raise where a case cannot be streamed.
 
-    Raises CaseError if its method, linear elasticity, relaxation, repair of each step, or one of
+    Raises CaseError if its reference, linear elasticity, relaxation, repair of each step, or one of
     its limits needs the whole mesh at once, and MeshError if its mesh is of no format that can be
     streamed.
     """
@@ -677,6 +677,8 @@ def require_stream(case: Case) -> None:
             "REPAIR_STEPS= YES needs the whole mesh after each step and cannot be streamed; use "
             "REPAIR_STEPS= NO, or run it without --stream"
         )
+    if case.reference_file is not None:
+        raise CaseError(NOT_STREAMED)
     if case.relax == "yes" and case.method == "rbf":
         raise CaseError(
             "RELAX= YES needs the whole mesh at once and cannot be streamed; use RELAX= NO or "

@@ -64,6 +64,7 @@ from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
 from slideviz.mesh.quality import quality
 from slideviz.solver.deform import deform
+from slideviz.solver.prepare import referenced
 from slideviz.solver.steps import Step
 from slideviz.streaming.run import require_stream, stream
 from slideviz.system.cleanup import clean_up, starting
@@ -544,6 +545,7 @@ def sweep(
     elif mesh is None:
         assert case.mesh_file is not None
         mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    mesh = None if mesh is None else referenced(case, mesh)
     if folder is None and (meshes or resume):
         raise CaseError("meshes and resume need a folder; give folder=")
     results = None

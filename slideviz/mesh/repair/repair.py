@@ -18,9 +18,18 @@ import numpy as np
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobian_slopes import write_slopes
 from slideviz.mesh.jacobians import CORNERS, INVERTED, VALID
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, Signs, row_norms, sealed
+from slideviz.mesh.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    Signs,
+    checked_reference,
+    row_norms,
+    sealed,
+)
 from slideviz.mesh.orientation import reference_of
-from slideviz.mesh.quality import Quality, cell_quality, checked_reference, quality
+from slideviz.mesh.quality import Quality, cell_quality, quality
 from slideviz.mesh.repair.descent import descend
 from slideviz.mesh.repair.energy import Targets, targets
 from slideviz.mesh.repair.freedom import Freedom, places
@@ -172,7 +181,7 @@ def repair_mesh(
     ``metric``: of the quality (`slideviz.mesh.quality.Quality`).
     ``report``: called with the fraction that is done; may raise, to cancel.
     """
-    shapes = None if reference is None else checked_reference(reference, mesh)
+    shapes = None if reference is None else checked_reference(reference, mesh).undeformed
     ratings = quality_ratings(quality(mesh, shapes, metric))
     before = np.flatnonzero(ratings < below)
     whole = _Whole(mesh, shapes, freedom, np.array(layers, np.int64))
