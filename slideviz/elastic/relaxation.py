@@ -52,7 +52,7 @@ worst cells joins."""
 SURE = 0.1
 """An iteration that promises to take away less than this part of that is the last one."""
 
-NEWTON = 40
+NEWTON = 100
 ALIKE = 3e-11
 STILL = 1e-14
 SEEN = 1e-6

@@ -364,3 +364,18 @@ def test_the_same_problem_has_the_same_mesh(make, change, relax):
         found.append(last(own, one).mesh.points)
     back = found[1][row] @ np.linalg.inv(place).T
     assert np.abs(back - found[0]).max() < 1e-9 * mesh.extent
+
+
+def test_derivatives_where_a_motion_nearly_closes_a_gap():
+    mesh = builders.square(20)
+    gap = mesh.points[mesh.marker("BLOCK").nodes, 0].min() - mesh.points[:, 0].min()
+    roles = dict.fromkeys(mesh.marker_names, "fixed") | {"BLOCK": "moving"}
+    motions = (sv.Translate("BLOCK", (-0.9 * gap, 0.0)),)
+    deformer = sv.Deformer(mesh, sv.Case(roles=roles, motions=motions, relax="yes"))
+    design = deformer.displacement
+    rng = np.random.default_rng(0)
+    change = rng.standard_normal(design.shape)
+    seed = rng.standard_normal(mesh.points.shape)
+    forward = np.vdot(seed, deformer.jvp(design, change))
+    assert forward == pytest.approx(np.vdot(deformer.vjp(design, seed), change), rel=1e-9)
+    assert sv.quality(mesh.with_points(deformer.deform(design)), mesh).inverted == 0
