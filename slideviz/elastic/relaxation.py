@@ -568,6 +568,16 @@ class Unknowns:
         blocks, free = projections(there, self.body, rows)
         return replace(self, problem=there, rows=rows, blocks=blocks, free=free)
 
+    def maps(self, nodes: IntArray) -> FloatArray:
+        """Return the maps (m, d, d) from their blocks to the displacements of nodes (m,)."""
+        d = self.turn.shape[1]
+        out = np.tile(np.eye(d), (len(nodes), 1, 1))
+        turned = np.isin(nodes, self.turned)
+        out[turned] = self.turn[np.searchsorted(self.turned, nodes[turned])]
+        bound = np.isin(self.place[nodes], self.blocks)
+        out[bound] @= self.free[np.searchsorted(self.blocks, self.place[nodes[bound]])]
+        return out
+
     def within(self, unknown: FloatArray) -> FloatArray:
         """Return unknowns (k, d) without their part in directions that are held."""
         out = unknown.copy()

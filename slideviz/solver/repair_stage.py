@@ -21,7 +21,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.case.zone_cases import zone_cases
-from slideviz.elastic.conditions import conditions
+from slideviz.elastic.relaxation import Unknowns
 from slideviz.errors import CaseError, MeshError, Message, not_one_of, raise_all
 from slideviz.mesh.cached_boundary import shell_of
 from slideviz.mesh.halo import without_halo
@@ -404,20 +404,24 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     inner = slides & _only_on(mesh, case.markers_with("internal"))
     before = setup.constraints(setup.coords)[1]
 
-    def maps_at(coords: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray]:
+    def constraints(coords: FloatArray) -> tuple[IntArray, FloatArray]:
         nodes, normals = setup.constraints(coords)
-        normals = np.where(inner[nodes][:, None], before, normals)
-        there = replace(problem, coords=coords, normal_nodes=nodes, normals=normals)
-        given = conditions(there, body, held, np.zeros((len(held), mesh.dim)))
-        return given.place, given.turn, given.plain
+        return nodes, np.where(inner[nodes][:, None], before, normals)
 
-    place, turn, plain = maps_at(coords)
-    bound = np.flatnonzero((place >= 0) & ~plain)
+    unknowns = Unknowns.of(problem, body, held).on(constraints, coords)
+    place = sealed(unknowns.place)
+    bound = np.flatnonzero(np.isin(place, unknowns.blocks))
+    bound = np.union1d(bound, unknowns.turned)
+    maps = unknowns.maps(bound)
     if not (setup.tracks.curved or frame.cylindrical):  # an arc about the axis is straight there
-        return Freedom(sealed(place), bound, turn[bound], bound[:0])
+        return Freedom(place, bound, maps, bound[:0])
     curved = np.flatnonzero(slides & (place >= 0))
+
+    def maps_at(coords: FloatArray, nodes: IntArray) -> FloatArray:
+        return unknowns.on(constraints, coords).maps(nodes)
+
     project = _projection(setup, points, coords, inner, maps_at)
-    return Freedom(sealed(place), bound, turn[bound], curved, project)
+    return Freedom(place, bound, maps, curved, project)
 
 
 def _only_on(mesh: Mesh, names: Sequence[str]) -> NDArray[np.bool_]:
@@ -451,13 +455,13 @@ def _projection(
     at: FloatArray,
     start: FloatArray,
     inner: NDArray[np.bool_],
-    maps_at: Callable[[FloatArray], tuple[IntArray, FloatArray, np.ndarray]],
+    maps_at: Callable[[FloatArray, IntArray], FloatArray],
 ) -> Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Return the function that puts sliding nodes back on their boundary (`Freedom.project`).
 
     ``at``, ``start`` (n, d): points and coordinates before the repair.
     ``inner`` (n,): nodes that move in the planes of their normals before, wherever they are.
-    ``maps_at``: returns the maps at coordinates.
+    ``maps_at``: returns the maps of nodes at coordinates.
     """
     frame = setup.frame
     representative = setup.classes.representative
@@ -476,7 +480,7 @@ def _projection(
         now[nodes] += slid[one]
         # A node in its place keeps its bits.
         stays = ~slid[one].any(axis=1, keepdims=True)
-        return np.where(stays, at[nodes], frame.points(now[nodes])), maps_at(now)[1][nodes]
+        return np.where(stays, at[nodes], frame.points(now[nodes])), maps_at(now, nodes)
 
     return project
 
