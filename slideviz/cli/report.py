@@ -477,12 +477,14 @@ def _print_run(
     if (relax := report["relax"]) is not None:
         words = f"{counted(relax['rounds'], 'iteration')}, to {relax['residual']:.1g}"
         rows.append(("relaxation", words))
-    if (mended := report["repair"]) is not None and mended["cells_before"]:
+    mended = report["repair"]
+    if mended is not None and (mended["cells_before"] or mended["nodes_moved"]):
         counts = "; ".join(
             f"{counted(mended[f'{key}_before'], what)} before, {mended[f'{key}_after']} after"
             for key, what in (("folded", "folded cell"), ("cells", "bad cell"))
             if mended[f"{key}_before"]
         )
+        counts = counts or "lowest qualities raised"
         far = f"up to {mended['largest_move']:.3g}"
         rows.append(("repair", f"{counts}; {counted(mended['nodes_moved'], 'node')} moved, {far}"))
     elif mended is not None:

@@ -33,11 +33,12 @@ from slideviz.mesh.model import (
     Mesh,
     Skin,
     checked_reference,
+    row_norms,
     sealed,
 )
 from slideviz.mesh.nearest import row_groups
 from slideviz.mesh.periodic import find_pairs, pair_up
-from slideviz.mesh.quality import VALID, quality
+from slideviz.mesh.quality import VALID, Quality, quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.repair import Impossible, quality_ratings, repair_mesh
 from slideviz.mesh.zones import spellings, with_zones, zones_of
@@ -50,6 +51,11 @@ from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step, step_timer
 from slideviz.system.threads import Tick, equal_shares
 from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS, SLIDES, RepairTarget, Role, SkewMetric
+
+LIFTED = 1.0
+LOSS = 0.002
+"""Of the cells that are lifted after a relaxation: their number over the root of that of all cells,
+and how much lower the mean quality may be for it."""
 
 _NO_IMAGES = "they are not images of each other; name two that are"
 
@@ -179,7 +185,8 @@ def mended_step(
     """Return a step of a run with its bad cells mended; ``mesh`` is undeformed."""
     timer = step_timer(report, step.index, step.total)
     with timer.phase("repair") as tick:
-        done = mend(case, mesh, step.mesh, mesh.undeformed, tick, setup)
+        lifts = setup is not None and step.relaxed is not None
+        done = mend(case, mesh, step.mesh, mesh.undeformed, tick, setup, lifts=lifts)
     seconds = {**step.seconds, "repair": timer.seconds["repair"]}
     return replace(step, mesh=done.mesh, repaired=done, seconds=seconds)
 
@@ -209,6 +216,8 @@ def mend(
     reference: Mesh | None,
     tick: Tick,
     setup: Setup | None = None,
+    *,
+    lifts: bool = False,
 ) -> MeshRepair:
     """Return a mesh with its bad cells mended.
 
@@ -216,6 +225,7 @@ def mend(
     ``mesh`` and ``now``: the mesh whose boundaries nodes slide on, undeformed, and the one to mend.
     ``reference``: the mesh whose shapes cells shall have; None: the ideal ones.
     ``setup``: that of the run, if there was one.
+    ``lifts``: whether the lowest of the valid cells are lifted, too.
     """
     if isinstance(mesh, Assembly) and isinstance(now, Assembly):
         return _mended_zones(case, mesh, now, reference, tick)
@@ -224,17 +234,30 @@ def mend(
     metric = case.quality_metric
     found = quality(domain, shapes, metric)
     limit = case.repair_below
+    goal = limit
     if shapes is not None:
-        limit = min(limit, quality(shapes, metric=metric).min)
-    if not (quality_ratings(found) < limit).any():
+        undeformed = quality(shapes, metric=metric).min
+        limit = min(limit, undeformed)
+        goal = min(undeformed, max(limit, _low_quality(found))) if lifts else limit
+    if not (quality_ratings(found) < goal).any():
         none = np.empty(0, np.int64)
         return MeshRepair(now, none, none, none, none, none, now.points[none], 0.0)
     freedom = find_freedom(case, mesh, now.points, setup)
     layers = _layers(case, mesh.undeformed) if setup is None else setup.rigid
+    mending, lifting = equal_shares(tick, 2)
     done = repair_mesh(
-        domain, freedom, shapes, layers=layers, below=limit, metric=metric, report=tick
+        domain, freedom, shapes, layers=layers, below=limit, metric=metric, report=mending
     )
     points = done.points
+    if setup is not None and goal > limit and not len(done.folded_after):
+        plain = domain.with_points(points)
+        stays = np.concatenate([layers, _first_layers(domain.cells, setup)])
+        lifted = repair_mesh(
+            plain, freedom, shapes, layers=stays, below=goal, metric=metric, report=lifting
+        ).points
+        mean = quality(domain.with_points(lifted), shapes, metric).mean
+        if mean >= quality(plain, shapes, metric).mean - LOSS:
+            points = lifted
     if now.halo is not None:
         beyond = np.flatnonzero(np.isin(now.halo.receivers, now.halo.outer))
         points = now.halo.move_receivers(now.points, points, beyond)
@@ -252,10 +275,26 @@ def mend(
         number[done.folded_after],
         moved,
         before,
-        done.largest_move,
+        float(row_norms(now.points[moved] - mended.points[moved]).max(initial=0.0)),
         unmendable,
         (*warnings, *moved_layers(np.isin(layers, moved)), *slide_advice(case, mesh, poor, limit)),
     )
+
+
+def _low_quality(found: Quality) -> float:
+    """Return the quality below which as many cells as `LIFTED` says are."""
+    count = min(int(LIFTED * np.sqrt(len(found.values))), len(found.values) - 1)
+    return float(np.partition(found.values, count)[count])
+
+
+def _first_layers(cells: Cells, setup: Setup) -> IntArray:
+    """Return the nodes of a run's layers in cells at moving boundaries: they have first heights."""
+    if setup.zone is None:
+        return setup.rigid
+    wall = np.zeros(len(setup.coords), bool)
+    wall[setup.classes.moving] = True
+    rows = [nodes[wall[nodes].any(axis=1)].ravel() for _, nodes in cells.by_type.values()]
+    return np.intersect1d(np.concatenate(rows), setup.zone.nodes)
 
 
 def _layers(case: Case, mesh: Mesh) -> IntArray:

@@ -481,6 +481,17 @@ def test_repair_of_poor_cells_keeps_first_heights(afterwards):
     assert not any("of layers" in text for text in last.warnings)
 
 
+def test_lifting_the_lowest_cells_after_a_relaxation_keeps_first_heights():
+    mesh = c_mesh(around=60, wake=10, first=1e-3)
+    case = Case(roles={"airfoil": "moving"}, motions=(sv.Rotate("airfoil", 30.0),), relax="yes")
+    case = case.change(layers="auto")
+    steps = [list(sv.deform(case.change(repair=repair), mesh))[-1] for repair in ("no", "yes")]
+    low = [sv.quality(step.mesh, mesh).min for step in steps]
+    assert low[1] > low[0]
+    heights = [sv.walls(step.mesh, mesh).summary()["airfoil"]["first_height"] for step in steps]
+    assert heights[0] == heights[1]
+
+
 def test_layers_move_where_cells_stay_folded_else_and_a_warning_says_so():
     """A bump leaves less room in a channel than the first layers of both walls need."""
     mesh = builders.grid((30, 20), place=lambda p: p * [1 / 30, 0.01])

@@ -6,12 +6,15 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError, UnsoundError, messages_of
 from slideviz.mesh.quality import VALID
-from slideviz.solver.repair_stage import find_freedom, repair_case
+from slideviz.solver import repair_stage
+from slideviz.solver.repair_stage import LOSS, find_freedom, repair_case
 from tests import builders
 
 MOTIONS = (sv.Translate("", (0.25, 0.1)), sv.Rotate("", 50.0))
@@ -66,6 +69,27 @@ def test_a_run_mends_its_folded_cells_and_keeps_all_else():
     far = np.linalg.norm(plain.mesh.points - mended.mesh.points, axis=1).max()
     assert done.largest_move == pytest.approx(far)
     assert mended.seconds["repair"] > 0.0
+
+
+@given(angle=st.floats(5.0, 45.0), shift=st.floats(0.0, 0.1))
+@settings(max_examples=8, deadline=None)
+def test_after_relaxation_the_lowest_qualities_are_raised_and_the_mean_stays(angle, shift):
+    mesh, case = folded(motions=(sv.Translate("", (shift, 0.0)), sv.Rotate("", angle)), relax="yes")
+    plain, lifted = last(case, mesh), last(case.change(repair="yes"), mesh)
+    before, after = (sv.quality(step.mesh, mesh) for step in (plain, lifted))
+    assert after.min > before.min
+    assert after.mean >= before.mean - LOSS
+    changed = (plain.mesh.points != lifted.mesh.points).any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(changed), lifted.repaired.nodes)
+    assert not changed[np.concatenate([marker.nodes for marker in mesh.markers])].any()
+
+
+def test_no_cell_is_lifted_where_the_mean_would_fall(monkeypatch):
+    mesh, case = folded(motions=(sv.Rotate("", 20.0),), relax="yes")
+    monkeypatch.setattr(repair_stage, "LOSS", -1.0)
+    plain, mended = last(case, mesh), last(case.change(repair="yes"), mesh)
+    np.testing.assert_array_equal(plain.mesh.points, mended.mesh.points)
+    assert not len(mended.repaired.nodes)
 
 
 def test_a_good_mesh_keeps_its_bits():
@@ -319,6 +343,14 @@ def test_a_run_reports_its_repair(tmp_path, capsys):
     assert streamed["seconds"]["repair"] > 0.0
     assert run([*words, "--set", "REPAIR_STEPS=YES"]) == 1
     assert "REPAIR_STEPS= YES needs the whole mesh after each step" in capsys.readouterr().err
+
+
+def test_a_run_says_that_it_raised_the_lowest_qualities(tmp_path, capsys):
+    mesh, case = folded(motions=(sv.Rotate("BLOCK", 20.0),), relax="yes", repair="yes")
+    sv.write(tmp_path / "mesh.su2", mesh)
+    case.change(mesh_file=tmp_path / "mesh.su2").write(tmp_path / "case.cfg")
+    assert run(["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / "out.su2")]) == 0
+    assert "lowest qualities raised; " in capsys.readouterr().out
 
 
 def test_poor_cells_beside_a_boundary_that_nobody_chose_to_fix_advise_to_let_it_slide(
