@@ -166,11 +166,23 @@ def shown(text: str) -> str:
     return repr(text if len(text) <= 60 else f"{text[:57]}...")
 
 
+_SWITCHES = (
+    ("yes", "on", "true", "keep", "slide"),
+    ("no", "off", "false", "none", "free"),
+)
+"""Words that switch something on, and off."""
+
+
 def not_one_of(value: object, known: Iterable[str]) -> str:
     """Return the message that a value is not one of the known ones, with the most similar one."""
     words = list(known)
+    text = str(value)
     quoted = shown(value) if isinstance(value, str) else repr(value)
-    return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"
+    meant = [
+        word for alike in _SWITCHES if text.lower() in alike for word in words if word in alike
+    ]
+    close = f"; did you mean {meant[0]}?" if meant else nearest(text, words)
+    return f"{quoted} is not one of {' | '.join(words)}{close}"
 
 
 def most_similar(name: str, known: Iterable[str]) -> str:
