@@ -162,7 +162,7 @@ NUMBERS: Mapping[str, LimitNumber] = {
     ),
     "first_height": _wall("first_height", "distance of the first node from its wall", "<>"),
     "height_ratio": _wall("height_ratio", "first height over that before", "<>"),
-    "growth": _wall("growth", "ratio of successive layers, the first five", "<", 1.0),
+    "growth": _wall("growth", "ratio of successive layers", "<", 1.0),
     "equal_layers": _wall(
         "equal_layers", "first layers of equal height, up to five", ">", high=LAYERS
     ),

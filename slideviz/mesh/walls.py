@@ -14,7 +14,9 @@ first height        (p1 - p0)·n: the distance of the first node from the wall, 
                     side): the distance of its plane from the mean of the cell's other nodes.
                     Negative where the cell is turned over.
 growth              largest ratio of the lengths of two successive edges, the longer one over the
-                    shorter one, of the first five edges of a column. Workshops ask for below 1.25.
+                    shorter one, of the first five edges of a column, or of those through the stack
+                    of flat cells (undeformed) and the first cell beyond. Workshops ask for below
+                    1.25.
 equal layers        number of first edges, at most five, whose lengths differ from that of the first
                     by less than 1 %. Workshops ask for two.
 wall angle          angle between the first edge and the boundary in degrees: 90 along the normal n,
@@ -55,7 +57,8 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
 
-LAYERS = 5  # layers that growth and equal layers are found from
+LAYERS = 5  # layers that equal layers are found from, and growth at walls without layers
+DEEPEST = 48  # most layers of a stack that growth is found from
 EQUAL = 0.01
 """Largest difference of the lengths of edges, as a part of the first one's, that are equal."""
 FLAT = 2 / 3  # largest height of a cell of the stack, as a part of its length
@@ -100,9 +103,27 @@ class Columns:
         the length of a line, else the square root of the area); 0 where there are none.
         ``most``: layers that count at most; all by default.
         """
+        return self._flat_stacks(points, most)[0]
+
+    def through_stacks(self, points: FloatArray) -> Columns:
+        """Return the same with columns that end at the first cell beyond a stack of flat cells.
+
+        But not before `LAYERS` layers. ``points`` (n, d).
+        """
+        depth = self._flat_stacks(points)[1]
+        end = np.full(len(self.nodes) + len(self.bare), LAYERS)
+        np.maximum.at(end, self.corner, depth[:, None] + 1)
+        beyond = np.arange(self.nodes.shape[1]) > end[: len(self.nodes), None]
+        return replace(self, nodes=sealed(np.where(beyond, -1, self.nodes)))
+
+    def _flat_stacks(
+        self, points: FloatArray, most: int | None = None
+    ) -> tuple[FloatArray, IntArray]:
+        """Return the thickness of the stack on each facet, and its number of layers, both (f,)."""
         facets = self.boundary.facets
         width = self.boundary.facets.shape[1]
         thickness = np.zeros(len(facets))
+        depth = np.zeros(len(facets), np.int64)
         flat = self.depth > 0
         for layer in range(self.nodes.shape[1] - 1 if most is None else most):
             some = np.flatnonzero(flat & (self.depth > layer))
@@ -115,8 +136,9 @@ class Columns:
             size = row_norms(facet_vectors(points, below))
             good = height < FLAT * (size if width == 2 else np.sqrt(size / 2))
             thickness[some[good]] += height[good]
+            depth[some[good]] += 1
             flat[some[~good]] = False
-        return thickness
+        return thickness, depth
 
 
 @check_types
@@ -288,9 +310,9 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
         some = k < width
         np.add.at(total, columns.corner[some, k], inward[some])
     normal = unit(total)
-    x = points[nodes[:, : LAYERS + 1]]
+    x = points[nodes]
     edges = x[:, 1:] - x[:, :-1]
-    edges[nodes[:, 1 : LAYERS + 1] < 0] = np.nan
+    edges[nodes[:, 1:] < 0] = np.nan
     length = np.linalg.norm(edges, axis=2)
     first = row_dots(edges[:, 0], normal[: len(nodes)])
     along = row_norms(edges[:, 0] - first[:, None] * normal[: len(nodes)])
@@ -298,7 +320,7 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     with np.errstate(all="ignore"):
         steps = np.exp(np.abs(np.log(length[:, 1:] / length[:, :-1])))
         growth = np.fmax.reduce(steps, axis=1, initial=np.nan)
-        alike = np.abs(length / length[:, :1] - 1) < EQUAL
+        alike = np.abs(length[:, :LAYERS] / length[:, :1] - 1) < EQUAL
     equal = np.cumprod(alike, axis=1).sum(axis=1).astype(float)
     away = points[columns.off].mean(axis=1) - _middles(points, facets[columns.bare])
     height = row_dots(away, normal[len(nodes) :])
@@ -464,7 +486,7 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
 @weak_cache
 def _columns_of(mesh: Mesh, markers: tuple[str, ...]) -> tuple[Columns, frozenset[str]]:
     """Return the columns at boundaries of a mesh, and those of the boundaries with layers."""
-    columns = find_columns(mesh, markers=markers)
+    columns = find_columns(mesh, DEEPEST, markers)
     boundary = columns.boundary
     flat = columns.stack_thickness(mesh.points, 1) > 0
     layered = set()
@@ -472,7 +494,7 @@ def _columns_of(mesh: Mesh, markers: tuple[str, ...]) -> tuple[Columns, frozense
         member = boundary.marker == boundary.names.index(name)
         if 2 * np.count_nonzero(flat[member]) > np.count_nonzero(member):
             layered.add(name)
-    return columns, frozenset(layered)
+    return columns.through_stacks(mesh.points), frozenset(layered)
 
 
 @check_types

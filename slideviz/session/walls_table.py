@@ -12,7 +12,7 @@ COLUMNS = ("Boundary", "First height", "Growth", "Equal", "Angle")
 TIPS = (
     "Boundaries that are neither periodic nor internal; those with layers of flat cells first.",
     "Lowest distance of the first nodes from the boundary; below it, after over before.",
-    "Largest ratio of two successive edges of the first five; boundary layers need at most 1.25.",
+    "Largest ratio of two successive edges through the layers; these need at most 1.25.",
     "Fewest first edges that are equal within 1 %; boundary layers need two.",
     "Lowest angle of the first edges to the boundary, 90° is best; below it, the largest change.",
 )

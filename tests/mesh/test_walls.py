@@ -227,3 +227,25 @@ def test_mistakes():
         sv.walls(mesh, markers=["wall"])
     with pytest.raises(MeshError, match="cannot be the reference"):
         sv.walls(mesh, cube())
+
+
+@pytest.mark.parametrize("layers", [5, 9, 14])
+def test_growth_is_that_through_the_whole_stack_and_to_the_first_cell_beyond(layers):
+    """A jump is seen in the stack, and at its end, but not behind it."""
+    flat = np.full(12, 0.01)
+    flat[layers:] = 0.03
+    beyond = [0.1, 0.5, 0.1]
+    y = np.concatenate([[0.0], np.cumsum([*flat, *beyond])])
+    mesh = grid(
+        (4, len(y) - 1),
+        place=lambda p: np.c_[p[:, 0] * 0.1, np.interp(p[:, 1], np.arange(len(y)), y)],
+    )
+    growth = sv.walls(mesh, markers=["y_m"]).summary()["y_m"]["growth"]["after"]
+    expected = max(3.0, 0.1 / flat[-1]) if layers < 12 else 10.0
+    assert growth["min"] == growth["max"] == pytest.approx(expected)
+    moved = mesh.points.copy()
+    within = (y[8] - 1e-9 < moved[:, 1]) & (moved[:, 1] < y[8] + 1e-9)
+    moved[within, 1] -= 0.9 * (y[8] - y[7])
+    walls = sv.walls(mesh.with_points(moved), mesh, ["y_m"]).summary()["y_m"]["growth"]
+    assert walls["before"]["max"] == pytest.approx(expected)
+    assert walls["after"]["max"] > 12.0
