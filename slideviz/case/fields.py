@@ -60,6 +60,7 @@ class CaseFields(CheckedFields):
     relax: terms.Relax = field(default="no", metadata=terms.RELAXES)
     layers: terms.Layers = field(default="no", metadata=terms.LAYERS)
     layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0
+    layer_minimum_gap: float = 0.33
     repair: terms.Repair = field(default="no", metadata=terms.REPAIRS)
     repair_below: float = 0.1
     repair_steps: bool = False

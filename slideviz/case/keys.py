@@ -465,6 +465,13 @@ def _why_no_levels(case: Case) -> str:
     return _why_no_reduction(case) or ("" if levels else "there are no levels")
 
 
+def _why_no_minimum_gap(case: Case) -> str:
+    """Return why layers do not give way; "" if they do."""
+    if case.layers == "no":
+        return "layers are off"
+    return "relaxation is off" if case.relax == "no" else ""
+
+
 def _why_no_repair(case: Case) -> str:
     return "repair is off" if case.repair == "no" else ""
 
@@ -825,6 +832,18 @@ METHOD_ROWS = (
         run_label="to {}",
         switch=lambda case: "layers are off" if case.layers == "no" else "",
         method="rbf",
+    ),
+    _method_setting(
+        "LAYER_MINIMUM_GAP",
+        "The part of their height that cells beside the layers keep before these give way, where "
+        "walls come near each other. With 0 they never do. Only a relaxed mesh has it.",
+        real(0.0, 1.0, with_low=True),
+        label="Minimum gap",
+        form="more",
+        tip="Layers become thinner where the cells beside them would keep less than this part of "
+        "their height, as walls come near each other. With 0 they never do.",
+        run_label="minimum gap {}",
+        switch=_why_no_minimum_gap,
     ),
     _method_setting(
         "REPAIR",

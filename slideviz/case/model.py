@@ -16,8 +16,8 @@ from slideviz.errors import CaseError, nearest, raise_all
 
 _NUMBERS = (
     "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
-    "support_radius", "reduction", "layer_thickness", "repair_below", "idw_power",
-    "idw_fixed_weight", "deform_coeff",
+    "support_radius", "reduction", "layer_thickness", "layer_minimum_gap", "repair_below",
+    "idw_power", "idw_fixed_weight", "deform_coeff",
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
 
@@ -45,6 +45,8 @@ class Case(CaseFields):
       to the motion. ``support_radius``, if not None, is used instead: a length.
     * ``reduction``: None: all boundary nodes are control nodes, however many.
     * ``layer_thickness``: how far from walls ``layers`` acts: a length; 0, or "auto", finds it.
+    * ``layer_minimum_gap``: the part of their height that cells beside layers keep before layers
+      give way; 0: they never do.
     * ``repair``: whether cells that are inverted, or whose quality is below ``repair_below``, are
       mended: after each step if ``repair_steps``, else after the last.
     * ``idw_power``: None: the number of dimensions.

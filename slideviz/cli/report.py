@@ -58,7 +58,7 @@ def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> dic
     steps = done.steps
     walls = done.walls
     last = steps[-1]
-    changed = [] if walls is None else height_warnings(case, walls, last.mesh)
+    changed = [] if walls is None else height_warnings(case, walls, last.mesh, last.kept_layers)
     each = [step.relaxed for step in steps if step.relaxed is not None]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:

@@ -15,7 +15,9 @@ see their common sharp edge. There each side has its own M_i; those that see X s
 Of several walls k, j whose zones overlap each has the weight b / distance^6, 1 - b is the product
 of theirs, and b_k is (1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap
 thinner than the zones the nodes between are left to the radial functions.
-All of this is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
+Where walls come near each other, layers give way: with the height left w of a node (1 where there
+is room), and its foot on the wall, p = sum_i w_i (X_i + d_i), it goes to p + w (X + u - p) instead.
+All but w is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
 the map of the directions of the facets at the wall node (lines in 2D, normals and edges in 3D).
 """
 
@@ -85,6 +87,8 @@ an equilateral triangle it is 1 / sqrt(3) of an edge."""
 RIGID = 0.99
 """Nodes that walls carry with a share above this stay where they carry them in relaxation and
 repair."""
+
+GIVEN = 0.995  # least part of a height that counts as all of it
 
 EDGES = 0.01  # weight of the edges of the facets at a wall node over that of their normals, in 3D
 
@@ -466,16 +470,40 @@ def _turns(frame: Frame, periods: IntArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class GaveWay:
+    """A wall whose layers gave way."""
+
+    names: tuple[str, ...]  # the boundaries that it consists of
+    height: float  # the least height that is left, as a part of that before
+    point: tuple[float, ...]  # the node of the layers that has it, Cartesian
+
+    def __str__(self) -> str:
+        """Return the same as a sentence."""
+        names = " and ".join(self.names)
+        where = ", ".join(f"{x:.6g}" for x in self.point)
+        return (
+            f"the layers at {names} gave way, to {self.height:.3g} times their height at "
+            f"({where}), since there is not enough room for them; leave more room, or write a "
+            "smaller LAYER_MINIMUM_GAP to keep them longer"
+        )
+
+
+@dataclass(frozen=True)
 class KeptLayers:
     """The layer zone of a run, for its report."""
 
     walls: tuple[tuple[tuple[str, ...], float], ...]
     """The boundaries of each connected wall, and the thickness of its zone, in the mesh's unit."""
     nodes: int  # nodes of the zone; of a streamed mesh those of its skin
+    gave_way: tuple[GaveWay, ...] = ()
 
     def report(self) -> dict[str, Any]:
         """Return the same as values of JSON."""
-        walls = [{"boundaries": names, "thickness": delta} for names, delta in self.walls]
+        less = {one.names: {"height": one.height, "at": one.point} for one in self.gave_way}
+        walls = [
+            {"boundaries": names, "thickness": delta, "gave_way": less.get(names)}
+            for names, delta in self.walls
+        ]
         return {"walls": walls, "nodes": self.nodes}
 
 
@@ -497,6 +525,35 @@ class LayerZone:
         moved, turned = motion
         return mixed(self.by_displacement, moved) + mixed(self.by_rotation, turned)
 
+    def feet(self, moved: Array) -> Array:
+        """Return b p, (..., z, d); ``moved``: displacement of the sources (`WallNodes.motion`)."""
+        return mixed(self.by_displacement, self.walls.places + moved)
+
+    def thinned(self, carried: Array, feet: Array, height: FloatArray) -> Array:
+        """Return `carried` with a part ``height`` (z,) of the heights left; ``feet``: b p."""
+        beside = multiply(self.share, self.start) - feet
+        return multiply(carried + beside, height[:, None]) - beside
+
+    @cached_property
+    def strongest(self) -> IntArray:
+        """Return the source (z,) that carries each node most."""
+        carriers = self.by_displacement
+        row = np.repeat(np.arange(len(self.nodes)), np.diff(carriers.indptr))
+        last = np.lexsort((carriers.data, row))[carriers.indptr[1:] - 1]
+        return carriers.indices[last].astype(np.int64)
+
+    def lowered(self, height: FloatArray) -> FloatArray:
+        """Return heights (z,) that are alike in a stack, and change gradually along the wall.
+
+        Each wall node has the least of the ``height`` (z,) of the nodes that it carries most, and
+        each node the mean of its wall nodes.
+        """
+        origin = self.walls.origin
+        least = np.ones(len(self.walls.start))
+        np.minimum.at(least, origin[self.strongest], height)
+        out: FloatArray = self.by_displacement @ least[origin] / self.share[:, 0]
+        return out
+
     def displacement(self, coords: Array, by: Array, carried: Array) -> Array:
         """Return the displacement (..., z, d) of the nodes of the zone in a step, in the frame.
 
@@ -513,10 +570,24 @@ class LayerZone:
         """Return the nodes (r,) that walls carry nearly alone."""
         return self.nodes[self.share[:, 0] > RIGID]
 
-    def summary(self) -> KeptLayers:
-        """Return what a report says of the zone."""
+    def summary(self, height: FloatArray | None, points: FloatArray) -> KeptLayers:
+        """Return what a report says of the zone.
+
+        ``height`` (z,): parts of the heights that are left; None: all of them are.
+        ``points`` (n, d): where the nodes are.
+        """
         walls = tuple((wall.names, wall.thickness) for wall, *_ in self.walls.walls)
-        return KeptLayers(walls, len(self.nodes))
+        gave_way = []
+        if height is not None:
+            low = (height < GIVEN) & (self.share[:, 0] > RIGID)
+            for wall, begins, _ in self.walls.walls:
+                mine = (begins[0] <= self.strongest) & (self.strongest < begins[-1])
+                rows = np.flatnonzero(mine & low)
+                if len(rows):
+                    k = rows[np.argmin(height[rows])]
+                    at = tuple(points[self.nodes[k]].tolist())
+                    gave_way.append(GaveWay(wall.names, float(height[k]), at))
+        return KeptLayers(walls, len(self.nodes), tuple(gave_way))
 
 
 def find_zone(

@@ -239,6 +239,8 @@ class Solution:
     field: Field | None = None
     """The field that displaced the nodes inside the mesh; None where a method has no such field."""
     relaxed: Relaxed | None = None  # none where the step was not relaxed
+    layer_height: FloatArray | None = None
+    """(z,): the part of their height that is left of the layers of a zone; None: all of it."""
     stages: tuple[Levels, ...] = ()
     """The rows of each system that was solved, in order: pseudo sliding has up to three, direct
     sliding one or two; empty where a method has no such systems."""

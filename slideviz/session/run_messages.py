@@ -158,7 +158,9 @@ def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
     layers = run.last.walls
     remarks = run.last_step.messages
     if layers is not None:
-        remarks += tuple(height_warnings(run.case, layers, run.last.mesh))
+        remarks += tuple(
+            height_warnings(run.case, layers, run.last.mesh, run.last_step.kept_layers)
+        )
     return tuple(
         with_field_labels(str(message))
         for message in messages_of(remarks)

@@ -7,14 +7,18 @@ cells are a third as high as long; where they are h from the beginning, the zone
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
-from slideviz.mesh.topology import facet_vectors
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, row_dots, row_norms
+from slideviz.mesh.topology import TINY, facet_vectors, unit
 from slideviz.mesh.walls import BADNESS, Columns, Walls, find_columns
-from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
+from slideviz.rbf.layers import KeptLayers, LayerZone, Wall, find_zone, wall_nodes
+from slideviz.rbf.tape import value
 from slideviz.solver.domain import Domain
 
 STEEP = 3.0  # largest first height that is kept, over the median of the wall
@@ -23,6 +27,8 @@ SHARP = -0.25
 sides of blunter edges turn as one: nodes that see both would come nearer to the edge else."""
 CHANGED = 1.5  # ratio of first heights, after over before or reverse, from which on a run warns
 TOUCHING = 1e-9  # distance over the thickness of a zone up to which walls touch each other
+ALONG = 0.5  # cosine to the normal of the wall from which an edge leads out of its layers
+LEAST = 0.02  # least part of the heights of layers that is left
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
@@ -44,6 +50,69 @@ def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> Layer
     targets = frame.points(domain.coords[nodes])
     slides = np.isin(nodes, domain.classes.sliding)
     return find_zone(wall_nodes(frame, domain.coords, known, walls), nodes, targets, slides)
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """The corners of cells beside the layers that walls hold."""
+
+    zone: LayerZone
+    rows: IntArray  # (c,): the nodes of the corners, by places in the zone
+    corners: IntArray
+    """(c, d + 1): these nodes, those beyond the layers, and those along the wall."""
+    height: FloatArray  # (c,): undeformed, of the second over the others
+
+    @classmethod
+    def beside(cls, zone: LayerZone, cells: Cells, points: FloatArray) -> Room:
+        """Return the room beside the layers of a zone; ``points`` (n, d): undeformed."""
+        place = np.full(len(points), -1)
+        rigid = np.flatnonzero(np.isin(zone.nodes, zone.rigid))
+        place[zone.nodes[rigid]] = rigid
+        normal = unit(zone.start - value(zone.feet(0.0 * zone.walls.places)) / zone.share)
+        dim = points.shape[1]
+        found = [np.empty((0, dim + 1), np.int64)]
+        for vtk, (_, nodes) in cells.by_type.items():
+            near = nodes[(place[nodes] >= 0).any(axis=1)]
+            table = np.array(ELEMENTS[vtk].corners)
+            if len(table) == 1:  # of a simplex all corners are alike
+                table = np.stack([np.roll(table[0], k) for k in range(dim + 1)])
+            for k in range(dim):
+                turned = np.c_[table[:, :1], np.roll(table[:, 1:], k, axis=1)]
+                found.append(near[:, turned].reshape(-1, dim + 1))
+        corners = np.concatenate(found)
+        row = place[corners[:, 0]]
+        corners = corners[row >= 0]
+        row = row[row >= 0]
+        edges = points[corners[:, 1:]] - points[corners[:, :1]]
+        rise = np.einsum("ckd,cd->ck", edges, normal[row]) / row_norms(edges)
+        end = place[corners[:, 1]]
+        alike = (end >= 0) & (row_dots(normal[row], normal[end]) > 0.0)
+        height = _heights(points, corners)
+        beyond = (rise[:, 0] > ALONG) & (rise[:, 1:] <= ALONG).all(axis=1) & ~alike
+        beyond &= np.abs(height) > ALONG * row_norms(edges[:, 0])
+        return cls(zone, row[beyond], corners[beyond], height[beyond])
+
+    def heights(self, points: FloatArray, gap: float) -> FloatArray:
+        """Return the part of their height (z,) that layers may keep, nodes at ``points`` (n, d).
+
+        It is 1 where cells beside them keep at least the part ``gap`` of their height. Where they
+        keep a part s it is (s / gap)^(3/2), at least s: cells beside layers are pressed more than
+        these, by a factor of 1 / gap at most.
+        """
+        left = np.maximum(_heights(points, self.corners) / self.height, LEAST)
+        height = np.ones(len(self.zone.nodes))
+        np.minimum.at(height, self.rows, np.maximum((left / gap) ** 1.5, left))
+        return self.zone.lowered(height) if (height < 1.0).any() else height
+
+
+def _heights(points: FloatArray, corners: IntArray) -> FloatArray:
+    """Return how high (c,) the second nodes of ``corners`` (c, d + 1) are over the others, signed.
+
+    ``points`` (n, d).
+    """
+    edges = points[corners[:, 1:]] - points[corners[:, :1]]
+    base = edges[:, 1] if edges.shape[1] == 2 else np.cross(edges[:, 1], edges[:, 2])
+    return np.linalg.det(edges) / np.maximum(row_norms(base), TINY)
 
 
 def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
@@ -187,14 +256,19 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
     return warnings
 
 
-def height_warnings(case: Case, walls: Walls, mesh: Mesh) -> list[str]:
+def height_warnings(
+    case: Case, walls: Walls, mesh: Mesh, kept: KeptLayers | None = None
+) -> list[str]:
     """Return warnings of layers whose first heights a run changed by more than `CHANGED`.
 
-    ``walls``: of the deformed ``mesh``, beside the undeformed one. At moving and fixed walls.
+    ``walls``: of the deformed ``mesh``, beside the undeformed one.
+    ``kept``: the layers that walls kept. Those that gave way have a warning of their own.
     """
     warnings = []
+    told = [] if kept is None else [name for one in kept.gave_way for name in one.names]
     for name in walls.markers:
-        if name not in walls.layered or case.roles.get(name, "fixed") not in ("moving", "fixed"):
+        known = name not in walls.layered or name in told
+        if known or case.roles.get(name, "fixed") not in ("moving", "fixed"):
             continue
         at = walls.columns.places(name)
         ratio = walls.values["height_ratio"][at]

@@ -185,6 +185,7 @@ class Setup(Domain):
     span: SpanField | None  # along which blades move; None: they do not
     solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
     zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
+    minimum_gap: float  # of the case, below which layers give way
     rims: Rims | None  # nodes that moving boundaries share with walls; None: there are none
     fitted_radius: float  # the support radius that fits the motion, whatever the case says
     relaxation: Relaxation | None = None
@@ -362,6 +363,7 @@ def setup_of(
         span=span,
         solve=_method(case, mesh, frame, axis),
         zone=zone,
+        minimum_gap=case.layer_minimum_gap,
         rims=rims,
         fitted_radius=fitted_radius(case, mesh, conditions.moved),
         relaxation=relaxation_of(case, mesh, frame, axis),

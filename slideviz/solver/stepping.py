@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.operations import features
-from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Relaxed, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.growth import (
@@ -33,9 +34,21 @@ from slideviz.solver.growth import (
     unsoundness,
     wall_warnings,
 )
+from slideviz.solver.layers import Room
 from slideviz.solver.setup import Setup, sliding_normals
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
+
+THINNINGS = 3
+"""How often the heights of layers that give way are found: at first from the room beside them where
+they do not, then from that where they do."""
+
+THINNER = 0.25
+THICKER = 1.25
+"""How much layers may become thinner or thicker each time, so that no cell beside them folds."""
+
+Height = FloatArray | None
+Way = tuple[Array, Relaxed | None]  # a displacement (..., n, d) after relaxation, and how it went
 
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
 ENDED = 0.1  # the residual above which relaxation did not come to its end
@@ -243,6 +256,7 @@ class Stepping:
         timer: PhaseTimer,
         part: float,
     ) -> Step:
+        zone = self.setup.zone
         return Step(
             index=index,
             total=total,
@@ -262,7 +276,7 @@ class Stepping:
             support_radius=self.setup.basis.radius if self.case.method == "rbf" else None,
             field=solution.field if self.rate is not None else None,
             relaxed=solution.relaxed,
-            kept_layers=self.setup.zone.summary() if self.setup.zone is not None else None,
+            kept_layers=None if zone is None else zone.summary(solution.layer_height, points),
         )
 
 
@@ -306,28 +320,86 @@ def one_step(
     def tie(displacement: Array) -> Array:
         return put(displacement, second, take(displacement, first), overwrite=True)
 
-    keep = keep_layers(setup, problem, goal, timer)
-    displacement = tie(keep(solution.displacement))
-    relaxed = None
-    if setup.relaxation is not None:
-        displacement, relaxed = setup.relaxation.relaxed(
-            problem, displacement, setup.rigid, setup.constraints, setup.project, tie, timer
+    relaxation = setup.relaxation
+    if relaxation is None:
+        keep = keep_layers(setup, problem, goal, timer)
+        return replace(solution, displacement=tie(keep(solution.displacement)))
+
+    def relax(problem: Problem, field: Array, goal: Array, height: Height, start: Height) -> Way:
+        """Free nodes begin at the displacement ``start`` (n, d); None: at that of the field."""
+        kept = tie(keep_layers(setup, problem, goal, timer, height)(field))
+        if start is not None:
+            held = np.concatenate([setup.known, setup.rigid])
+            free = np.flatnonzero(~np.isin(setup.same_as, setup.same_as[held]))
+            kept = put(kept, free, start[free])
+        return relaxation.relaxed(
+            problem, kept, setup.rigid, setup.constraints, setup.project, tie, timer
         )
-    return replace(solution, displacement=displacement, relaxed=relaxed)
+
+    field = value(solution.displacement).copy()
+    plain = problem if frozen is None else problem_at(setup, value(coords), value(goal))
+
+    def run(height: Height, start: Height) -> Way:
+        return relax(plain, field.copy(), value(goal), height, start)
+
+    find = partial(_heights_left, setup, plain, run)
+    if frozen is None:
+        moved, relaxed, height = find()
+    else:
+        height = None if setup.zone is None else frozen.choose("layers", lambda: find()[2])
+        start = None if height is None else value(run(None, None)[0])
+        moved, relaxed = relax(problem, solution.displacement, goal, height, start)
+    return replace(solution, displacement=moved, relaxed=relaxed, layer_height=height)
+
+
+def _heights_left(
+    setup: Setup, problem: Problem, relax: Callable[[Height, Height], Way]
+) -> tuple[Array, Relaxed | None, Height]:
+    """Return a displacement (n, d) after relaxation, how it went, and the heights that are left.
+
+    The latter (z,) are parts of the heights of layers; None where no layer gave way.
+    ``relax``: with such heights, and from a displacement (n, d).
+    """
+    moved, relaxed = relax(None, None)
+    zone = setup.zone
+    if zone is None or setup.relaxation is None or not setup.minimum_gap:
+        return moved, relaxed, None
+    domain = setup.relaxation.domain
+    room = Room.beside(zone, domain.cells, domain.points)
+    height = np.ones(len(zone.nodes))
+    for k in range(THINNINGS):
+        there = setup.frame.points(value(problem.coords) + value(moved))
+        found = room.heights(there, setup.minimum_gap)
+        if k == 0 and (found == 1.0).all():
+            return moved, relaxed, None
+        height = np.clip(found, THINNER * height, THICKER * height)
+        before = relaxed
+        moved, relaxed = relax(height, value(moved))
+        if relaxed is not None and before is not None:
+            relaxed = replace(relaxed, rounds=before.rounds + relaxed.rounds)
+    return moved, relaxed, height
 
 
 def keep_layers(
-    setup: Setup, problem: Problem, goal: Array, timer: PhaseTimer
+    setup: Setup,
+    problem: Problem,
+    goal: Array,
+    timer: PhaseTimer,
+    height: FloatArray | None = None,
 ) -> Callable[[Array], Array]:
     """Return a function of displacements (..., n, d) that lets walls carry the nodes near them.
 
     Those that slide are then projected. ``goal`` as of `one_step`.
+    ``height`` (z,): the part of their height that is left of the layers; None: all of it.
     """
     zone = setup.zone
     if zone is None:
         return lambda displacement: displacement
     with timer.phase("layers"):
-        carried = zone.carried(zone.walls.motion(goal))
+        motion = zone.walls.motion(goal)
+        carried = zone.carried(motion)
+        if height is not None:
+            carried = zone.thinned(carried, zone.feet(motion[0]), height)
         coords = take(problem.coords, zone.nodes)
 
     def keep(displacement: Array) -> Array:
@@ -443,6 +515,8 @@ def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Findi
     others: list[Remark] = [f"step {step.index}: {text}" for text in solution.warnings]
     if step.repaired is not None:
         others += step.repaired.warnings
+    if step.kept_layers is not None:
+        others += map(str, step.kept_layers.gave_way)
     if solution.relaxed is not None and solution.relaxed.residual > ENDED:
         others.append(
             f"step {step.index}: relaxation ended before the energy of the cells was least (after "

@@ -180,7 +180,12 @@ def _chained(values: Iterable[Iterable[Any]]) -> tuple[Any, ...]:
 
 
 def _joined_layers(values: Iterable[KeptLayers]) -> KeptLayers:
-    return KeptLayers(_chained(one.walls for one in values), sum(one.nodes for one in values))
+    each = list(values)
+    return KeptLayers(
+        _chained(one.walls for one in each),
+        sum(one.nodes for one in each),
+        _chained(one.gave_way for one in each),
+    )
 
 
 def by(rule: Callable[[list[Any]], Any], *, new: bool = False) -> dict[str, Any]:
@@ -296,7 +301,11 @@ class Step:
         if layers is not None:
             label = names_from(mesh, part)
             walls = [(tuple(map(label.__getitem__, wall)), size) for wall, size in layers.walls]
-            layers = replace(layers, walls=tuple(walls))
+            gave_way = [
+                replace(one, names=tuple(map(label.__getitem__, one.names)))
+                for one in layers.gave_way
+            ]
+            layers = replace(layers, walls=tuple(walls), gave_way=tuple(gave_way))
         return replace(
             self,
             control=self.control + part.points.start,

@@ -382,3 +382,20 @@ def test_a_setting_whose_switch_is_off_is_told(name):
     assert str(said).startswith(name)
     assert key.switch(case) in str(said)
     assert said.level == "note"
+
+
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ("LAYERS= YES", "keep"),
+        ("LAYERS= OFF", "no"),
+        ("RELAX= KEEP", "yes"),
+        ("RIMS= NO", "free"),
+        ("RIMS= TRUE", "slide"),
+        ("SLIDING_MODE= NO", "none"),
+    ],
+)
+def test_words_that_switch_have_the_value_that_is_meant(line, meant, tmp_path):
+    (tmp_path / "case.cfg").write_text(f"MESH_FILENAME= mesh.su2\nMARKER_MOVING= ( w )\n{line}\n")
+    with pytest.raises(CaseError, match=f"did you mean {meant}\\?"):
+        Case.read(tmp_path / "case.cfg")
