@@ -17,7 +17,7 @@ from slideviz.samples.table import SAMPLES
 from slideviz.study.combinations import COMPARED_METHODS
 from slideviz.terms import PERIODIC_MODES
 from tools.study import __main__ as study
-from tools.study import contest, leading_edge
+from tools.study import closing_gap, contest, leading_edge
 from tools.study.__main__ import FIGURES
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense
@@ -281,7 +281,7 @@ def test_layers_of_real_blades_are_kept(name):
 
 
 def test_leading_edge_is_drawn(tmp_path, monkeypatch):
-    heights, panel = [], leading_edge._panel
+    heights, panel = [], leading_edge.panel_of
 
     def noted(axes, mesh, ratios):
         wall = set(mesh.marker("BLADE").nodes.tolist())
@@ -289,7 +289,7 @@ def test_leading_edge_is_drawn(tmp_path, monkeypatch):
         heights.append((np.array(first), np.array([*ratios.values()])))
         return panel(axes, mesh, ratios)
 
-    monkeypatch.setattr(leading_edge, "_panel", noted)
+    monkeypatch.setattr(leading_edge, "panel_of", noted)
     path = leading_edge.draw(tmp_path / "edge.png", 5_000)
     undeformed, rbf, elastic, auto = heights
     assert (undeformed[1] == 1.0).all()
@@ -305,3 +305,9 @@ def test_leading_edge_is_drawn(tmp_path, monkeypatch):
     quarter = image.width * 7 // 32  # the color bar takes the last eighth
     blue = [(p[..., 2] - p[..., 0] > 40).sum() for p in np.split(shown[:, : 4 * quarter], 4, 1)]
     assert blue[1] > max(blue[2:]) > min(blue[2:]) > 20 * max(blue[0], 1)
+
+
+def test_a_closing_gap_is_drawn(tmp_path):
+    path = closing_gap.draw(tmp_path / "gap.png")
+    with Image.open(path) as image:
+        assert image.size == tuple(round(x * closing_gap.DPI) for x in closing_gap.INCHES)

@@ -55,7 +55,7 @@ def draw(path: Path, size: int = 20_000) -> Path:
                 f"first heights × {low}{f' to {high}' if low != high else ''}\n"
                 f"first edges turned by up to {angle:.{0 if angle > 1 else 1}f}°"
             )
-        image = _panel(panel, moved, _ratios(columns, mesh, moved))
+        image = panel_of(panel, moved, ratios_of(columns, mesh, moved))
         panel.set_title(title, fontsize=10, fontweight="bold")
         panel.set_xlabel(label, fontsize=9)
         panel.set_xlim(nose[0] - 0.4 * reach, nose[0] + 1.6 * reach)
@@ -68,7 +68,7 @@ def draw(path: Path, size: int = 20_000) -> Path:
     return path
 
 
-def _ratios(columns: Any, mesh: sv.Mesh, moved: sv.Mesh) -> dict[tuple[int, ...], float]:
+def ratios_of(columns: Any, mesh: sv.Mesh, moved: sv.Mesh) -> dict[tuple[int, ...], float]:
     """Return the heights, after over before, of the quadrilaterals of a layer, by their nodes."""
     out = {}
     for facet in np.flatnonzero(columns.depth):
@@ -83,11 +83,16 @@ def _ratios(columns: Any, mesh: sv.Mesh, moved: sv.Mesh) -> dict[tuple[int, ...]
     return out
 
 
-def _panel(axes: Any, mesh: sv.Mesh, ratios: dict[tuple[int, ...], float]) -> Any:
+def panel_of(
+    axes: Any,
+    mesh: sv.Mesh,
+    ratios: dict[tuple[int, ...], float],
+    limits: tuple[float, float] = (LOW, HIGH),
+) -> Any:
     """Draw the cells of a mesh into axes; return what has the color scale."""
     from matplotlib.collections import PolyCollection
 
-    scale = {"cmap": "RdBu_r", "clim": (LOW, HIGH), "edgecolors": "#444444", "linewidths": 0.35}
+    scale = {"cmap": "RdBu_r", "clim": limits, "edgecolors": "#444444", "linewidths": 0.35}
     for _, nodes in mesh.cells.by_type.values():
         shape = PolyCollection(mesh.points[nodes], **scale)
         found = [ratios.get(tuple(sorted(row)), np.nan) for row in nodes.tolist()]
