@@ -205,6 +205,7 @@ def test_every_setting_that_changes_a_result_tells_runs_apart(key):
         roles={**BASE.roles, "up": "periodic"},
         method=key.method or "rbf",
         reduction=Reduction(0.25, multilevel=True),
+        relax="yes",
         layers="keep",
         repair="yes",
         steps=0 if key.name == "STEPS_GAIN" else 3,  # it counts where steps are found only
