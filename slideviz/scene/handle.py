@@ -204,7 +204,7 @@ class Drag:
         pairs = zip(numbers, units, sizes, strict=True)
         even = [self._even(0.0, value, each, size, size) for value, each, size in pairs]
         kept = np.where(np.abs(numbers - first) > 1e-9 * units, even, first)
-        words = ", ".join(f"{value:.10g}" for value in kept)
+        words = ", ".join(f"{value:.10g}" for value in kept[: placed.dim])
         return Result(placed.put(kept), f"{WORDS['move']}: ({words})", placed.at(kept))
 
 

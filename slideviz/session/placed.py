@@ -82,6 +82,16 @@ class Placed(ABC):
     """The axes along which it moves where none was chosen; () for all."""
 
     @property
+    def dim(self) -> int:
+        """Return the dimension of the mesh."""
+        assert self.session.mesh is not None
+        return self.session.mesh.dim
+
+    def allows(self, act: Act, axis: int) -> bool:
+        """Return whether one can act along or about an axis: in 2D it stays in the plane."""
+        return self.dim == 3 or (axis == 2) == (act == "turn")
+
+    @property
     def edge(self) -> FloatArray:
         """Return where (3,) the grip is that changes its size."""
         return self.origin
@@ -111,7 +121,9 @@ class Placed(ABC):
         value = float(start @ way)
 
         def there(to: float) -> FloatArray:
-            return start + (to - value) * way
+            moved = start + (to - value) * way
+            moved[way == 1.0] = to  # to the last bit
+            return moved
 
         return Number(
             value,
@@ -171,7 +183,6 @@ class PlacedBoundary(Placed):
 
     index: int | None  # the place of the chosen motion in the case
     marker: Target
-    dim: int
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -333,7 +344,6 @@ class PlacedControl(Placed):
     index: int  # the place of the motion in the case
     q: FloatArray  # (3,): the mean of the control points as they are moved, in these coordinates
     system: CoordinateSystem
-    dim: int
 
     @property
     def motion(self) -> Ffd:
@@ -368,7 +378,6 @@ class PlacedSection(Placed):
     """A section of the view; its axes are x, y, z, its normal or axis, and two across."""
 
     section: Section
-    dim: int
     points: FloatArray  # (k, 3): of its cut, or of the mesh where it cuts nothing
 
     @property
@@ -472,7 +481,7 @@ def _section(session: Session, section: Section, cuts: Cuts) -> PlacedSection | 
         origin = padded(section.in_plane.middle[None])[0]
     across = section.basis[[2, 0, 1]]
     axes = np.concatenate([np.eye(3), across])
-    return PlacedSection(session, origin, axes, "xyznuv", section, mesh.dim, points)
+    return PlacedSection(session, origin, axes, "xyznuv", section, points)
 
 
 def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
@@ -500,7 +509,7 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
     moved = [ghosts.get(name, mesh.points[mesh.marker(name).nodes]) for name in names]
     origin = padded(np.concatenate(moved)[once].mean(axis=0)[None])[0]
     kind = PlacedRadius if isinstance(motion, Radial) else PlacedBoundary
-    return kind(session, origin, *_axes(session, origin), index, marker, mesh.dim)
+    return kind(session, origin, *_axes(session, origin), index, marker)
 
 
 def _control(session: Session, index: int, motion: Ffd) -> PlacedControl | None:
@@ -520,4 +529,4 @@ def _control(session: Session, index: int, motion: Ffd) -> PlacedControl | None:
         names = "rta"
         if mesh.dim == 2:
             return None
-    return PlacedControl(session, origin, axes, names, index, q, system, mesh.dim)
+    return PlacedControl(session, origin, axes, names, index, q, system)

@@ -277,6 +277,20 @@ def test_in_2d_it_moves_in_the_plane(window, driver, passage_file):
     window.view.setFocus()
     keys(window, "r-3.5")
     assert motions(window)[-1].angle_deg == -3.5
+    # Nothing leaves the plane.
+    keys(window, "rx4")
+    assert motions(window)[-1].angle_deg == 4.0
+    assert motions(window)[-1].axis == (0.0, 0.0, 1.0)
+    for letter in "gy0.02":
+        QTest.keyClicks(window.view, letter)
+    keys(window, "z")
+    moved = next(one for one in motions(window)[::-1] if isinstance(one, Translate))
+    assert moved.vector[1] == 0.02
+    drag(mouse, ("move", ()), (10, 0), release=False)
+    shown = window.statusBar().currentMessage().split(")")[0].split("(")[1]
+    moved = next(one for one in motions(window)[::-1] if isinstance(one, Translate))
+    assert tuple(map(float, shown.split(","))) == moved.vector
+    QTest.keyClick(window.view, Qt.Key.Key_Escape)
 
 
 @pytest.fixture

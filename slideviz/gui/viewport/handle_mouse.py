@@ -232,10 +232,11 @@ class HandleMouse(QObject):
         if key == Qt.Key.Key_Escape or key in _ENTER:
             self._end(keep=key != Qt.Key.Key_Escape)
             return
-        if letter and letter in drag.placed.names:
-            axis = drag.placed.names.index(letter)
+        axis = drag.placed.names.find(letter) if letter else -1
+        if axis >= 0 and drag.placed.allows(drag.act, axis):
             axes: tuple[int, ...] = (axis,)
-            if modifiers & Qt.KeyboardModifier.ShiftModifier and axis < 3 and drag.act == "move":
+            across = modifiers & Qt.KeyboardModifier.ShiftModifier and drag.placed.dim == 3
+            if across and axis < 3 and drag.act == "move":
                 axes = tuple(sorted({0, 1, 2} - {axis}))
             self.drag = replace(drag, axes=() if axes == drag.axes else axes)
         elif key in ACTS:
