@@ -49,6 +49,7 @@ class LiveFields:
     added: FloatArray | None = None
     """`base` (m d,), `added` (n d,): the displacement of the boundary in a run, and what that run
     adds to these fields; None without one."""
+    start: FloatArray | None = None  # (n, d): the points of that run
 
     @classmethod
     def of(cls, case: Case, mesh: Mesh, progress: Callable[[Progress], None]) -> LiveFields:
@@ -82,6 +83,10 @@ class LiveFields:
         """Return the memory that the fields take."""
         return self.fields.nbytes
 
+    def fits(self, case: Case) -> bool:
+        """Return whether these are the fields of a case, apart from numbers of its motions."""
+        return settings(simplified(case)) == settings(self.case)
+
     def after(self, case: Case, points: FloatArray) -> LiveFields:
         """Return the fields such that ``case`` gives ``points`` (n, d), those of its run.
 
@@ -90,12 +95,12 @@ class LiveFields:
         base = moving_nodes(case, self.mesh).vectors.ravel()
         bare = replace(self, base=None, added=None).moved(case)
         if bare is None or not base.any():
-            return replace(self, base=None, added=None)
-        return replace(self, base=base, added=(points - bare).ravel())
+            return replace(self, base=None, added=None, start=points)
+        return replace(self, base=base, added=(points - bare).ravel(), start=points)
 
     def moved(self, case: Case) -> FloatArray | None:
         """Return the points (n, d) of a case; None where these fields are of other settings."""
-        if settings(simplified(case)) != settings(self.case):
+        if not self.fits(case):
             return None
         wanted = moving_nodes(case, self.mesh).vectors.ravel()
         if wanted.size != self.boundary.shape[1]:

@@ -234,7 +234,7 @@ class Files(QObject):
 
         ``then`` is called when it is written.
         """
-        session = self.window.store.session
+        session = changes.end_preview(self.window.store.session)
         frame = session.frames[-1] if last and session.frames else session.frame
         if frame is None or self.window.runner.busy:
             return

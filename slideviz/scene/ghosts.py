@@ -337,6 +337,8 @@ def is_planned(session: Session) -> bool:
         now = _motion(session.case)
         return all(_motion(run.case) != now for run in session.runs)
     run = session.run_shown
+    if session.preview is not None:
+        return False  # the boundaries are where the motions take them
     if run is not None and run.panels is not None:
         return _motion(run.panels) != _motion(session.case)
     return session.view.frame == 0 or session.outdated

@@ -19,7 +19,15 @@ from slideviz.session.motions import new_target, with_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
 from slideviz.session.reach import scaled
 from slideviz.session.saving import bound_sections
-from slideviz.session.state import Handle, PanelPlace, Run, Session, StepFrame, ViewState
+from slideviz.session.state import (
+    Handle,
+    PanelPlace,
+    Preview,
+    Run,
+    Session,
+    StepFrame,
+    ViewState,
+)
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, FfdSystem, Role
 
 if TYPE_CHECKING:
@@ -140,7 +148,8 @@ def isolate(session: Session, names: Iterable[str]) -> Session:
 
 
 def show_frame(session: Session, index: int) -> Session:
-    """Return the session with the frame ``index`` shown, or the nearest there is."""
+    """Return the session with the frame ``index`` shown, or the nearest there is; no preview."""
+    session = replace(session, preview=None)
     return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
 
 
@@ -433,18 +442,41 @@ def saved_session(session: Session, written: Session, path: Path) -> Session:
 
 
 # Runs ------------------------------------------------------------------------------------
-def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
+def show_preview(session: Session, preview: Preview) -> Session:
+    """Return the session with the preview of a case shown, colored by quality if by roles."""
+    color = "size-skew" if session.view.color_by == "role" else session.view.color_by
+    return set_view(replace(session, preview=preview), frame=1, color_by=color)
+
+
+def end_preview(session: Session) -> Session:
+    """Return the session with the last step of the run that is shown, instead of a preview."""
+    run = session.run_shown
+    return show_frame(session, len(run.frames) if run else 0) if session.preview else session
+
+
+def start_run(
+    session: Session, case: Case | None = None, name: str = "", live: bool = False
+) -> Session:
     """Return the session with a new run, which is shown: of ``case``, or of the session's case.
 
-    With a ``name`` it is the run of a design. Earlier runs without any step are removed. No cell is
-    marked: one that was bad need not be of interest in another run.
+    With a ``name`` it is the run of a design. Earlier runs without any step are removed; by one
+    that is ``live``, the one before, too. No cell is marked: one that was bad need not be of
+    interest in another run. A preview is shown until the run ends.
     """
-    kept = tuple(run for run in session.runs if run.frames)
+    view = session.view
+    kept = tuple(
+        run
+        for run in session.runs
+        if run.frames
+        and not (live and run.live and not run.name and not run.saved and run.number != view.beside)
+    )
     number = 1 + max((session.newest, *(run.number for run in session.runs)))
     panels = session.case if name else None
-    runs = (*kept, Run(number, case or session.case, name=name, panels=panels))
-    session = replace(session, runs=runs, shown=number, newest=number)
-    return show_frame(set_view(session, marked_cell=None), 0)
+    preview = None if name else session.preview
+    run = Run(number, case or session.case, name=name, panels=panels, live=live)
+    session = replace(session, runs=(*kept, run), shown=number, newest=number)
+    session = show_frame(set_view(session, marked_cell=None), 0)
+    return show_preview(session, preview) if preview else session
 
 
 def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
@@ -452,16 +484,29 @@ def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
     newest = session.runs[-1]
     grown = (*newest.frames, *frames)
     session = _with_run(session, newest.number, frames=grown, saved=False)
-    if session.shown != newest.number:
-        return session  # the user looks at another run meanwhile
+    if session.shown != newest.number or session.preview:
+        return session  # the user looks at another run meanwhile, or at the preview
     return show_frame(session, len(grown))
 
 
 def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
-    """Return the session with ``end`` as the end of the newest run, if that had none."""
+    """Return the session with ``end`` as the end of the newest run, if that had none.
+
+    A live run is cancelled because the hand moves on: it is removed, and the preview stays.
+    """
     if not session.runs or session.runs[-1].end:
         return session
-    return _with_run(session, session.runs[-1].number, end=end)
+    *others, newest = session.runs
+    if newest.live and end == "cancelled":
+        shown = others[-1].number if others else None
+        shown = shown if session.shown == newest.number else session.shown
+        return replace(session, runs=tuple(others), shown=shown)
+    off = None
+    preview = session.preview
+    if preview and newest.last and session.mesh and preview.case is newest.case:
+        off = preview.off(newest.last, session.mesh)
+    session = _with_run(session, newest.number, end=end, preview_off=off)
+    return end_preview(session) if session.shown == newest.number else session
 
 
 def show_run(session: Session, number: int) -> Session:

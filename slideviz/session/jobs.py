@@ -31,6 +31,7 @@ from slideviz.case.motions.span import prepare_span
 from slideviz.case.words import counted
 from slideviz.case.zone_cases import each_zone, with_marker_names
 from slideviz.design.deformed_wheel import write_wheel
+from slideviz.design.live_fields import LiveFields
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError, Message, SlidevizError
 from slideviz.formats.files import read, write
@@ -62,7 +63,7 @@ from slideviz.session.session_file import (
     stored_session,
     write_session,
 )
-from slideviz.session.state import CheckedLimits, Run, Session, StepFrame
+from slideviz.session.state import CheckedLimits, Preview, Run, Session, StepFrame
 from slideviz.solver.deform import deform
 from slideviz.solver.interface_motion import check_motions
 from slideviz.solver.prepare import referenced
@@ -411,6 +412,37 @@ def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
         return walls(mesh, undeformed).of(names)  # of others where roles change
     except MeshError:
         return None
+
+
+def make_live_fields(
+    case: Case, mesh: Mesh, _report: Report, stopped: Stopped
+) -> LiveFields | None:
+    """Return the live fields of a case; None where there can be none."""
+    try:
+        return LiveFields.of(case, mesh, lambda _: raise_if_cancelled(stopped))
+    except (CaseError, DeformError, MeshError):
+        return None
+
+
+def make_preview(
+    fields: LiveFields, case: Case, run: Run | None, _report: Report, stopped: Stopped
+) -> tuple[LiveFields, Preview | None]:
+    """Return the preview of a case, and its fields, which begin at ``run`` if that is given.
+
+    There is none where the fields are of other settings.
+    """
+    mesh = fields.mesh
+    with suppress(CaseError):
+        if run is not None and run.last is not None and run.last.mesh.points is not fields.start:
+            fields = fields.after(run.case, run.last.mesh.points)
+        points = fields.moved(case)
+        if points is not None:
+            now = mesh.with_points(points)
+            going_on = partial(raise_if_cancelled, stopped)
+            frame = StepFrame(now, quality(now, mesh, case.quality_metric, going_on))
+            _precompute(frame)
+            return fields, Preview(case, frame, step_safety(mesh, now, mesh))
+    return fields, None
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:

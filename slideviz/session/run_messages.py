@@ -102,6 +102,18 @@ def repair_words(run: Run) -> str:
     return step.repaired.words()
 
 
+def preview_words(run: Run) -> str:
+    """Return how far the preview of a run was off; "" where there was none."""
+    if run.preview_off is None:
+        return ""
+    part, lowest = run.preview_off
+    why = "" if run.case.relax == "no" else ", which has no relaxation,"
+    return (
+        f"the preview{why} was off by {100.0 * part:.2g} % of the motion, its lowest quality by "
+        f"{abs(lowest):.1g}"
+    )
+
+
 def to_mend(session: Session) -> StepFrame | None:
     """Return the frame that a repair would mend: the last step of the shown run, or the mesh.
 

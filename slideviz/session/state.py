@@ -165,6 +165,21 @@ _AT_WALLS: WeakKeyDictionary[StepFrame, dict[str, FloatArray]] = WeakKeyDictiona
 
 
 @dataclass(frozen=True, eq=False)
+class Preview:
+    """The mesh that live fields give for a case, until its run is there."""
+
+    case: Case
+    frame: StepFrame
+    safe: SafeFraction  # how far the motion may go, straight on
+
+    def off(self, last: StepFrame, undeformed: Mesh) -> tuple[float, float]:
+        """Return ``Run.preview_off`` for the last step of the run of the same case."""
+        apart = np.linalg.norm(self.frame.mesh.points - last.mesh.points, axis=1)
+        largest = last.largest_displacement(undeformed) or 1.0
+        return float(apart.max()) / largest, self.frame.quality.min - last.quality.min
+
+
+@dataclass(frozen=True, eq=False)
 class CheckedLimits:
     """The limits of a case, checked on a frame."""
 
@@ -198,6 +213,10 @@ class Run:
     undeformed: StepFrame | None = None
     """The undeformed mesh with its quality, where this run has another metric than the session."""
     panels: Case | None = None  # for the run of a design: the session's case when it was asked for
+    preview_off: tuple[float, float] | None = None
+    """How far the preview was off that was shown before: the largest distance of a node as a part
+    of the largest displacement, and the lowest quality; None where there was none."""
+    live: bool = False  # whether it began because the hand rested; the next such run replaces it
 
     @property
     def label(self) -> str:
@@ -377,6 +396,7 @@ class Session:
     view: ViewState = field(default_factory=ViewState)
     checked: CheckedLimits | None = None
     """The limits as they were checked last (`slideviz.session.jobs`)."""
+    preview: Preview | None = None  # what is shown instead of the steps of a run, or None
     limit: int | None = None
     """The place in its results of the one whose failing cells are marked with rings."""
     intersection: str = ""
@@ -421,9 +441,14 @@ class Session:
 
     @property
     def frames(self) -> tuple[StepFrame, ...]:
-        """Return the frames that can be shown: the undeformed mesh, the steps of the run shown."""
+        """Return the frames that can be shown: the undeformed mesh, the steps of the run shown.
+
+        Of a preview that is its only step.
+        """
         run = self.run_shown
         first = (run and run.undeformed) or self.first
+        if self.preview is not None and first is not None:
+            return first, self.preview.frame
         return (() if first is None else (first,)) + (() if run is None else run.frames)
 
     @property
@@ -540,7 +565,8 @@ class Session:
         """Return the largest displacement of a node after all runs, in the mesh's length unit."""
         if self.mesh is None:
             return 0.0
-        lasts = (run.last for run in self.runs if run.last is not None)
+        lasts = [run.last for run in self.runs if run.last is not None]
+        lasts += [self.preview.frame] if self.preview is not None else []
         return max((last.largest_displacement(self.mesh) for last in lasts), default=0.0)
 
     def role(self, marker: str) -> Role:
