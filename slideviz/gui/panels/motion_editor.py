@@ -453,6 +453,9 @@ class MotionEditor(QWidget):
     def set_extent(self, extent: float) -> None:
         """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
         self.point.set_scale(extent)
+        lengths = self.amount, self.raised, self.distance, *self.vector.fields, *self.point.fields
+        for field in lengths:
+            field.extent = extent
         self.drawn.set_extent(extent)
 
     def _emit_changed(self) -> None:

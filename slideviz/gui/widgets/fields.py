@@ -284,6 +284,7 @@ class NumberField(CheckedField):
         super().__init__(self._words.get(value, short_text(value)), float(value), tip)
         self._allowed = allowed or (lambda _: "")
         self._scale = 0.0
+        self.extent = 10.0  # beside which a step from 0 is a hundredth
         self._whole = False
         self._twice_ms = float("-inf")
         self.setCursorPosition(0)
@@ -319,6 +320,19 @@ class NumberField(CheckedField):
         """Return the text of the value: its word, or its first digits, or all with ``exact``."""
         digits = number_text(self._value) if exact else short_text(self._value, self._scale)
         return self._words.get(self._value, digits)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        way = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}.get(Qt.Key(event.key()), 0)
+        if not way or self.problem or self._words or self.isReadOnly():
+            super().keyPressEvent(event)
+            return
+        fine = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+        # By the value before the editing: steps that shrink with the value would not reach 0.
+        size = abs(self._before) or 0.1 * self.extent
+        unit = 10.0 ** (math.floor(math.log10(size)) - 1) / fine
+        self.setText(number_text(float(f"{round(self._value / unit + way) * unit:.12g}")))
+        self.setModified(True)
+        self._edited()
 
     def set_tip(self, text: str) -> None:
         self._tip = text
