@@ -48,6 +48,8 @@ def launch(path: Path | None = None, run: bool = False) -> int:
             window.show()
             window.recovery.start(crashes)
             QTimer.singleShot(0, lambda: prepare_drawing(window.view, window.scene.stage))
+            window.live.switch(bool(window.settings.value("live", True, type=bool)))
+            window.sync_actions()
             window.warmup.watch()
             QTimer.singleShot(WARM_UP_MS, window.warmup.start)
             if path is not None:

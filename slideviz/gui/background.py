@@ -1,4 +1,4 @@
-"""Jobs in the background of the window: the intersection check, and reading the cells of sections.
+"""Jobs in the background of the window: checks, previews, reading the cells of sections.
 
 Each has a runner of its own, so that neither it nor a run waits for the other.
 """
@@ -12,16 +12,20 @@ from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
-from slideviz.gui.responsiveness.timers import INTERSECTION_MS, single_shot
+from slideviz.case.model import Case
+from slideviz.design.live_fields import LiveFields
+from slideviz.gui.responsiveness.timers import FIELDS_MS, HAND_MS, INTERSECTION_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.gui.running import Running
 from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
-from slideviz.session import jobs
+from slideviz.session import changes, jobs
 from slideviz.session.jobs import JobProgress, Report, Stopped, check_frame, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
-from slideviz.session.state import CheckedLimits, Session, StepFrame
+from slideviz.session.state import CheckedLimits, Preview, Session, StepFrame
 from slideviz.session.store import Store
+from slideviz.solver.deform import free_memory
 
 log = logging.getLogger("slideviz")
 
@@ -129,6 +133,102 @@ class LimitCheck(BackgroundJob):
 
     def _failed(self, error: Exception) -> None:
         log.error("limits: %s", error)
+
+
+class LivePreview(BackgroundJob):
+    """Shows the mesh while a hand moves its boundaries, and runs the case when the hand rests.
+
+    Live fields are made when the case has come to rest, and dropped where memory is short.
+    """
+
+    def __init__(self, store: Store, running: Running, parent: QObject | None = None) -> None:
+        super().__init__(store, parent)
+        self.is_on = False
+        self.fields: LiveFields | None = None
+        self._running = running
+        self._tried: Case | None = None
+        self._at_rest = single_shot(self, self._make_fields, FIELDS_MS)
+        self._hand = single_shot(self, self._run, HAND_MS)
+        running.began.connect(self._spare_memory)
+        store.listen(self._changed)
+
+    def switch(self, on: bool) -> None:
+        """Begin or end to follow the hand."""
+        self.is_on = on
+        self.fields = self._tried = None
+        self._at_rest.start()
+        self.store.change(changes.end_preview)
+
+    def close(self) -> None:
+        for timer in (self._at_rest, self._hand):
+            timer.stop()
+        super().close()
+
+    def _changed(self, old: Session, new: Session) -> None:
+        if old.mesh is not new.mesh:
+            self.fields = self._tried = None
+        elif old.case.motions != new.case.motions and self.fields is not None:
+            self._running.cancel_live()
+            self._hand.start()
+            if new.run_shown is not None and new.run_shown.frames and not new.outdated:
+                self.store.change(changes.end_preview)
+            else:
+                self._begin()
+        if old.case is not new.case:
+            self._at_rest.start()
+
+    def _spare_memory(self) -> None:
+        if self.fields is not None and free_memory() < self.fields.nbytes:
+            self.fields = None
+
+    def _make_fields(self) -> None:
+        session = self.store.session
+        case = session.case
+        known = case == self._tried or (self.fields is not None and self.fields.fits(case))
+        if not self.is_on or session.mesh is None or session.lacks_cells or known:
+            return
+        if self._runner.busy:
+            self._at_rest.start()
+        elif case.method == "rbf" and case.motions:
+            self._tried = case
+            self._runner.start(jobs.make_live_fields, case, session.mesh)
+
+    def _begin(self) -> None:
+        self._spare_memory()
+        if self.fields is not None and not self._runner.busy:
+            session = self.store.session
+            done = (run for run in reversed(session.runs) if run.end == "done" and run.frames)
+            self._runner.start(jobs.make_preview, self.fields, session.case, next(done, None))
+
+    def _finished(self, found: LiveFields | tuple[LiveFields, Preview | None] | None) -> None:
+        if not isinstance(found, tuple):
+            self.fields = found
+            return
+        fields, preview = found
+        if self.fields is None or fields.mesh is not self.store.session.mesh:
+            return
+        if preview is None:
+            self.fields = None
+            self._at_rest.start()
+            return
+        self.fields = fields
+        if self.store.session.case is not preview.case:
+            self._begin()
+        self.store.change(changes.show_preview, preview)
+
+    def _run(self) -> None:
+        preview = self.store.session.preview
+        if preview is None or self.fields is None:
+            return
+        moving = self.store.dragging or preview.case is not self.store.session.case
+        if moving or self._running.runner.busy:
+            self._hand.start()
+        else:
+            self._running.start_run(live=True)
+
+    def _failed(self, error: Exception) -> None:
+        log.error("the preview failed: %s", error)
+        self.fields = None
 
 
 class SectionReader(BackgroundJob):

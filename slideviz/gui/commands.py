@@ -198,6 +198,8 @@ class CommandState:
     none."""
     theme: str = ""
     """The chosen theme: one of `slideviz.gui.widgets.theme.THEMES`."""
+    live: bool = False
+    """Whether the mesh follows the hand."""
 
 
 def has_mesh(now: CommandState) -> bool:
@@ -454,6 +456,10 @@ _RUN = Menu("run", "&Run", entries=(
             "cells are relaxed to the shapes of the undeformed mesh, and compared with them.",
             call("files.continue_run"), enabled=can_continue,
             why_not="There are no steps of a whole mesh in memory: run the case first."),
+    Command("live", "&Live preview",
+            "While a number of a motion changes, let the mesh follow, with its quality; half a "
+            "second after the last change the run itself replaces this preview.",
+            call("toggle_live"), checked=lambda now: now.live),
     None,
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "

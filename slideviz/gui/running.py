@@ -20,6 +20,7 @@ from slideviz.session.jobs import compute_streamed
 from slideviz.session.run_messages import (
     inverted_words,
     limits_words,
+    preview_words,
     remarks_of,
     remedy_for,
     repair_words,
@@ -93,13 +94,19 @@ class Running(QObject):
         self.began.emit(text)
         self.status_changed.emit(text)
 
-    def start_run(self, output: Path | None = None) -> None:
+    def start_run(self, output: Path | None = None, live: bool = False) -> None:
         """Start a run of the session's case, if nothing is missing for it.
 
-        ``output`` is the file of the deformed mesh, needed if the mesh stays in its file.
+        ``output`` is the file of the deformed mesh, needed if the mesh stays in its file. ``live``:
+        whether the hand rests that moves the boundaries.
         """
         if not self.runner.busy and not run_requirements(self.store.session):
-            self._start_run(self.store.session.case, output=output)
+            self._start_run(self.store.session.case, output=output, live=live)
+
+    def cancel_live(self) -> None:
+        """Cancel the run that began because the hand rested, if it goes on."""
+        if self._deforms and self.store.session.runs[-1].live:
+            self.cancel()
 
     def repair(self) -> None:
         """Mend the last step of the run that is shown, or the mesh, as a new run."""
@@ -149,16 +156,18 @@ class Running(QObject):
         whole = {number: session.with_chosen_roles(one) for number, one in cases.items()}
         self.start_job("Starting", lambda _: done(), jobs.compute_designs, whole, session.mesh)
 
-    def _show_started(self, case: Case, name: str = "") -> None:
+    def _show_started(self, case: Case, name: str = "", live: bool = False) -> None:
         """Show a new run, without steps yet."""
         self.banner.hide()
-        self.store.change(changes.start_run, case, name)
+        self.store.change(changes.start_run, case, name, live)
         if self.store.session.view.color_by == "role":
             self.store.change(changes.set_view, color_by="size-skew")
         self._deforms = True
 
-    def _start_run(self, case: Case, name: str = "", output: Path | None = None) -> None:
-        self._show_started(case, name)
+    def _start_run(
+        self, case: Case, name: str = "", output: Path | None = None, live: bool = False
+    ) -> None:
+        self._show_started(case, name, live)
         session = self.store.session
         periodic = PERIODIC_MODES[case.periodic].name
         steps = case.steps or "automatic"
@@ -258,6 +267,8 @@ class Running(QObject):
             text += f", {missed}"
         if words := repair_words(run):
             text += f", {words}"
+        if words := preview_words(run):
+            text += f"; {words}"
         log.info("done: %s", text)
         warnings = self._log_remarks(run)
         bad = inverted_words(run)

@@ -25,7 +25,13 @@ from qtpy.QtWidgets import (
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.autosave import Autosave, SessionRecovery
-from slideviz.gui.background import READING, IntersectionCheck, LimitCheck, SectionReader
+from slideviz.gui.background import (
+    READING,
+    IntersectionCheck,
+    LimitCheck,
+    LivePreview,
+    SectionReader,
+)
 from slideviz.gui.commands import COMMANDS, MENUS, CommandState, Menu, colored_by_value
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
@@ -208,6 +214,7 @@ class MainWindow(Services):
         self.store.failed = self.error_reporter.show
         self.running = Running(self.store, self.banner, self)
         self.runner = self.running.runner
+        self.live = LivePreview(self.store, self.running, self)
         self.files = Files(self, self.settings)
         self.exports = Exports(self)
         self.help = Help(self)
@@ -334,6 +341,7 @@ class MainWindow(Services):
                 undo=self.store.can_undo,
                 redo=self.store.can_redo,
                 theme=str(self.settings.value("theme")),
+                live=self.live.is_on,
             )
         )
         self.setWindowTitle(title_of(session))
@@ -382,6 +390,12 @@ class MainWindow(Services):
         output = self.files.ask_output()
         if output is not None:
             self.running.start_run(output)
+
+    def toggle_live(self) -> None:
+        """Let the mesh follow the hand, or no longer."""
+        self.live.switch(not self.live.is_on)
+        self.settings.setValue("live", self.live.is_on)
+        self.sync_actions()
 
     def show_status(self, text: str) -> None:
         """Show a short message in the status bar for 8 s; an empty text clears it."""
@@ -468,6 +482,7 @@ class MainWindow(Services):
             self.warmup.close()
             self.intersection_check.close()
             self.limit_check.close()
+            self.live.close()
             self.section_reader.close()
             self.left_behind = not self.running.close()
             if self.autosave is not None:

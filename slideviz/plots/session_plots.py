@@ -298,6 +298,7 @@ def draw_histogram(
     shown = counts(session.frame)
     run = session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
+    label = "preview" if session.preview else label
     term = QUANTITIES[what]
     metric = f"{term.label} quality [-]" if what in SIZE_SKEW else term.axis
     runs, left_out = compared(session)

@@ -334,6 +334,31 @@ def has_inverted(session: Session) -> bool:
     return session.frame is not None and session.frame.quality.inverted > 0
 
 
+class PreviewLayer(KeyedLayer):
+    """The word Preview in the upper left corner, while the mesh is one."""
+
+    names = ("preview",)
+
+    def key(self, session: Session) -> tuple[object, ...]:
+        if session.preview is None:
+            return ()
+        return self.stage.scheme, self.stage.pixel_scale, self.stage.font_scale
+
+    def draw(self, _session: Session) -> None:
+        if not self._key:
+            return
+        word = pv.Text("Preview")
+        scale = self.stage.pixel_scale
+        word.GetPositionCoordinate().SetReferenceCoordinate(_corner(0.0, 1.0))
+        word.GetPositionCoordinate().SetCoordinateSystemToViewport()
+        word.GetPositionCoordinate().SetValue(14 * scale, -14 * scale)
+        set_letters(word.prop, self.stage.scheme, 15 * self.stage.font_scale)
+        word.prop.SetVerticalJustificationToTop()
+        self.stage.plotter.add_actor(
+            word, name="preview", reset_camera=False, render=False, pickable=False
+        )
+
+
 SIZE = 92  # width and height in pixels of the corner with the axes, at normal letter size
 COLORS = ("#c8452f", "#4c9a2a", "#3b7dd8")
 """Colors of the axes x, y and z, visible on light and dark backgrounds."""

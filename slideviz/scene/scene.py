@@ -19,7 +19,7 @@ from slideviz.scene import pick
 from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.camera import Camera
 from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
-from slideviz.scene.legend import LegendLayer, TriadLayer
+from slideviz.scene.legend import LegendLayer, PreviewLayer, TriadLayer
 from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, PointLayer, RepairLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
 from slideviz.scene.overview import Overview
@@ -64,6 +64,7 @@ class Scene:
             RepairLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
+            PreviewLayer(self.stage),
             self._coarse,
         )
         self.camera = Camera(self.stage, self._shapes)

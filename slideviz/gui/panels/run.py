@@ -22,6 +22,7 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.theme import icon
+from slideviz.mesh.margin import reach_words
 from slideviz.session import changes
 from slideviz.session.jobs import JobProgress
 from slideviz.session.reach import reach_run
@@ -37,7 +38,7 @@ from slideviz.session.run_messages import (
     run_requirements,
     with_field_labels,
 )
-from slideviz.session.state import Run, Session
+from slideviz.session.state import Preview, Run, Session
 from slideviz.session.store import Store
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
@@ -99,7 +100,7 @@ class RunPanel(Panel):
     def sync(self, session: Session) -> None:
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
-        self.bar.setVisible(bool(self._busy))
+        self.bar.setVisible(bool(self._busy or session.preview))
         self.run.setEnabled(not self._missing)
         if self._busy or self._missing:
             set_style(self.text, "bad", False)
@@ -119,7 +120,20 @@ class RunPanel(Panel):
             return
         self.run.setToolTip(COMMANDS["run"].button_tip)
         self.text.setToolTip("")
+        if session.preview is not None:
+            self._show_preview(session.preview)
+            return
         self._show_run(session)
+
+    def _show_preview(self, preview: Preview) -> None:
+        """Show how far the motion may go: the bar is full where the first cell folds."""
+        safe = preview.safe
+        self.bar.setValue(round(1000 * min(1.0, 1.0 / max(safe.fraction, 1e-3))))
+        words = safe.words if safe.cell is None else f"the motion {reach_words(safe.fraction)}"
+        bad = preview.frame.quality.inverted > 0
+        self.text.setText(f"Preview: {words}.")
+        self.text.setToolTip(wrapped(f"{safe.words}. The bar is full where the first cell folds."))
+        set_style(self.text, "bad", bad)
 
     def _show_run(self, session: Session) -> None:
         """Show how the shown run ended, or that the panels have other settings than it."""

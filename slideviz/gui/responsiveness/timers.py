@@ -104,6 +104,12 @@ ROWS_MS = 250
 INTERSECTION_MS = 200
 """Delay from the last change of the case to the job that checks boundaries for intersections."""
 
+FIELDS_MS = 1000
+"""Delay from the last change of the case to making the fields of previews, which takes a second."""
+
+HAND_MS = 500
+"""Delay from the last movement of the hand to the run that replaces the preview."""
+
 AUTOSAVE_MS = 5000
 """Delay from the first unsaved change to writing the session."""
 

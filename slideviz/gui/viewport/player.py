@@ -144,6 +144,8 @@ class Player(QWidget):
 
     def _step_words(self, step: int, planned: int) -> str:
         """Return the text for a step of ``planned``, shortened where the player is narrow."""
+        if step and self.store.session.preview:
+            return "Preview"
         if self._narrow and planned:
             return f"{step}/{planned}"
         return f"Step {step} of {planned}" if step else "Undeformed"
