@@ -451,7 +451,9 @@ def show_preview(session: Session, preview: Preview) -> Session:
 def end_preview(session: Session) -> Session:
     """Return the session with the last step of the run that is shown, instead of a preview."""
     run = session.run_shown
-    return show_frame(session, len(run.frames) if run else 0) if session.preview else session
+    if session.preview is None:
+        return session
+    return show_frame(session, len(run.frames) if run else 0)
 
 
 def start_run(
