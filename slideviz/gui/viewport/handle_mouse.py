@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt
-from qtpy.QtGui import QKeyEvent, QMouseEvent
+from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent
 
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
@@ -42,6 +42,7 @@ _MODIFIERS: dict[int, Qt.KeyboardModifier] = {
     Qt.Key.Key_Shift: Qt.KeyboardModifier.ShiftModifier,
 }
 """The modifier of its key: whether the event of the key itself has it differs by platform."""
+_ELSEWHERE = (Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason)
 _ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
@@ -120,8 +121,11 @@ class HandleMouse(QObject):
         kind = event.type()
         if isinstance(event, QKeyEvent):
             return self._key(event)
-        if kind == QEvent.Type.FocusOut and self.drag is not None:
-            self._end()  # what a panel changes now must not be lost by the next move
+        if isinstance(event, QFocusEvent):
+            # What a panel changes now must not be lost by the next move; other windows may come.
+            left = event.lostFocus() and event.reason() not in _ELSEWHERE
+            if left and self.drag is not None:
+                self._end()
         if not isinstance(event, QMouseEvent):
             return False
         where = event.position().toPoint()
