@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.argument_types import CheckedFields, _annotations
+from slideviz.argument_types import CheckedFields, annotations_of
 from slideviz.case.motions.motion import Motion
 from slideviz.design.sweeps.table import read_designs
 from slideviz.errors import ArgumentError, MeshError
@@ -139,13 +139,13 @@ def test_numbers_and_arrays_of_numpy_and_lists_fit():
 
 def test_every_motion_checks_its_fields_and_every_annotation_is_known():
     assert all(issubclass(kind, CheckedFields) for kind in get_args(Motion))
-    known = {kind: set(_annotations(kind)) for kind in (*get_args(Motion), sv.Case, sv.Reduction)}
+    known = {kind: set(annotations_of(kind)) for kind in (*get_args(Motion), sv.Case, sv.Reduction)}
     written = {kind: {*kind.__dataclass_fields__} for kind in known}
     assert known == written
     functions = sv.read, sv.write, sv.convert, sv.deform, sv.quality, sv.sweep, sv.Deformer.__init__
     for function in functions:
         inner = function.__wrapped__
-        assert set(_annotations(inner)) == set(get_annotations(inner))
+        assert set(annotations_of(inner)) == set(get_annotations(inner))
 
 
 def test_names_of_files_in_a_case_may_be_texts(tmp_path):

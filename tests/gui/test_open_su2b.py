@@ -35,4 +35,4 @@ def test_they_are_among_the_files_to_open(monkeypatch):
 
     monkeypatch.setattr(QFileDialog, "getOpenFileName", ask)
     assert ask_open(None, Path()) is None
-    assert "SU2 meshes and cases (*.su2 *.su2b" in asked[0]
+    assert "SU2 meshes, cases and sessions (*.su2 *.su2b" in asked[0]
