@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from qtpy.QtCore import QPoint, Qt
+from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
@@ -199,6 +199,31 @@ def test_the_keys_are_the_views_while_nothing_has_a_handle(window, driver, blade
     # In a field, a letter is a letter, and the handle waits.
     window.motions.editor.vector.fields[0].setFocus()
     QTest.keyClicks(window.motions.editor.vector.fields[0], "g")
+    assert window.viewing.handles[window.view].drag is None
+
+
+def test_keys_are_the_handles_where_the_mouse_is_though_a_panel_has_the_focus(
+    window, driver, blade, qtbot
+):
+    ghost = "motion_ghost" in window.store.session.view.drawn
+    driver.activate()
+    move(blade, (200, 200))
+    qtbot.waitUntil(window.view.underMouse)
+    driver.click_row("BLADE")
+    table = window.focusWidget()
+    assert not window.view.hasFocus()
+    move(blade, (210, 200))
+    for letter in "gz0.01\r":
+        QTest.keyClick(window.windowHandle(), letter)
+    QApplication.processEvents()
+    assert motions(window)[0].vector == (0.0, 0.0, 0.01)
+    assert window.statusBar().currentMessage() == "Move z: 0.01", "what keys do next is past"
+    # Outside the view, they are those of the window.
+    table.setFocus()
+    QApplication.sendEvent(window.view, QEvent(QEvent.Type.Leave))
+    QTest.keyClick(window.windowHandle(), "g")
+    QApplication.processEvents()
+    assert ("motion_ghost" in window.store.session.view.drawn) != ghost
     assert window.viewing.handles[window.view].drag is None
 
 

@@ -70,7 +70,7 @@ PANELS = (
     ("Worst cells: remove the mark", "Esc", ""),
     ("Worst cells: copy", "Ctrl+C", "The selected rows, or all."),
     ("Histogram: show all cells", "Esc", ""),
-    ("Handle: move, turn, enlarge what is chosen", "G, R, S", "While the view has the focus."),
+    ("Handle: move, turn, enlarge what is chosen", "G, R, S", "While the mouse is in the view."),
     ("Handle: along an axis; in a machine axial, radial, tangential", "X, Y, Z; A, R, T", ""),
     ("Handle: in a plane", "Shift+X, Shift+Y, Shift+Z", ""),
     ("Handle: type the number; snap; go finely", "0 to 9; Ctrl; Shift", ""),

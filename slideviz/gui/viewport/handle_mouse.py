@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent
+from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
@@ -117,8 +118,15 @@ class HandleMouse(QObject):
         """Return the part of the handle at a position in the widget, or None."""
         return part_at(self.parts, self._pixel(where), self.view.devicePixelRatioF())
 
-    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
+        if watched is not self.view:
+            asked = kind == QEvent.Type.ShortcutOverride and self.drag is None
+            return asked and isinstance(event, QKeyEvent) and self._key(event)
+        if kind == QEvent.Type.Enter:
+            self.view.window().installEventFilter(self)  # keys that the panels do not take
+        if kind == QEvent.Type.Leave:
+            self.view.window().removeEventFilter(self)
         if isinstance(event, QKeyEvent):
             return self._key(event)
         if isinstance(event, QFocusEvent):
@@ -205,6 +213,7 @@ class HandleMouse(QObject):
         if self.drag is None and not starts:
             return False
         if kind == QEvent.Type.ShortcutOverride:
+            self.view.setFocus()  # the key press goes to what has the focus then
             event.accept()
             return True
         if self.drag is None:
@@ -226,6 +235,7 @@ class HandleMouse(QObject):
             held = middle + np.array([arm, 0.0])
         point = projection.on_plane(held, now.origin, projection.sight(now.origin))
         self._by_key = True
+        QToolTip.hideText()  # it would be in front of the handle
         self._begin(act, (), start, point)
 
     def _choose(self, event: QKeyEvent, drag: Drag) -> None:
@@ -288,16 +298,17 @@ class HandleMouse(QObject):
 
     def _end(self, keep: bool = True) -> None:
         """End the drag; without ``keep`` everything is as it was before."""
-        drag = self.drag
-        assert drag is not None
         if keep and self._soon.isActive():
             self._apply()
+        drag = self.drag
+        assert drag is not None
         self._soon.stop()
         self.drag = self._origin = None
         if not keep:
             with self.store.reverting():
                 self.store.change(changes.place, moved=drag.placed.session)
-            self._show_status("")
+        result = drag.result() if keep else None
+        self._show_status("" if result is None else result.words)
         self.store.set_dragging(False)
         self.view.signals.released.emit()
         self.view.render_soon()
