@@ -109,7 +109,7 @@ def preview_words(run: Run) -> str:
     part, lowest = run.preview_off
     why = "" if run.case.relax == "no" else ", which has no relaxation,"
     return (
-        f"the preview{why} was off by {100.0 * part:.2g} % of the motion, its lowest quality by "
+        f"the preview{why} was off by {100.0 * part:.3g} % of the motion, its lowest quality by "
         f"{abs(lowest):.1g}"
     )
 

@@ -77,6 +77,7 @@ def test_it_stays_until_the_run_ends_which_says_how_far_it_was_off():
     assert abs(lowest) < 1e-3
     assert "of the motion, its lowest quality by" in preview_words(run)
     assert preview_words(replace(run, preview_off=None)) == ""
+    assert "was off by 257 % of" in preview_words(replace(run, preview_off=(2.574, 0.1)))
     relaxed = replace(run, case=run.case.change(relax="yes"))
     assert "no relaxation" in preview_words(relaxed)
 
