@@ -14,6 +14,7 @@ from slideviz.formats.files import read
 from slideviz.samples.table import write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs, scripts
+from slideviz.session.saving import view_to_case
 from slideviz.session.state import StepFrame
 from tests.golden.alike import picture_difference
 
@@ -157,6 +158,19 @@ def test_a_run(samples, here):
     (one, other) = made(script)["hexahedron_deformed.su2"]
     assert (read(one).points == read(other).points).all()
     assert (read(one).points == session.deformed.mesh.points).all(), "it is that of the window"
+
+
+def test_a_camera_as_it_was_saved_is_not_said_again(samples):
+    session, camera = samples["hexahedron"]
+    exact = tuple(number + 1e-9 for number in camera)
+    case = view_to_case(session, exact)
+    path = case.source.with_name("viewed.cfg")
+    case.write(path)
+    saved = replace(session, case=session.case.change(source=path))
+    script = scripts.picture_scripts(saved, exact, (300, 200))
+    assert "VIEW_CAMERA" not in script.command + script.python
+    moved = (exact[0] + 1.0, *exact[1:])
+    assert "VIEW_CAMERA" in scripts.picture_scripts(saved, moved, (300, 200)).command
 
 
 def test_roles_are_changed_too(samples, here):

@@ -50,7 +50,10 @@ class _Recipe:
             raise CaseError("a command names the file of the case, which has none yet; save it")
         self.source = source.absolute()
         file = with_marker_names(Case.read(self.source), mesh).with_paths(Path.absolute)
-        view = file.view if camera is None else view_to_case(session, _rounded(camera)).view
+        seen = file.view.get("VIEW_CAMERA")
+        place = camera and _rounded(camera)
+        place = seen if seen and _rounded(seen) == place else place
+        view = file.view if camera is None else view_to_case(session, place).view
         self.case = shown_case(session).with_paths(Path.absolute).change(view=view)
         self.keys = changed_keys(file, self.case)
         self.frame = min(session.view.frame, len(session.frames) - 1)

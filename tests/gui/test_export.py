@@ -866,6 +866,8 @@ def test_the_view_is_copied_as_a_command_that_draws_it(
     copied = paste(qtbot, (Qt.Key.Key_C, COPY))
     assert copied.startswith(f"slideviz picture {sample_folder}/passage/passage.cfg -o passage.png")
     assert "VIEW_COLOR=size-skew" in copied
+    first, *_ = copied.split(" \\\n")
+    assert window.statusBar().currentMessage() == f"Copied: {first}"
     program = paste(qtbot, (Qt.Key.Key_P, COPY))
     assert program.startswith("import slideviz as sv\n")
     assert "Copied: sv.picture(" in window.statusBar().currentMessage()

@@ -133,7 +133,8 @@ class Exports(QObject):
             self.window.banner.show_error(error)
             return
         QApplication.clipboard().setText(made[place])
-        self.window.show_status(f"Copied: {made[place].splitlines()[-1]}")
+        line = made[place].splitlines()[-place]  # a command's first line, a program's last
+        self.window.show_status("Copied: " + line.removesuffix(" \\"))
 
     def section(self, paper: SectionStyle) -> None:
         """Ask for a file name, and write a picture of the selected section."""
