@@ -350,7 +350,7 @@ _NO_STEPS = "There are no steps yet: run the case first."
 _BY_ROLE = "Color the cells by a quantity first, with a range of its own."
 _NO_FILE = "Save the case first (Ctrl+Shift+S): a command names its file."
 _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes.", (
-    Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
+    Command("save_picture", "&Picture…", "Make a picture (screenshot) of the view.",
             call("exports.picture"), ("Ctrl+P",), "picture", has_mesh),
     Command("copy_picture", "&Copy picture",
             "Copy a picture of the view, with a white background, to the clipboard.",
@@ -391,7 +391,7 @@ _FILE = Menu("file", "&File", entries=(
             why_not="The mesh is not a passage of a wheel: two boundaries of its only zone must be "
             "periodic, by a whole part of a turn."),
     Command("save_case", "Save &case as…",
-            "Save roles, motions, method and view as a case that gives the same result again.",
+            "Save roles, motions, method and view as a case (.cfg) that gives the same result.",
             call("files.save_case"), ("Ctrl+Shift+S",), "case", has_mesh),
     Command("save_session", "Save s&ession as…",
             "Save case, view, runs with their steps, and designs in one file, to go on later.",
@@ -413,7 +413,8 @@ _COPY_AS = Menu("copy_as", "&Copy as", "Copy what makes again what is shown, to 
          (("Ctrl+Alt+C", "Ctrl+Alt+P")[place],), has_file, _NO_FILE),
         ("section", "&section", "the picture of the selected section", (), has_section,
          "Select a section of a saved case first."),
-        ("film", "&film", "the film of the steps", (), has_run_of_file, _NO_STEPS),
+        ("film", "&film", "the film of the steps", (), has_run_of_file,
+         "Save the case (Ctrl+Shift+S) and run it first."),
         ("run", "&run", "the run", (), has_file, _NO_FILE),
     )
 ), tooltips=True)
@@ -561,10 +562,10 @@ _VIEW = Menu("view", "&View", entries=(
     *(_shown_command(name, term) for name, term in SHOWN.items()),
     None,
     _COLORS,
-    Command("fit", "&Fit all", "Make the whole mesh fill the view.",
+    Command("fit", "&Fit all", "Zoom to the whole mesh.",
             call("viewing.fit"), ("F",), "fit", has_mesh),
     Command("fit_boundary", "Fit to &boundary",
-            "Make the selected boundaries fill the view, or else those that move.",
+            "Zoom to the selected boundaries, or else those that move.",
             lambda w: w.viewing.fit(target_boundaries(w.store.session)),
             ("Shift+F",), enabled=has_boundary_target,
             why_not="No boundary is selected, and none moves."),

@@ -7,6 +7,7 @@ from qtpy.QtWidgets import QLineEdit
 
 from slideviz.gui.commands import COMMANDS, CommandState
 from slideviz.gui.dialogs.help import PaletteDialog
+from slideviz.session import changes
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
@@ -93,6 +94,42 @@ def test_arrows_move_in_the_list_while_typing(find, with_runs):
         QTest.keyClick(dialog.search, Qt.Key.Key_Down)
     enter(dialog)
     assert driver.session.view.frame == 1
+
+
+def test_the_name_itself_is_first(find, with_runs):
+    with_runs({"steps": 2})
+    for name in ("STEPS", "Run", "airfoil", "RELAX"):
+        dialog = find(name.lower())
+        assert next(iter(rows(dialog))) == name
+        dialog.close()
+
+
+def test_words_of_other_programs_are_found(find, with_runs):
+    with_runs({"steps": 1})
+    words = {"zoom": "Fit to boundary", "screenshot": "Picture", "cfg": "Save case as"}
+    for word, name in words.items():
+        dialog = find(word)
+        assert name in rows(dialog)
+        dialog.close()
+
+
+def test_motions_are_added_from_the_mesh_on(find, with_runs):
+    dialog = find("add motion")
+    assert not rows(dialog)
+    dialog.close()
+    driver = with_runs({"steps": 1})
+    count = len(driver.session.case.motions)
+    enter(find("add motion: rotate"))
+    assert len(driver.session.case.motions) == count + 1
+    assert "Add motion: Twist by box" not in rows(find("add motion")), "in 2D"
+
+
+def test_a_film_of_a_case_without_a_file_asks_for_both(find, with_runs):
+    driver = with_runs({"steps": 1})
+    driver.window.store.change(changes.set_case, source=None)
+    dialog = find("copy film")
+    assert set(rows(dialog).values()) == {"Save the case (Ctrl+Shift+S) and run it first."}
+    dialog.close()
 
 
 def test_a_boundary_is_selected(find, with_runs):

@@ -221,6 +221,10 @@ def palette_entries(helper: Help) -> Iterator[Entry]:
         about, do = (command.tip, act.trigger) if act.isEnabled() else (act.whatsThis(), None)
         keys = act.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
         yield Entry(command.called(now).replace("&", "").rstrip("…"), keys, about, do)
+    add = window.findChild(QToolButton, "add_motion")
+    for act in add.menu().actions() if add.isEnabled() else ():
+        if act.isEnabled():
+            yield Entry(f"Add motion: {act.text()}", "", "motion", act.trigger)
     change = partial(partial, window.store.change)
     for name in session.mesh.marker_names if session.mesh is not None else ():
         yield Entry(name, "", "boundary", change(changes.select, [name]))
@@ -265,9 +269,10 @@ class PaletteDialog(SearchDialog):
         near = wanted.strip().lower()
         letters = re.compile(".*?".join(map(re.escape, near)))
 
-        def rank(entry: Entry) -> tuple[bool, bool, int]:
+        def rank(entry: Entry) -> tuple[bool, bool, bool, int]:
             done = recent.index(entry.title) if entry.title in recent else RECENT
-            return near not in entry.title.lower(), entry.do is None, done
+            title = entry.title.lower()
+            return title != near, near not in title, entry.do is None, done
 
         self.tree.clear()
         for entry in sorted(self.entries, key=rank):
