@@ -295,7 +295,7 @@ class _Way:
         """Go on by Newton's method, until all nodes are within ``still`` of their places.
 
         ``still``: a part of the extent. A run ends where a step is not found in `SURELY` products
-        with the Hessian, as with cells 1e5 times as long as they are thick.
+        with the Hessian, as with cells 2e4 times as long as they are thick.
         """
         most = STEPS if still == STILL else SURELY
         before = 0.0

@@ -261,14 +261,17 @@ def height_warnings(
 ) -> list[str]:
     """Return warnings of layers whose first heights a run changed by more than `CHANGED`.
 
+    Those at sliding boundaries count where layers are to be kept.
+
     ``walls``: of the deformed ``mesh``, beside the undeformed one.
     ``kept``: the layers that walls kept. Those that gave way have a warning of their own.
     """
     warnings = []
     told = [] if kept is None else [name for one in kept.gave_way for name in one.names]
+    roles = ("moving", "fixed") if case.layers == "no" else ("moving", "fixed", "sliding")
     for name in walls.markers:
         known = name not in walls.layered or name in told
-        if known or case.roles.get(name, "fixed") not in ("moving", "fixed"):
+        if known or case.roles.get(name, "fixed") not in roles:
             continue
         at = walls.columns.places(name)
         ratio = walls.values["height_ratio"][at]
@@ -286,6 +289,12 @@ def height_warnings(
 
 def _remedy(case: Case, mesh: Mesh, name: str, point: FloatArray) -> str:
     """Return what keeps the first height that a run changed at a point of a wall."""
+    if case.roles.get(name) == "sliding":
+        moving = " and ".join(case.markers_with("moving"))
+        return (
+            f"only moving and fixed boundaries keep their layers; move {moving} less, above all "
+            f"towards {name} and in turns about lines that lie in it"
+        )
     if case.method != "rbf":
         return "METHOD= rbf with LAYERS= AUTO keeps it"
     if case.layers == "no":

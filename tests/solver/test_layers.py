@@ -481,6 +481,25 @@ def test_repair_of_poor_cells_keeps_first_heights(afterwards):
     assert not any("of layers" in text for text in last.warnings)
 
 
+@pytest.mark.parametrize("layers", ["auto", "no"])
+@pytest.mark.parametrize("degrees", [-5.0, -30.0])
+def test_a_run_that_keeps_layers_says_where_those_of_a_sliding_wall_are_spoiled(layers, degrees):
+    """A wall with layers leans against one with layers in which its foot slides."""
+    height = np.append(0.002 * (1.2 ** np.arange(20) - 1.0) / 0.2, 1.0)
+    mesh = builders.grid((20, 20), place=lambda p: height[np.asarray(p).astype(int)])
+    roles = {"x_m": "moving", "y_m": "sliding", "y_p": "sliding"}
+    case = Case(roles=roles, relax="yes", layers=layers, sliding="ps", rims="slide")
+    case = case.change(motions=(Rotate("x_m", degrees, (0.0, 0.0)),))
+    *_, last = sv.deform(case, mesh)
+    walls = sv.walls(last.mesh, mesh)
+    ratio = walls.summary()["y_m"]["first_height"]["ratio"]
+    said = [text for text in height_warnings(case, walls, last.mesh) if "layers at y_m" in text]
+    assert len(said) == (layers == "auto" and degrees == -30.0)
+    for text in said:
+        assert f"is {ratio['min']:.3g} times" in text
+        assert "only moving and fixed boundaries keep their layers; move x_m less" in text
+
+
 def test_lifting_the_lowest_cells_after_a_relaxation_keeps_first_heights():
     mesh = c_mesh(around=60, wake=10, first=1e-3)
     case = Case(roles={"airfoil": "moving"}, motions=(sv.Rotate("airfoil", 30.0),), relax="yes")
