@@ -536,7 +536,7 @@ def draw(path: Path, outcomes: Sequence[Outcome]) -> None:
         theirs = np.array([(b.mean, _lowest(b)) for _, b in pairs]).reshape(-1, 2)
         between = LineCollection(np.stack([ours, theirs], axis=1), color="0.8", lw=0.6, zorder=1)
         axes.add_collection(between)
-        axes.plot(*theirs.T, "o", color="tab:orange", ms=4, mew=0, label="the method above", zorder=2)
+        axes.plot(*theirs.T, "o", color="tab:orange", ms=4, mew=0, label="the other", zorder=2)
         axes.plot(*ours.T, "o", color="tab:blue", ms=4, mew=0, label="slideviz", zorder=3)
         axes.set_title(title, fontsize=10)
         axes.grid(visible=True, color="0.92")
