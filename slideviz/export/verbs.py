@@ -60,7 +60,7 @@ def picture(
         Width and height in pixels.
     zoom : Detail, "auto", "all" or "view"
         What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it, "view"
-        what the window showed by the keys VIEW_... of the case, with colors and sections, and
+        what the window showed by the keys ``VIEW_...`` of the case, with colors and sections, and
         without a title.
     beside : (Case, Step) or "undeformed", optional
         Another run of the mesh, or the undeformed mesh, drawn beside it.
