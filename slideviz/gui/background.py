@@ -147,6 +147,7 @@ class LivePreview(BackgroundJob):
         self.fields: LiveFields | None = None
         self._running = running
         self._tried: Case | None = None
+        self._pulled: Case | None = None  # as the mouse left it, perhaps before there were fields
         self._at_rest = single_shot(self, self._make_fields, FIELDS_MS)
         self._hand = single_shot(self, self._run, HAND_MS)
         running.began.connect(self._spare_memory)
@@ -176,6 +177,7 @@ class LivePreview(BackgroundJob):
                 self._begin()
         if old.case is not new.case:
             self._at_rest.start()
+            self._pulled = new.case if self.store.dragging else None
 
     def _spare_memory(self) -> None:
         if self.fields is not None and free_memory() < self.fields.nbytes:
@@ -203,6 +205,9 @@ class LivePreview(BackgroundJob):
     def _finished(self, found: LiveFields | tuple[LiveFields, Preview | None] | None) -> None:
         if not isinstance(found, tuple):
             self.fields = found
+            if self._pulled is self.store.session.case:
+                self._hand.start()
+                self._begin()
             return
         fields, preview = found
         if self.fields is None or fields.mesh is not self.store.session.mesh:

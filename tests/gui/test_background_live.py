@@ -1,6 +1,7 @@
 """The mesh follows the hand: typed, stepped with keys, dragged; then the run takes its place."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,6 +97,27 @@ def test_a_run_is_cancelled_when_the_hand_moves_on(live, monkeypatch):
         )
     )
     assert len(live.session.runs) == 1
+
+
+def test_a_motion_that_a_pull_adds_is_followed_too(live):
+    window = live.window
+    motions = live.session.case.motions
+    window.store.set_dragging(True)
+    window.store.change(changes.set_case, motions=(*motions, replace(motions[0], angle_deg=3.0)))
+    window.store.set_dragging(False)
+    live.qtbot.waitUntil(lambda: live.session.preview is not None)
+    settled(live)
+    assert live.session.runs[-1].live
+    assert live.session.runs[-1].case.motions == live.session.case.motions
+
+
+def test_a_motion_of_the_menu_runs_nothing(live):
+    fields = live.window.live.fields
+    live.add_motion(Rotate)
+    live.qtbot.waitUntil(lambda: live.window.live.fields not in (fields, None))
+    QTest.qWait(700)
+    assert not live.session.runs
+    assert live.session.preview is None
 
 
 def test_while_the_mouse_drags_nothing_runs(live):
