@@ -740,7 +740,7 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
     panels |= {act.shortcut() for act in window.motions.actions_table.values()}
     told = {key for row in rows for key in row.text(1).split(", ")}
     assert {key.toString() for key in panels} - {""} <= told
-    dialog.search.setText("zoom whole mesh")
+    dialog.search.setText("zoom to the whole mesh")
     assert [row.text(0) for row in shown()] == ["Fit all"]
     assert dialog.count.isHidden()
     dialog.search.setText("no such key")
