@@ -53,12 +53,23 @@ SURE = 0.1
 """An iteration that promises to take away less than this part of that is the last one."""
 
 NEWTON = 100
-ALIKE = 3e-11
-STILL = 1e-14
 SEEN = 1e-6
-"""Most steps of Newton's method; how far from the least energy it ends, as a part of the extent, so
-that the same mesh in other axes or numbers has the same result, and where derivatives are wanted;
-and the step from which on energies differ by more than rounding, so that the step is searched."""
+"""Most steps of Newton's method, and the step, as a part of the extent, from which on energies
+differ by more than rounding, so that the step is searched."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Where Newton's method ends."""
+
+    still: float  # how far nodes may be from the least energy, as a part of the extent
+    products: int  # most products with the Hessian of one step
+    gives_up: bool  # whether it ends where a step is not found in these, with long thin cells
+
+
+ALIKE = End(3e-11, 100, gives_up=True)
+EXACT = End(1e-14, 300, gives_up=False)
+"""Of a run, whose result is the same in other axes or numbers, and where derivatives are wanted."""
 
 BEND = 1e-6  # step, as a part of the extent, by which changes of walls are found
 
@@ -78,10 +89,7 @@ AT_REST = 1e-14  # energy of a cell that counts as nothing: rounding is a hundre
 
 SOLVED = 1e-13
 PRODUCTS = 5000
-STEPS = 300
-SURELY = 100
-"""Residual of the linear systems of derivatives, most products with the Hessian, and most of a step
-of Newton's method where derivatives are wanted, and in a run."""
+"""Residual of the linear systems of derivatives, and most products with the Hessian."""
 
 Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
 """Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
@@ -175,7 +183,7 @@ class Relaxation:
             way = way_on(walls)
             if self.converged:
                 way.go(tick, SOON)
-                way.finish(STILL)
+                way.finish(EXACT)
             else:
                 size = max(1.0, made.energy.count / SMALL)
                 unfolded = way.go(tick, min(RESIDUAL * np.sqrt(size), LOOSE))
@@ -268,7 +276,7 @@ class _Way:
     def frozen_walls(self, tick: Tick) -> Walls:
         """Return the walls of sliding nodes, flat as they are where these come to lie."""
         self.go(tick, SOON)
-        self.finish(STILL)
+        self.finish(EXACT)
         nodes = self._sliding
         end = self._coords_of(self.x, nodes) - self._coords[nodes]
         d = end.shape[1]
@@ -291,13 +299,8 @@ class _Way:
         anchor = self._coords[nodes] + end
         return Walls(lambda _: rows, FlatWalls(anchor, free @ np.swapaxes(free, 1, 2)))
 
-    def finish(self, still: float) -> None:
-        """Go on by Newton's method, until all nodes are within ``still`` of their places.
-
-        ``still``: a part of the extent. A run ends where a step is not found in `SURELY` products
-        with the Hessian, as with cells 2e4 times as long as they are thick.
-        """
-        most = STEPS if still == STILL else SURELY
+    def finish(self, end: End) -> None:
+        """Go on by Newton's method, until all nodes are where ``end`` has them."""
         before = 0.0
         last = np.inf
         left = 1.0
@@ -307,7 +310,7 @@ class _Way:
             along = self._function(WORST, 0.0)
             nothing = np.zeros((len(self._unknowns.owner), self.x.shape[1]))
             now, gradient = along(nothing)
-            step, size, left = self._solved(-gradient, most, before)
+            step, size, left = self._solved(-gradient, end.products, before)
             found_all = left < 1.0
             farthest = float(np.abs(self._unknowns.moved(step)).max())
             slope = dot(gradient.ravel(), step.ravel())
@@ -319,11 +322,11 @@ class _Way:
                 left = left if found[0] == 1.0 else 1.0
             self._go_to(self._placed(self.x + self._unknowns.moved(step)))
             self.iterations += 1
-            if farthest * max(left, farthest / last) <= still * self._extent:
+            if farthest * max(left, farthest / last) <= end.still * self._extent:
                 nothing_left = AT_REST * self._energy.count
                 self.residual = float(np.sqrt(max(-slope, 0.0) / max(now, nothing_left)))
                 break
-            if not (found_all or still == STILL):
+            if end.gives_up and not found_all:
                 break
             before = size
             last = farthest
