@@ -24,8 +24,8 @@ from slideviz.samples.table import SAMPLES
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
 from slideviz.session.run_messages import stopped_words
-from slideviz.session.saving import Unsaved, continued_case, files_beside, view_to_case
-from slideviz.session.session_file import ENDING, MissingMeshError, files_of
+from slideviz.session.saving import Unsaved, continued_case, files_beside, files_of, view_to_case
+from slideviz.session.session_file import ENDING, MissingMeshError
 from slideviz.session.state import Session
 from slideviz.system.atomic import atomic_write
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -254,6 +254,11 @@ def continued_case(session: Session, path: Path) -> Case:
     return case.change(mesh_file=path, mesh_format=None, reference_file=reference, source=None)
 
 
+def files_of(case: Case) -> Iterable[Path]:
+    """Return the files that a case needs: its mesh, the reference, and those of its motions."""
+    return case.change(source=None).inputs()
+
+
 def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
     """Return new paths, beside the case file ``path``, for a case's files that are in ``folder``.
 
@@ -261,11 +266,10 @@ def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
     """
     if folder in path.parents:
         return {}
-    used = [case.mesh_file, case.reference_file, *(path for m in case.motions for path in m.files)]
     return {
         file: path.with_suffix(file.suffix)
         if file == case.mesh_file
         else path.with_name(f"{path.stem}_{file.name}")
-        for file in used
-        if file and folder in file.parents and file.is_file()
+        for file in files_of(case)
+        if folder in file.parents and file.is_file()
     }

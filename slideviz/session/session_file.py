@@ -31,7 +31,7 @@ from slideviz.errors import CaseError, SlidevizError, printable
 from slideviz.mesh.model import Mesh
 from slideviz.session.changes import show_frame
 from slideviz.session.design_table import DesignTable
-from slideviz.session.saving import Camera, view_to_case
+from slideviz.session.saving import Camera, files_of, view_to_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
@@ -260,13 +260,6 @@ def read_session(
             head["runs"] = []
         content: StoredSession = reader.decoded(head, StoredSession)
         return content
-
-
-def files_of(case: Case) -> list[Path]:
-    """Return the files that a case needs: its mesh, the reference, and those of its motions."""
-    of_motions = (path for motion in case.motions for path in motion.files)
-    files = case.mesh_file, case.reference_file, *of_motions
-    return [file for file in files if file is not None]
 
 
 @contextmanager
