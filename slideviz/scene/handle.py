@@ -441,14 +441,16 @@ class HandleActor:
 
     def draw(self, parts: list[Part], held: Grip | None, scheme: ColorScheme) -> None:
         """Draw parts, the last one at the bottom; that of the grip ``held`` in another color."""
+        edge = (*pv.Color(scheme.background).int_rgb, 153)
         rim = []
         fill = []
         for part in parts[::-1]:
             color = SELECTED_COLOR if part.grip == held else part.color
             opacity = 1.0 if part.grip == held or held is None else 0.35 * part.opacity
             opacity = min(opacity, part.opacity)
-            fill += [(polygon, color, opacity) for polygon in part.polygons]
-            rim += [(_wider(polygon), scheme.background, 0.6) for polygon in part.polygons
+            paint = (*pv.Color(color).int_rgb, round(255 * opacity))
+            fill += [(polygon, paint) for polygon in part.polygons]
+            rim += [(_wider(polygon), edge) for polygon in part.polygons
                     if opacity > 0.5 and len(part.line) < 3]  # fmt: skip
         every = rim + fill
         there = NAME in self.plotter.actors
@@ -459,12 +461,11 @@ class HandleActor:
         if not there:  # at first, and after the scene was cleared
             options = {"reset_camera": False, "render": False, "pickable": False}
             self.plotter.add_actor(self.actor, name=NAME, **options)
-        flat = np.concatenate([polygon for polygon, _, _ in every])
-        offsets = np.cumsum([0, *(len(polygon) for polygon, _, _ in every)])
+        flat = np.concatenate([polygon for polygon, _ in every])
+        offsets = np.cumsum([0, *(len(polygon) for polygon, _ in every)])
         self._shape.points = np.column_stack([flat, np.zeros(len(flat))])
         self._shape.SetPolys(pv.CellArray.from_arrays(offsets, np.arange(offsets[-1])))
-        colors = [(*pv.Color(color).int_rgb, round(255 * part)) for _, color, part in every]
-        array = numpy_to_vtk(np.array(colors, np.uint8), deep=True)
+        array = numpy_to_vtk(np.array([paint for _, paint in every], np.uint8), deep=True)
         array.SetName("colors")
         self._shape.GetCellData().SetScalars(array)
         self._shape.Modified()
