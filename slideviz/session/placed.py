@@ -502,11 +502,11 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
         return None
     marker = new_target(session) if motion is None else motion.marker
     names = named(marker) or session.case.markers_with("moving")
-    nodes = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
+    nodes = {name: mesh.marker(name).nodes for name in names if name in mesh.marker_names}
     if not nodes:
         return None
-    once = np.unique(np.concatenate(nodes), return_index=True)[1]
-    moved = [ghosts.get(name, mesh.points[mesh.marker(name).nodes]) for name in names]
+    once = np.unique(np.concatenate([*nodes.values()]), return_index=True)[1]
+    moved = [ghosts.get(name, mesh.points[mine]) for name, mine in nodes.items()]
     origin = padded(np.concatenate(moved)[once].mean(axis=0)[None])[0]
     kind = PlacedRadius if isinstance(motion, Radial) else PlacedBoundary
     return kind(session, origin, *_axes(session, origin), index, marker)

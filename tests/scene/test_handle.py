@@ -195,6 +195,15 @@ def test_each_act_changes_the_motion_of_its_kind_and_adds_none_twice(body):
     assert other.case.motions[3].axis == (1.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("target", ["", ("x_m", "gone")])
+def test_a_name_that_the_mesh_lacks_leaves_the_handle_of_the_others(body, target):
+    session = changes.add_motion(body, Translate(target, (0.1, 0.0, 0.0)))
+    roles = {**session.case.roles, "gone": "moving"}
+    lacking = replace(session, case=session.case.change(roles=roles))
+    there = changes.add_motion(body, Translate("x_m", (0.1, 0.0, 0.0)))
+    assert np.array_equal(handle_of(lacking).origin, handle_of(there).origin)
+
+
 def test_a_typed_number_is_that_of_the_case(body):
     drag = take(handle_of(body), VIEWS[1], ("move", ()))
     typed = replace(drag, axes=(1,), typed="-0.25").result()
