@@ -46,7 +46,7 @@ _OF_FRAMES = ("step", "label")  # fields of frames; others are computed again fr
 _OF_POINTS = ("control", "nodes")  # fields that are numbers of points; others are of cells
 _VIEW = (
     "drawn", "selected", "frame", "marked_cell", "marked_in", "beside", "swapped", "ranges",
-    "section_index", "handle",
+    "section_index", "handle", "motion_index",
 )  # fmt: skip
 """The fields of a view that a case file lacks, or has only where they differ from a default."""
 

@@ -61,6 +61,7 @@ def left(folder):
     )
     session = changes.add_section(session, Section("plane", (0.3, 0.0, 0.0), (1.0, 0.0, 0.0)))
     session = changes.replace_section(session, 0, replace(session.view.section, name="middle"))
+    session = changes.choose_motion(session, 1)
     session = changes.show_beside(changes.show_frame(session, 1), 3)
     return changes.mark_cell(session, 5)
 
