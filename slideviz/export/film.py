@@ -219,10 +219,8 @@ def film(
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         if zoom == "view":
             options = options.like(renderer.session.view)
-        runs = renderer.shown(renderer.session, options)
-        titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
         yield from draw_images(
-            film_steps(renderer, options, path, film_options, titles=titles, overwrite=overwrite)
+            film_steps(renderer, options, path, film_options, named=False, overwrite=overwrite)
         )
 
 
@@ -237,22 +235,23 @@ def film_steps(
     file: Path,
     film_options: FilmOptions,
     *,
-    titles: Titles | None = None,
+    named: bool = True,
     overwrite: bool = False,
 ) -> Generator[object, Any, None]:
     """Write a film drawn by a renderer; yield `FilmProgress` after each image, and between pieces.
 
     The rest is as for `film`. ``renderer``: holds the session, whose steps are shown, and the
-    camera. ``titles`` returns those of the images; by default run, step and quality.
+    camera. ``named``: whether the title of a single run has its name.
     """
     runs = renderer.shown(renderer.session, options)
     for one in runs:
         if len(one.frames) < 2:
             raise SlidevizError("there are no steps to make a film of; run the case first")
         check_film(file, film_options, frames=len(one.frames), overwrite=overwrite)
-    if titles is None and len(runs) == 2:
-        titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
-    write = titles or _titles(runs[0], options)
+    if named and len(runs) == 1:
+        write = _titles(runs[0], options)
+    else:
+        write = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
     longest = max(runs, key=lambda one: len(one.frames))
     yield from aim_at_largest(renderer, options)
 
