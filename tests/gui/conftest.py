@@ -40,27 +40,37 @@ DIALOGS = (
 )
 
 
+@pytest.fixture(scope="module", autouse=True)
+def no_collection_in_threads():
+    """Let no thread of a job or a plot look for garbage, not even between two tests.
+
+    What belongs to Qt and VTK would end there. The program does the same
+    (`slideviz.gui.responsiveness.threads`).
+    """
+    gc.disable()
+    yield
+    gc.collect()
+    gc.enable()
+
+
 @pytest.fixture(autouse=True)
 def nothing_of_closed_windows():
     """Collect what closed windows left, as PySide would give their wrappers to new objects.
 
     The view keeps a QSurface; where Qt puts an action at its address later, Python gets the
-    surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.threads`), no thread
-    of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
+    surface for it.
 
     Qt deletes closed windows in the next event loop only, and those that nobody gave to `qtbot`
     never: the next window would polish them, too, which takes longer than to make it.
     What is there before the test, as modules are, no later look finds: each would take longer.
     """
+    gc.disable()  # a test may have switched it on
     for top in QApplication.topLevelWidgets():
         if isinstance(top, MainWindow) and not top.isVisible():
             top.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.collect()
     gc.freeze()
-    gc.disable()
-    yield
-    gc.enable()
 
 
 @pytest.fixture(autouse=True)
