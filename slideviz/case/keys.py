@@ -465,11 +465,13 @@ def _why_no_levels(case: Case) -> str:
     return _why_no_reduction(case) or ("" if levels else "there are no levels")
 
 
+def _why_no_layers(case: Case) -> str:
+    return "layers are off" if case.layers == "no" else ""
+
+
 def _why_no_minimum_gap(case: Case) -> str:
     """Return why layers do not give way; "" if they do."""
-    if case.layers == "no":
-        return "layers are off"
-    return "relaxation is off" if case.relax == "no" else ""
+    return _why_no_layers(case) or ("relaxation is off" if case.relax == "no" else "")
 
 
 def _why_no_repair(case: Case) -> str:
@@ -830,7 +832,7 @@ METHOD_ROWS = (
         tip="How far from walls nodes go with them, in the mesh's length unit. Automatic: a "
         "fiftieth of the wall's extent, or the thickness of its boundary layer if that is less.",
         run_label="to {}",
-        switch=lambda case: "layers are off" if case.layers == "no" else "",
+        switch=_why_no_layers,
         method="rbf",
     ),
     _method_setting(
