@@ -17,6 +17,7 @@ from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.cli import run
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.samples.table import sample
+from slideviz.samples.turbine_row import SPAN, extruded
 from slideviz.session import jobs
 from slideviz.session.run_messages import remarks_of
 from slideviz.session.state import Run, StepFrame
@@ -28,7 +29,7 @@ from slideviz.solver.setup import make_setup
 from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
 from tests.test_laws import box, box_case, sector, sector_case
-from tools.study.flows import c_mesh, joukowski, layered_o_mesh
+from tools.study.flows import c_mesh, grid_mesh, joukowski, layered_o_mesh
 
 pytestmark = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
 
@@ -130,15 +131,9 @@ def test_a_fixed_wall_keeps_its_layers_in_place():
     """Two walls: of a channel the lower one moves, the upper one has layers and stays."""
     y = np.r_[0.0, 1e-3 * (1.3 ** np.arange(1, 16) - 1) / 0.3, 0.6, 0.8, 0.95, 0.99, 1.0]
     x = np.linspace(0, 2, 21)
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    node = np.arange(len(points)).reshape(len(y), len(x))
-    quads = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1)
+    node = np.arange(x.size * y.size).reshape(y.size, x.size)
     sides = {"w": node[0], "top": node[-1], "in": node[:, 0], "out": node[:, -1]}
-    markers = [
-        Marker(name, Cells.from_blocks([(3, np.stack([row[:-1], row[1:]], axis=1))]))
-        for name, row in sides.items()
-    ]
-    mesh = Mesh(points, Cells.from_blocks([(9, quads.reshape(-1, 4))]), tuple(markers))
+    mesh = grid_mesh(x + 1j * y[:, None], node.T, sides)
     roles = {"w": "moving", "in": "sliding", "out": "sliding"}
     case = Case(roles=roles, motions=(Translate("w", (0.0, 0.1)),), sliding="ps", layers="auto")
     *_, last = sv.deform(case, mesh)
@@ -431,24 +426,15 @@ def test_layers_of_cambered_airfoils_are_kept_at_any_trailing_edge(
 def test_the_sides_of_a_sharp_edge_in_3d_turn_by_themselves():
     """A wing of constant section, thickened and turned between two sliding planes."""
     flat = c_mesh(sharp(16.0, 0.04), 60, 12, first=2e-6)
-    count, planes = len(flat.points), np.linspace(0.0, 0.4, 5)
-    points = np.concatenate([np.c_[flat.points, np.full(count, z)] for z in planes])
-    quads = flat.cells.connectivity.reshape(-1, 4)
-    hexahedra = [np.c_[quads, quads + count] + k * count for k in range(len(planes) - 1)]
-    sides = {"low": quads[:, ::-1], "high": quads + (len(planes) - 1) * count}
-    for marker in flat.markers:
-        line = marker.cells.connectivity.reshape(-1, 2)
-        strip = np.c_[line, line[:, ::-1] + count]
-        sides[marker.name] = np.concatenate([strip + k * count for k in range(len(planes) - 1)])
-    markers = [Marker(name, Cells.from_blocks([(9, rows)])) for name, rows in sides.items()]
-    mesh = Mesh(points, Cells.from_blocks([(12, np.concatenate(hexahedra))]), tuple(markers))
+    straight = extruded(flat, 4)
+    mesh = straight.with_points(straight.points * [1.0, 1.0, 0.4 / SPAN])
 
     def moved(x):
         return np.stack([-0.2 * x[:, 1], 0.2 * x[:, 0] + 0.5 * x[:, 1], 0.0 * x[:, 2]], axis=1)
 
     nodes = np.unique(mesh.marker("airfoil").nodes)
     case = Case(
-        roles={"airfoil": "moving", "low": "sliding", "high": "sliding"},
+        roles={"airfoil": "moving", "HUB": "sliding", "SHROUD": "sliding"},
         motions=(Prescribed(nodes, moved(mesh.points[nodes]), "airfoil"),),
         sliding="ps",
         layers="auto",

@@ -15,12 +15,13 @@ from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.rigid import Translate
 from slideviz.cli import run
-from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.samples.turbine_row import SPAN, extruded
 from slideviz.session import jobs
 from slideviz.session.run_messages import remarks_of
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.layers import height_warnings
 from tests.design.test_deformer_derivatives import check_relaxed
+from tools.study.flows import grid_mesh
 
 HEIGHT = 0.2
 LAYER = np.concatenate([[0.0], np.cumsum(1e-3 * 1.2 ** np.arange(10))])
@@ -31,18 +32,10 @@ def channel(columns=40, core=24, length=1.0):
     """A channel between walls ``low`` and ``high`` with ten layers each, and its nodes by rows."""
     middle = np.linspace(LAYER[-1], HEIGHT - LAYER[-1], core + 1)[1:-1]
     y = np.concatenate([LAYER, middle, HEIGHT - LAYER[::-1]])
-    points = np.stack(np.meshgrid(np.linspace(0.0, length, columns + 1), y), axis=-1)
-    node = np.arange(points.size // 2).reshape(points.shape[:2])
-    quads = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1)
+    z = np.linspace(0.0, length, columns + 1) + 1j * y[:, None]
+    node = np.arange(z.size).reshape(z.shape)
     sides = {"low": node[0], "high": node[-1], "in": node[:, 0], "out": node[:, -1]}
-    markers = [
-        Marker(name, Cells.from_blocks([(3, np.stack([row[:-1], row[1:]], axis=1))]))
-        for name, row in sides.items()
-    ]
-    mesh = Mesh(
-        points.reshape(-1, 2), Cells.from_blocks([(9, quads.reshape(-1, 4))]), tuple(markers)
-    )
-    return mesh, node
+    return grid_mesh(z, node.T, sides), node
 
 
 def closing(motion, **changes):
@@ -180,25 +173,16 @@ def test_where_there_is_room_nothing_changes():
 def test_a_gap_that_closes_in_3d_between_turned_walls():
     """The tip of a blade near its casing, in a mesh turned about no axis of it."""
     mesh, _ = channel(16, 12)
-    count = len(mesh.points)
-    depth = np.linspace(0.0, 0.5, 9)
-    points = np.concatenate([np.c_[mesh.points, np.full(count, z)] for z in depth])
-    quads = mesh.cells.connectivity.reshape(-1, 4)
-    cells = [np.c_[quads, quads + count] + k * count for k in range(len(depth) - 1)]
-    sides = {"near": quads[:, ::-1], "far": quads + (len(depth) - 1) * count}
-    for marker in mesh.markers:
-        line = marker.cells.connectivity.reshape(-1, 2)
-        strip = np.c_[line, line[:, ::-1] + count]
-        sides[marker.name] = np.concatenate([strip + k * count for k in range(len(depth) - 1)])
+    straight = extruded(mesh, 8)
+    points = straight.points * [1.0, 1.0, 0.5 / SPAN]
     turn = Rotation.from_rotvec([0.2, 0.4, 0.6]).as_matrix()
-    markers = [Marker(name, Cells.from_blocks([(9, rows)])) for name, rows in sides.items()]
-    solid = Mesh(points @ turn.T, Cells.from_blocks([(12, np.concatenate(cells))]), tuple(markers))
+    solid = straight.with_points(points @ turn.T)
     nodes = np.unique(solid.marker("low").nodes)
     x, _, z = points[nodes].T
     up = 0.17 * np.exp(-((x - 0.5) ** 2) / 0.03 - (z - 0.2) ** 2 / 0.05)
     moved = np.stack([0 * up, up, 0 * up], axis=1) @ turn.T
     case = closing(Prescribed(nodes, moved, "low"))
-    case = case.change(roles={**case.roles, "near": "sliding", "far": "sliding"})
+    case = case.change(roles={**case.roles, "HUB": "sliding", "SHROUD": "sliding"})
     *_, last = sv.deform(case, solid)
     found = sv.quality(last.mesh, solid)
     assert found.inverted == 0

@@ -16,6 +16,7 @@ import slideviz as sv
 from slideviz.mesh.walls import find_columns
 from slideviz.plots.figure_io import empty_figure
 from tools.shots import shrink
+from tools.study.flows import grid_mesh
 from tools.study.leading_edge import LAYERS, panel_of, ratios_of
 
 GAPS = (0.1, 0.05, 0.03)  # what is left of `OPEN`
@@ -32,15 +33,9 @@ def tip_gap() -> sv.Mesh:
     x = np.linspace(-0.5, 0.5, COLUMNS + 1)
     below = -0.8 * x**2
     y = below + (OPEN - below) * up[:, None]
-    points = np.stack([np.broadcast_to(x, y.shape), y], axis=-1).reshape(-1, 2)
     node = np.arange(y.size).reshape(y.shape)
-    quads = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1)
     sides = {"TIP": node[0], "CASING": node[-1], "IN": node[:, 0], "OUT": node[:, -1]}
-    markers = tuple(
-        sv.Marker(name, sv.Cells.from_blocks([(3, np.stack([row[:-1], row[1:]], axis=1))]))
-        for name, row in sides.items()
-    )
-    return sv.Mesh(points, sv.Cells.from_blocks([(9, quads.reshape(-1, 4))]), markers)
+    return grid_mesh(x + 1j * y, node.T, sides)
 
 
 def draw(path: Path) -> Path:

@@ -78,9 +78,8 @@ def c_mesh(
     z = (base[:, None] + 1j * height) ** 2 + FOCUS
     number = np.arange(z.size).reshape(z.shape)
     number[-wake - 1 :, 0] = number[wake::-1, 0]  # both sides of the wake are one
-    quads = _quads(number)
     body, far = number[wake:-wake, 0], np.r_[number[0], number[1:-1, -1], number[-1, ::-1]]
-    return _mesh(z, [(QUADRILATERAL, quads)], {"airfoil": body[::-1], "farfield": far[::-1]})
+    return grid_mesh(z, number, {"airfoil": body[::-1], "farfield": far[::-1]})
 
 
 def layered_o_mesh(outline: Outline, around: int = 120, first: float = 1e-5) -> sv.Mesh:
@@ -103,7 +102,7 @@ def layered_o_mesh(outline: Outline, around: int = 120, first: float = 1e-5) -> 
     number = np.arange(z.size).reshape(z.shape)
     number[-1] = number[0]
     sides = {"airfoil": number[::-1, 0], "farfield": number[:, -1]}
-    return _mesh(z, [(QUADRILATERAL, _quads(number))], sides)
+    return grid_mesh(z, number, sides)
 
 
 def o_mesh(around: int = 60) -> sv.Mesh:
@@ -113,8 +112,8 @@ def o_mesh(around: int = 60) -> sv.Mesh:
     z = radius * np.exp(2j * np.pi * np.arange(around + 1) / around)[:, None]
     number = np.arange(z.size).reshape(z.shape)
     number[-1] = number[0]
-    quads = _quads(number[:, ::-1])
-    return _mesh(z, [(QUADRILATERAL, quads)], {"body": number[:, 0], "farfield": number[:, -1]})
+    sides = {"body": number[:, 0], "farfield": number[:, -1]}
+    return grid_mesh(z, number[:, ::-1], sides)
 
 
 def triangle_mesh(shape: str) -> sv.Mesh:
@@ -138,7 +137,7 @@ def triangle_mesh(shape: str) -> sv.Mesh:
     points, triangles = relax(points, len(fixed), edges)
     sides = {"body": ring, "farfield": np.r_[len(body) + np.arange(n), len(body)]}
     sides["body"] = np.r_[ring, 0][::-1]
-    return _mesh(points @ [1, 1j], [(TRIANGLE, triangles)], sides)
+    return _mesh(points @ [1, 1j], TRIANGLE, triangles, sides)
 
 
 def _polygon(*corners: complex) -> FloatArray:
@@ -191,19 +190,22 @@ def _ratio(sum_of: float, count: int) -> float:
     return low
 
 
-def _quads(number: IntArray) -> IntArray:
-    """Return the quadrilaterals (m, 4) of a structured grid of node numbers (a, b)."""
-    parts = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
-    return np.stack(parts, axis=-1).reshape(-1, 4)
-
-
 def _loop(nodes: IntArray) -> IntArray:
     return np.column_stack([nodes, np.roll(nodes, -1)])
 
 
-def _mesh(z: FloatArray, cells: list[tuple[int, IntArray]], sides: dict[str, IntArray]) -> sv.Mesh:
+def grid_mesh(z: FloatArray, number: IntArray, sides: dict[str, IntArray]) -> sv.Mesh:
+    """Return quadrilaterals of a structured grid of node numbers (a, b).
+
+    ``z``: the points as complex numbers; ``sides``: rows of nodes of the boundaries.
+    """
+    parts = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    return _mesh(z, QUADRILATERAL, np.stack(parts, axis=-1).reshape(-1, 4), sides)
+
+
+def _mesh(z: FloatArray, kind: int, cells: IntArray, sides: dict[str, IntArray]) -> sv.Mesh:
     """Return the mesh of the nodes in use, from complex points and rows of nodes of its sides."""
-    used, flat = np.unique(cells[0][1], return_inverse=True)
+    used, flat = np.unique(cells, return_inverse=True)
     new = np.zeros(z.size, np.int64)
     new[used] = np.arange(len(used))
     points = np.column_stack([z.ravel()[used].real, z.ravel()[used].imag])
@@ -211,5 +213,5 @@ def _mesh(z: FloatArray, cells: list[tuple[int, IntArray]], sides: dict[str, Int
         Marker(name, Cells.from_blocks([(LINE, np.column_stack([new[row[:-1]], new[row[1:]]]))]))
         for name, row in sides.items()
     ]
-    blocks = [(cells[0][0], flat.reshape(cells[0][1].shape))]
+    blocks = [(kind, flat.reshape(cells.shape))]
     return sv.Mesh(points, Cells.from_blocks(blocks), tuple(markers))
