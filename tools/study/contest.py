@@ -413,7 +413,7 @@ def faults(row: Contest, found: Mapping[str, Outcome]) -> Iterator[str]:
             yield f"lowest {ours.lowest:.3f}, {ours.inverted} inverted, from {rbf.lowest:.3f}"
         if ours.mean < rbf.mean or (rbf.lowest > 0.4 and ours.mean <= rbf.mean):
             yield f"mean {ours.mean:.4f}, of radial basis functions {rbf.mean:.4f}"
-    less = 0.003 if row.layered else EQUAL
+    less = MEAN_LESS if row.layered else EQUAL
     for name, most in (("elastic", less), ("su2", less), ("elastic-10", EQUAL)):
         other = found.get(name)
         if other is None or other.problem or other.inverted:
