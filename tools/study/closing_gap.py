@@ -15,9 +15,8 @@ import numpy as np
 import slideviz as sv
 from slideviz.mesh.walls import find_columns
 from slideviz.plots.figure_io import empty_figure
-from tools.shots import shrink
 from tools.study.flows import grid_mesh
-from tools.study.leading_edge import LAYERS, panel_of, ratios_of
+from tools.study.leading_edge import LAYERS, panel_of, ratios_of, save_scaled
 
 GAPS = (0.1, 0.05, 0.03)  # what is left of `OPEN`
 OPEN = 0.2
@@ -60,12 +59,7 @@ def draw(path: Path) -> Path:
         panel.set_xlabel(f"{words}\nlowest quality {least:.2f}", fontsize=9)
         panel.set_xlim(-0.1, 0.1)
         panel.set_ylim(OPEN - 1.2 * GAPS[0], OPEN + 0.01)
-    bar = figure.colorbar(image, ax=axes, aspect=25, pad=0.01, extend="max")
-    bar.set_label("height of cells, after / before", fontsize=9)
-    bar.ax.tick_params(labelsize=9)
-    figure.savefig(path)
-    shrink(path)
-    return path
+    return save_scaled(path, figure, image, "cells", "max")
 
 
 if __name__ == "__main__":

@@ -60,12 +60,7 @@ def draw(path: Path, size: int = 20_000) -> Path:
         panel.set_xlabel(label, fontsize=9)
         panel.set_xlim(nose[0] - 0.4 * reach, nose[0] + 1.6 * reach)
         panel.set_ylim(nose[1] - 0.4 * reach, nose[1] + 1.6 * reach)
-    bar = figure.colorbar(image, ax=axes, aspect=25, pad=0.01, extend="both")
-    bar.set_label("height of the layers' cells, after / before", fontsize=9)
-    bar.ax.tick_params(labelsize=9)
-    figure.savefig(path)
-    shrink(path)
-    return path
+    return save_scaled(path, figure, image, "the layers' cells", "both")
 
 
 def ratios_of(columns: Any, mesh: sv.Mesh, moved: sv.Mesh) -> dict[tuple[int, ...], float]:
@@ -106,6 +101,16 @@ def panel_of(
     axes.set_xticks([])
     axes.set_yticks([])
     return image
+
+
+def save_scaled(path: Path, figure: Any, image: Any, cells: str, extend: str) -> Path:
+    """Write a figure with a scale of the heights of ``cells``; return the path."""
+    bar = figure.colorbar(image, ax=figure.axes, aspect=25, pad=0.01, extend=extend)
+    bar.set_label(f"height of {cells}, after / before", fontsize=9)
+    bar.ax.tick_params(labelsize=9)
+    figure.savefig(path)
+    shrink(path)
+    return path
 
 
 if __name__ == "__main__":
