@@ -57,6 +57,7 @@ from slideviz.session.saving import Camera
 from slideviz.session.session_file import (
     ENDING,
     StoredSession,
+    digest,
     read_case_of,
     read_picture,
     read_session,
@@ -251,8 +252,8 @@ class Opened:
 
     ``has_view`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are
     the moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh
-    with fewer facets. ``content`` is what a session file has besides, ``remark`` what
-    the user should know of it.
+    with fewer facets. ``content`` is what a session file has besides, ``remark`` what the user
+    should know of it.
     """
 
     session: Session
@@ -286,8 +287,8 @@ def open_file(
 
     ``mesh_file``: the mesh of a session, where it is neither beside it nor where it was.
     ``unpacked``: the folder for copies of files that a session has; by default its own.
-    ``case``: that of the mesh at ``path``. Raises
-    SlidevizError if the file cannot be used; the message says what and where.
+    ``case``: that of the mesh at ``path``. Raises SlidevizError if the file cannot be used; the
+    message says what and where.
     """
     mesh_path = path
     ending = path.suffix.lower()
@@ -321,7 +322,7 @@ def open_file(
     content = read_session(path, session.first, moved)
     runs = [_restored(run, mesh, report, stopped) for run in content.runs]
     remark = ""
-    if content.shown is not None and not runs:
+    if content.shown is not None and content.mesh != digest(mesh):
         remark = f"{mesh_path} has changed since the session was saved, so its runs are left out."
     return replace(opened, session=content.put_into(session, runs), content=content, remark=remark)
 

@@ -223,6 +223,15 @@ def test_runs_of_another_mesh_are_left_out_and_that_is_told(file, folder, tmp_pa
     assert digest(mesh) != digest(mesh.with_points(1.01 * mesh.points))
 
 
+def test_of_a_file_without_the_runs_it_is_not_told_that_the_mesh_has_changed(left, folder):
+    path = folder / "autosave.slideviz"
+    write_session(path, left, stored_session(left, DesignTable(), None), None)
+    found = opened(path)
+    assert found.session.runs == ()
+    assert found.session.shown is None
+    assert found.remark == ""
+
+
 def test_it_is_written_whole_or_not_at_all(left, designs, tmp_path):
     path = tmp_path / "f.slideviz"
     path.write_text("before")
