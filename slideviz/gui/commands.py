@@ -70,7 +70,6 @@ def _fill(
 
 
 Keys = str | QKeySequence.StandardKey
-NO_MESH = "There is no mesh yet: open one first."
 WAIT = "Wait for the running job, or cancel it."
 
 
@@ -152,7 +151,7 @@ class Command:
     def reason(self, now: CommandState) -> str:
         """Return why the command is disabled."""
         if not has_mesh(now):
-            return self.why_not or NO_MESH
+            return self.why_not or "There is no mesh yet: open one first."
         return now.session.lacks_cells or (
             WAIT if now.busy else self.why_not or "Not possible with this mesh."
         )
@@ -357,15 +356,14 @@ _EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes."
             call("exports.copy_picture"), ("Ctrl+Shift+C",), enabled=has_mesh),
     Command("export_report", "&Report…",
             "Write a page with picture, histogram, numbers of the runs, limits, case and versions.",
-            call("exports.report"), enabled=in_memory(is_idle), why_not=NO_MESH),
+            call("exports.report"), enabled=in_memory(is_idle)),
     Command("export_film", "&Film of the steps…", "Make a film of the steps.",
             call("exports.make_film"),
             enabled=in_memory(has_steps), why_not=_NO_STEPS),
     Command("export_quality", "&Quality as CSV…",
             "Save the quality of every cell of the step that is shown as a CSV table.",
             call("exports.quality"),
-            enabled=in_memory(is_idle),
-            why_not=NO_MESH),
+            enabled=in_memory(is_idle)),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
             call("exports.steps"),
@@ -383,8 +381,7 @@ _FILE = Menu("file", "&File", entries=(
     ), fill=_fill_samples),
     None,
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
-            call("files.save_mesh"), (KEY.Save,), "save", in_memory(is_idle),
-            why_not=NO_MESH),
+            call("files.save_mesh"), (KEY.Save,), "save", in_memory(is_idle)),
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
             call("exports.wheel"), enabled=in_memory(has_wheel),
@@ -395,8 +392,7 @@ _FILE = Menu("file", "&File", entries=(
             call("files.save_case"), ("Ctrl+Shift+S",), "case", has_mesh),
     Command("save_session", "Save s&ession as…",
             "Save case, view, runs with their steps, and designs in one file, to go on later.",
-            call("files.save_session"), ("Ctrl+Alt+S",), enabled=is_idle,
-            why_not="There is no mesh yet: open one first."),
+            call("files.save_session"), ("Ctrl+Alt+S",), enabled=is_idle),
     _EXPORT,
     None,
     Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",
@@ -465,8 +461,7 @@ _RUN = Menu("run", "&Run", entries=(
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "
             "or other settings, and their quality.",
-            call("dock_manager.toggle", "designs"), ("F6",), enabled=has_mesh,
-            why_not=NO_MESH),
+            call("dock_manager.toggle", "designs"), ("F6",), enabled=has_mesh),
 ))
 
 _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.", (
