@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
@@ -61,9 +61,8 @@ class Files(QObject):
     # Open ------------------------------------------------------------------------------
     def recent(self) -> list[Path]:
         """Return the files used last, the latest first."""
-        listed = self.settings.value("recent", []) or []
-        assert isinstance(listed, str | list)
-        return [Path(text) for text in ([listed] if isinstance(listed, str) else listed)]
+        listed: Any = self.settings.value("recent", [], type=list)
+        return [Path(text) for text in listed]
 
     def remember(self, path: Path) -> None:
         """Put a file at the top of the recent ones."""

@@ -1,7 +1,7 @@
 """The palette finds commands, boundaries, runs, keys and pages by letters, and does them."""
 
 import pytest
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QSettings, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QLineEdit
 
@@ -72,7 +72,7 @@ def test_without_a_mesh_it_says_what_is_missing(find):
     dialog.close()
 
 
-def test_letters_in_order_are_enough_and_enter_does_it(find, with_runs):
+def test_letters_in_order_are_enough_and_enter_does_it(find, with_runs, monkeypatch, tmp_path):
     driver = with_runs({"steps": 2})
     dialog = find("mshedg")
     assert next(iter(rows(dialog))) == "Mesh edges"
@@ -83,6 +83,13 @@ def test_letters_in_order_are_enough_and_enter_does_it(find, with_runs):
     again = find("e")
     assert next(iter(rows(again))) == "Mesh edges", "what was done is first"
     again.close()
+    window = driver.window
+    one = tmp_path / "one.ini"
+    one.write_text("[General]\npalette=Mesh edges\n")
+    monkeypatch.setattr(window, "settings", QSettings(str(one), QSettings.Format.IniFormat))
+    later = find("e")
+    assert next(iter(rows(later))) == "Mesh edges", "also when the program is started again"
+    later.close()
 
 
 def test_arrows_move_in_the_list_while_typing(find, with_runs):

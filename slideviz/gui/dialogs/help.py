@@ -98,7 +98,7 @@ MOUSE = (
 
 
 class Help(QObject):
-    """What the Help menu does: shortcuts, case keys, about, and details for a bug report."""
+    """What the Help menu does: manual, palette, case keys, about, and details for a bug report."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -262,7 +262,8 @@ class PaletteDialog(SearchDialog):
 
     @property
     def _recent(self) -> list[str]:
-        return list(self.helper.window.settings.value("palette") or ())
+        titles: Any = self.helper.window.settings.value("palette", [], type=list)
+        return list(titles)
 
     def look_for(self, wanted: str) -> None:
         recent = self._recent
