@@ -117,6 +117,12 @@ def test_what_cannot_stand_beside_is_told_before_the_work(
     assert message in capsys.readouterr().err
 
 
+def test_a_picture_of_two_runs_is_of_one_mesh(case, tmp_path, capsys):
+    words = ["picture", str(case), "-o", str(tmp_path / "a.png")]
+    assert run([*words, "--beside", "MESH_FILENAME=other.su2"]) == 1
+    assert "must deform the same mesh" in capsys.readouterr().err
+
+
 def test_inverted_cells_are_code_3_and_the_film_is_written(tmp_path, capsys):
     write_sample("square", tmp_path / "square")
     file, case = tmp_path / "a.mp4", tmp_path / "square" / "square.cfg"

@@ -12,13 +12,13 @@ from slideviz import deform, quality
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import counted
-from slideviz.cli.mesh_source import changed, read_case, read_mesh, require_mesh_file
+from slideviz.cli.mesh_source import changed_beside, read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.design.sweeps.table import TIME, number_of, read_designs, require_distinct_times
-from slideviz.errors import CaseError, Remark
+from slideviz.errors import Remark
 from slideviz.export.encode import film_kind
 from slideviz.export.film import FilmOptions, check_film, require_pair_width
 from slideviz.export.film import film as draw
@@ -54,7 +54,7 @@ def main(arguments: Namespace) -> int:
 
 def _runs(arguments: Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
-    other = changed(case, arguments.beside, "--beside")  # mistakes before the work
+    other = changed_beside(case, arguments.beside)  # mistakes before the work
     mesh_file = require_mesh_file(arguments, case)
     case, mesh = read_mesh(case, mesh_file)
     require_detail(arguments.zoom, mesh)
@@ -65,8 +65,6 @@ def _runs(arguments: Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     first = undeformed(case)
     if not arguments.beside:
         return first, [Run(1, case, _frames(arguments, case, mesh), "done")]
-    if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
-        raise CaseError("--beside: two runs side by side must deform the same mesh")
     keys = [text.partition("=")[0].strip().upper() for text in arguments.beside]
     runs = [
         Run(number, one, _frames(arguments, one, mesh), "done", name=_words(one, keys))

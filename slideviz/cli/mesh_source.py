@@ -112,6 +112,17 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     return case.change(warnings=(*added, *idle_roles(case)))
 
 
+def changed_beside(case: Case, texts: Sequence[str]) -> Case:
+    """Return the case of a second run of a mesh, which stands beside that of a case.
+
+    Errors as `changed`, or if it is of another mesh.
+    """
+    other = changed(case, texts, "--beside")
+    if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
+        raise CaseError("--beside: two runs side by side must deform the same mesh")
+    return other
+
+
 def with_lines(messages: Iterable[Message], arguments: Namespace) -> tuple[Message, ...]:
     """Return the messages about keys with the case file of the arguments, and the line there."""
     path = getattr(arguments, "case", None)

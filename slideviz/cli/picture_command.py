@@ -7,7 +7,7 @@ from typing import Literal
 
 from slideviz import deform, picture
 from slideviz.case.model import Case
-from slideviz.cli.mesh_source import changed, read_inputs
+from slideviz.cli.mesh_source import changed_beside, read_inputs
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE
@@ -29,7 +29,7 @@ def main(arguments: Namespace) -> int:
     if arguments.beside == ["undeformed"]:
         beside = "undeformed"
     elif arguments.beside:
-        other = changed(case, arguments.beside, "--beside")
+        other = changed_beside(case, arguments.beside)
     number = arguments.step
     step = None
     if number != 0:
