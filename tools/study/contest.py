@@ -495,7 +495,7 @@ def standing(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Yield the lines of a table: how ``auto`` stands beside each of `RIVALS`."""
     yield (
         "| beside | runs | mean as good | lowest as good | worst difference of the lowest "
-        "| inverted cells: theirs, ours | goes as far |"
+        "| runs with inverted cells: theirs, ours | goes as far |"
     )
     yield "| --- " * 7 + "|"
     for rival, title in RIVALS.items():
