@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
-from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate, rotated
+from slideviz.case.motions.rigid import ByFormula, Radial, Rotate, Scale, Translate, rotated
 from slideviz.ffd.box import CoordinateSystem, points_at
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import padded
@@ -215,11 +215,11 @@ class PlacedBoundary(Placed):
         changed = changes.replace_motion(self.session, place, motion)
         return changes.choose_motion(changed, place)
 
-    def _later(self, place: int) -> Iterator[Any]:
+    def _later(self, place: int) -> Iterator[ByFormula]:
         """Yield the motions after one, if they move the boundary by a formula."""
         names = named(self.marker) or self.session.case.markers_with("moving")
         for motion in self.motions[place + 1 :]:
-            if hasattr(motion, "shift") and any(applies_to(motion, name) for name in names):
+            if isinstance(motion, ByFormula) and any(applies_to(motion, name) for name in names):
                 yield motion
 
     def _slopes(self, place: int, *, with_turns: bool) -> FloatArray:
@@ -498,7 +498,7 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
     motion = None if index is None else session.case.motions[index]
     if isinstance(motion, Ffd) and index is not None:
         return _control(session, index, motion)
-    if by_motion and not isinstance(motion, Translate | Rotate | Scale | Radial):
+    if by_motion and not isinstance(motion, ByFormula):
         return None
     marker = new_target(session) if motion is None else motion.marker
     names = named(marker) or session.case.markers_with("moving")

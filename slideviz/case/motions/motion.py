@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -221,7 +221,7 @@ class Motion(CheckedFields):
         """
         return np.zeros_like(points) if placed is None else placed.at(nodes)
 
-    def as_one(self, points: FloatArray) -> Motion:
+    def as_one(self, points: FloatArray) -> Self:
         """Return the motion of several markers as one body, with all its nodes at ``points``."""
         return self
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _Z = (0.0, 0.0, 1.0)
 
 
-class _ByFormula(Motion):
+class ByFormula(Motion):
     """A motion by a formula of the place, after the motions before it."""
 
     def shift(self, points: FloatArray) -> FloatArray:
@@ -55,7 +55,7 @@ class _ByFormula(Motion):
 
 
 @dataclass(frozen=True)
-class Translate(_ByFormula):
+class Translate(ByFormula):
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
     marker: Target
@@ -96,7 +96,7 @@ class Translate(_ByFormula):
         return np.broadcast_to(np.array(self.vector, np.float64), points.shape)
 
 
-class _AboutPoint(_ByFormula):
+class _AboutPoint(ByFormula):
     """A motion about a point; where that is the centroid, several markers have one in common."""
 
     point: Point
@@ -109,7 +109,7 @@ class _AboutPoint(_ByFormula):
             said = f"the point has {len(self.point)} coordinates"
             yield from require_dimension(len(self.point), mesh.dim, said)
 
-    def as_one(self, points: FloatArray) -> Motion:
+    def as_one(self, points: FloatArray) -> Self:
         if self.point != "centroid":
             return self
         return replace(self, point=tuple(points.mean(axis=0).tolist()))
