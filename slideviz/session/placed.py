@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
@@ -65,6 +66,11 @@ class Number(NamedTuple):
 def _turned(points: FloatArray, about: tuple[FloatArray, FloatArray], degrees: float) -> FloatArray:
     """Return points (k, 3) after a rotation about an axis: a point on it, and its direction."""
     return points + rotated(points - about[0], degrees, triple(about[1]))
+
+
+def _in_space(numbers: ArrayLike) -> FloatArray:
+    """Return two or three numbers as three (3,), of two with 0."""
+    return padded(np.array([numbers]))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +251,7 @@ class PlacedBoundary(Placed):
 
     @property
     def numbers(self) -> FloatArray:
-        return padded(np.array([self._shift[1].vector]))[0]
+        return _in_space(self._shift[1].vector)
 
     def put(self, numbers: FloatArray) -> Session:
         place, motion, _ = self._shift
@@ -276,7 +282,7 @@ class PlacedBoundary(Placed):
     def _turn_by(self, place: int, motion: Rotate) -> Number:
         centre = self.origin
         if motion.point != "centroid":
-            centre = padded(np.array([motion.point]))[0]
+            centre = _in_space(motion.point)
             for later in self._later(place):
                 here = centre[None, : self.dim]
                 centre = centre + padded(later.as_one(self.origin[None, : self.dim]).shift(here))[0]
@@ -302,10 +308,10 @@ class PlacedBoundary(Placed):
             changed = tuple(np.where(mine, factors * ratio, factors).tolist())
             return self._with(place, replace(motion, factors=changed))
 
-        centre = self.origin if motion.point == "centroid" else padded(np.array([motion.point]))[0]
+        centre = self.origin if motion.point == "centroid" else _in_space(motion.point)
 
         def path(factor: float, point: FloatArray) -> FloatArray:
-            ratio = padded(np.where(mine, factor / value, 1.0)[None])[0]
+            ratio = _in_space(np.where(mine, factor / value, 1.0))
             return np.asarray(centre + (point - centre) * ratio)
 
         return Number(value, put, path)
@@ -327,7 +333,7 @@ class PlacedRadius(PlacedBoundary):
         along = np.array(motion.axis) / np.linalg.norm(motion.axis)
 
         def path(distance: float, point: FloatArray) -> FloatArray:
-            arm = point - padded(np.array([motion.point]))[0]
+            arm = point - _in_space(motion.point)
             arm = arm - (arm @ along) * along
             return np.asarray(point + (distance - value) * arm / max(np.linalg.norm(arm), 1e-300))
 
@@ -478,7 +484,7 @@ def _section(session: Session, section: Section, cuts: Cuts) -> PlacedSection | 
     if isinstance(section, AboutAxis) and mesh.dim == 3:
         (origin,) = section.surface(np.array([section.patch(points).middle]), section.size)
     elif mesh.dim == 2:
-        origin = padded(section.in_plane.middle[None])[0]
+        origin = _in_space(section.in_plane.middle)
     across = section.basis[[2, 0, 1]]
     axes = np.concatenate([np.eye(3), across])
     return PlacedSection(session, origin, axes, "xyznuv", section, points)
@@ -507,7 +513,7 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
         return None
     once = np.unique(np.concatenate([*nodes.values()]), return_index=True)[1]
     moved = [ghosts.get(name, mesh.points[mine]) for name, mine in nodes.items()]
-    origin = padded(np.concatenate(moved)[once].mean(axis=0)[None])[0]
+    origin = _in_space(np.concatenate(moved)[once].mean(axis=0))
     kind = PlacedRadius if isinstance(motion, Radial) else PlacedBoundary
     return kind(session, origin, *_axes(session, origin), index, marker)
 
