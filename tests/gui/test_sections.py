@@ -169,15 +169,20 @@ def test_in_2d_the_menu_offers_a_line_and_a_circle_whose_curve_is_saved(
     assert b"<svg" in (tmp_path / "along.svg").read_bytes()
 
 
-def test_a_hidden_section_has_no_flat_view_and_its_box_in_a_case(
+@pytest.mark.usefixtures("painted")
+def test_a_hidden_section_has_no_handle_no_flat_view_and_its_box_in_a_case(
     window, driver, panel, passage_file, tmp_path
 ):
     driver.click(panel.add["cylinder"])
     panel.flat.click()
+    panel.handle.click()
+    assert has_handle(window.view)
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
     assert window.section_views.flat is None
     assert not panel.flat.isEnabled()
     assert panel.flat.isChecked()
+    assert not has_handle(window.view)
+    assert not panel.handle.isEnabled()
     panel.list.item(0).setCheckState(Qt.CheckState.Checked)
     assert window.section_views.flat.scene.section.kind == "cylinder"
     assert panel.flat.isEnabled()
