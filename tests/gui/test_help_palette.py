@@ -95,9 +95,9 @@ def test_letters_in_order_are_enough_and_enter_does_it(find, with_runs, monkeypa
 def test_arrows_move_in_the_list_while_typing(find, with_runs):
     driver = with_runs({"steps": 2})
     dialog = find("step ")
-    names = [name for name in rows(dialog) if name in ("Step back", "Step on")]
-    assert names == ["Step back", "Step on"]
-    for _ in range(names.index("Step back") + list(rows(dialog)).index("Step back")):
+    names = list(rows(dialog))
+    assert [name for name in names if name in ("Step back", "Step on")] == ["Step back", "Step on"]
+    for _ in range(names.index("Step back")):
         QTest.keyClick(dialog.search, Qt.Key.Key_Down)
     enter(dialog)
     assert driver.session.view.frame == 1
