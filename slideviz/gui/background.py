@@ -204,7 +204,9 @@ class LivePreview(BackgroundJob):
 
     def _finished(self, found: LiveFields | tuple[LiveFields, Preview | None] | None) -> None:
         if not isinstance(found, tuple):
-            self.fields = found
+            # It may have been switched off, or another mesh opened, meanwhile.
+            stale = found is not None and found.mesh is not self.store.session.mesh
+            self.fields = found if self.is_on and not stale else None
             if self._pulled is self.store.session.case:
                 self._hand.start()
                 self._begin()

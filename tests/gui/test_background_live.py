@@ -174,6 +174,20 @@ def test_switched_off_nothing_follows(live):
     assert window.live.fields is None
 
 
+@pytest.mark.parametrize("off", [True, False])
+def test_fields_that_come_too_late_are_dropped(live, off):
+    window = live.window
+    window.live.switch(True)
+    window.live._make_fields()
+    assert window.live.busy
+    if off:
+        window.live.switch(False)
+    else:
+        window.store.change(lambda session: replace(session, mesh=replace(session.mesh)))
+    live.qtbot.waitUntil(lambda: not window.live._runner.busy)
+    assert window.live.fields is None
+
+
 def test_another_mesh_drops_the_fields(live, sample_folder, answers):
     answers("ask_unsaved", "discard")
     live.open(sample_folder / "hexahedron" / "hexahedron.cfg")
