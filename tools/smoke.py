@@ -70,9 +70,10 @@ MODULES = """
 import importlib, pkgutil, slideviz
 
 DRAWING = ("gui", "scene", "export", "plots", "study")
+DRAWN_BY = ("film", "picture", "report", "section")
 
 def needs_more(name):
-    if name.endswith(("openmdao", "film_command", "section_command")):
+    if name.endswith(("openmdao", *(f"{one}_command" for one in DRAWN_BY))):
         return True
     return name.split(".")[1] in DRAWING
 
@@ -108,6 +109,8 @@ PLOTTED = (
 DRAWN = (
     "run square.cfg --steps 1 -q -o drawn.su2 --picture drawn.png",
     "film square.cfg --steps 1 -q -o film.gif",
+    "picture square.cfg -q -o picture.png",
+    "report square.cfg -q -o report.html",
     "compare square.cfg --methods ps --steps 1 -q -o pictures",
 )
 

@@ -22,7 +22,6 @@ from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from slideviz.argument_types import annotations_of
 from slideviz.case.cfg import case_of_text, case_text
@@ -208,6 +207,9 @@ def read_picture(path: Path, mesh: Path | None = None) -> Case:
 
     ``mesh``: as of `placed`. Raises CaseError if it has none.
     """
+    # Late: Pillow comes with what draws; computing does without it.
+    from PIL import Image
+
     try:
         with Image.open(path, formats=["PNG"]) as image:
             text = str(image.info[PICTURE_KEY])
