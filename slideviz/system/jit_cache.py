@@ -1,4 +1,4 @@
-"""``njit`` with a checked cache on disk: damaged entries are compiled again.
+"""``njit`` with a checked cache on disk, and the same machine code from it as from compiling.
 
 Numba trusts its cache: an index that was cut off (by a full disk, a killed process) ends the
 program, and so does damaged machine code. Here both begin with a checksum (SHA-256), which is
@@ -21,6 +21,7 @@ from typing import Any
 import numba
 from numba.core import environment, event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.environment import Environment
 from numba.core.runtime import rtsys
 
@@ -108,6 +109,26 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         """Save machine code for argument types ``sig``; nothing if it cannot be written."""
         with suppress(OSError):
             super().save_overload(sig, data)
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of one function, the same when it was just compiled as from the cache.
+
+    Numba links copies of the loops that a function calls into it, and optimises them once more.
+    A process that has just compiled would run the loops' first machine code, and one that loads
+    the cache these copies, whose sums may differ in the last digits. As internal functions the
+    copies are what runs in both.
+    """
+
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled:
+            for function in self._final_module.functions:
+                if function.linkage.name in ("linkonce_odr", "weak_odr"):
+                    function.linkage = "internal"
+        super()._finalize_final_module()
+
+
+JITCPUCodegen._library_class = _Library
 
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numba.core import environment, event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 
 from slideviz.system.jit_cache import njit
 
@@ -64,6 +65,7 @@ PRIVATE = {
         "_load_overload": "self sig target_context",
         "_guard_against_spurious_io_errors": "self",
     },
+    JITCodeLibrary: {"_finalize_final_module": "self"},
     environment: {
         "_rebuild_env": "modname consts env_name",
         "lookup_environment": "env_name",
@@ -87,6 +89,7 @@ def test_numba_has_the_private_parts_that_the_cache_replaces():
     assert hasattr(made, "_cache_file"), remedy
     assert hasattr(numba.njit(half), "_cache"), remedy
     assert isinstance(environment.Environment._memo, Mapping), remedy
+    assert issubclass(JITCPUCodegen._library_class, JITCodeLibrary), remedy
 
 
 @pytest.fixture
@@ -148,6 +151,27 @@ def test_all_loops_have_this_cache():
         if re.search(r"system.jit_cache import (OPTIONS, )?njit", path.read_text())
     ]
     assert sorted(users) == sorted([*own, "jit_cache.py"])
+
+
+SUM_OF_THREE_FEATURES = """
+import numpy as np
+from slideviz.rbf.compiled import sum_plain
+
+random = np.random.default_rng(0)
+out = np.empty((3, 2000))
+sum_plain(random.random((3, 2000)), random.random((3, 333)), random.random((3, 333)), 0.0, 0.8, out)
+print(out.tobytes().hex())
+"""
+
+
+def test_the_cache_gives_the_bits_of_a_loop_just_compiled(tmp_path):
+    """Of a parallel sum, whose order the compiler may choose."""
+    places = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    call = [sys.executable, "-c", SUM_OF_THREE_FEATURES]
+    compiled, loaded = (
+        subprocess.run(call, env=places, check=True, capture_output=True).stdout for _ in range(2)
+    )
+    assert loaded == compiled
 
 
 @pytest.mark.slow
