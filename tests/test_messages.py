@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,13 +51,24 @@ def _faults(tree: ast.AST) -> Iterator[tuple[int, str]]:
             )
 
 
+def _tree(path: Path) -> ast.AST:
+    """Return the tree of a module, or that of the values in a table of words."""
+    text = path.read_text("utf-8")
+    return ast.parse(text if path.suffix == ".py" else repr(tomllib.loads(text)))
+
+
 def test_messages_need_no_second_reading():
+    paths = sorted([*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.toml")])
     wrong = [
         f"{path.relative_to(PACKAGE)}:{line}: {remedy}"
-        for path in sorted(PACKAGE.rglob("*.py"))
-        for line, remedy in _faults(ast.parse(path.read_text("utf-8")))
+        for path in paths
+        for line, remedy in _faults(_tree(path))
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_tables_of_words_are_read_too():
+    assert len(list(_texts(_tree(PACKAGE / "terms.toml")))) > 200
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def _is_stored(part: ast.AST) -> bool:
 
 
 CITED = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-IN_FILE = re.compile(r"((?:`\w+`(?:, | and |, and )?)+) in `([\w/.]+\.py)`")
+IN_FILE = re.compile(r"((?:`\w+`(?:, | and |, and )?)+) in `([\w/.]+\.(?:py|toml))`")
 
 
 def test_contributing_cites_files_that_exist():

@@ -8,29 +8,41 @@ import pytest
 
 from slideviz import terms
 
-TABLES = {
-    terms.Role: terms.ROLES,
-    terms.NodeType: terms.NODE_TYPES,
-    terms.Sliding: terms.SLIDING,
-    terms.Method: terms.METHODS,
-    terms.Selection: terms.SELECTIONS,
-    terms.LevelCriterion: terms.LEVEL_CRITERIA,
-    terms.PeriodicMode: terms.PERIODIC_MODES,
-    terms.PeriodicType: terms.PERIODIC_TYPES,
-    terms.Metric: terms.METRICS,
-    terms.SkewMetric: terms.SKEW_METRICS,
-    terms.CellState: dict.fromkeys(terms.CELL_STATES, terms.Term("state")),
-    terms.Quantity: terms.QUANTITIES,
-    terms.ColorBy: terms.COLOR_BY,
-    terms.ColorMap: terms.COLOR_MAPS,
-    terms.PointsShown: terms.POINTS_SHOWN,
-    terms.Shown: terms.SHOWN,
-}
+TABLES = [
+    (terms.Role, terms.ROLES),
+    (terms.NodeType, terms.NODE_TYPES),
+    (terms.SpanKind, terms.SPAN_KINDS),
+    (terms.Side, terms.SIDES),
+    (terms.FfdBlending, terms.FFD_BLENDINGS),
+    (terms.FfdSystem, terms.FFD_SYSTEMS),
+    (terms.Sliding, terms.SLIDING),
+    (terms.Method, terms.METHODS),
+    (terms.StiffnessType, terms.STIFFNESS_TYPES),
+    (terms.Polynomial, terms.POLYNOMIALS),
+    (terms.Selection, terms.SELECTIONS),
+    (terms.DataReduction, terms.DATA_REDUCTIONS),
+    (terms.Relax, terms.RELAXES),
+    (terms.Rims, terms.RIMS),
+    (terms.Repair, terms.REPAIRS),
+    (terms.RepairTarget, terms.REPAIR_TARGETS),
+    (terms.Layers, terms.LAYERS),
+    (terms.LevelCriterion, terms.LEVEL_CRITERIA),
+    (terms.PeriodicMode, terms.PERIODIC_MODES),
+    (terms.PeriodicType, terms.PERIODIC_TYPES),
+    (terms.Metric, terms.METRICS),
+    (terms.WallValue, terms.WALL_VALUES),
+    (terms.SkewMetric, terms.SKEW_METRICS),
+    (terms.CellState, dict.fromkeys(terms.CELL_STATES, terms.Term("state"))),
+    (terms.Quantity, terms.QUANTITIES),
+    (terms.ColorBy, terms.COLOR_BY),
+    (terms.ColorMap, terms.COLOR_MAPS),
+    (terms.PointsShown, terms.POINTS_SHOWN),
+    (terms.Shown, terms.SHOWN),
+]
 
 
-@pytest.mark.parametrize("kind", TABLES, ids=str)
-def test_the_type_has_the_values_of_the_table_in_its_order(kind):
-    table = TABLES[kind]
+@pytest.mark.parametrize(("kind", "table"), TABLES, ids=str)
+def test_the_type_has_the_values_of_the_table_in_its_order(kind, table):
     assert get_args(kind) == tuple(table)
     assert all(term.label and term.name for term in table.values())
 
@@ -43,8 +55,8 @@ def test_what_is_drawn_in_colors_has_one_of_its_own_for_each_value():
 
 
 def test_each_list_in_which_one_chooses_has_words_that_differ():
-    for table in TABLES.values():
-        if table is not TABLES[terms.CellState]:
+    for kind, table in TABLES:
+        if kind is not terms.CellState:
             assert len(set(terms.labels(table).values())) == len(table)
             assert len(set(terms.names(table).values())) == len(table)
 
