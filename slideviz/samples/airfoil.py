@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.case.model import Case
-from slideviz.case.motions.rigid import Rotate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
@@ -55,14 +53,6 @@ def airfoil_mesh(size: int, variant: str) -> Mesh:
     cells = Cells.from_blocks([(9, quads.reshape(-1, 4))])
     points = np.stack([z.real.ravel(), z.imag.ravel()], axis=1)
     return Mesh(points, cells, tuple(markers), name="airfoil")
-
-
-def airfoil_case() -> Case:
-    """Return the case that turns the airfoil about its quarter chord."""
-    return Case(
-        roles={"airfoil": "moving", "farfield": "fixed"},
-        motions=(Rotate("airfoil", -15.0, (0.25, 0.0)),),
-    )
 
 
 def _rings(size: int, last: float, layered: bool) -> FloatArray:

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.case.model import Case
-from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.samples.passage import (
@@ -90,29 +88,3 @@ def impeller_mesh(size: int) -> Mesh:
     at = np.interp(first + chord * points[:, 0], m_prime, place)
     plane = np.column_stack([at, chord * points[:, 1]])
     return mesh_of(Impeller(grid, plane[None], max(round(size / len(grid.quads)), 1)), "impeller")
-
-
-def impeller_case() -> Case:
-    """Return the case that twists the blade by 5 degrees at the shroud, and leans it there."""
-    return Case(
-        roles={
-            "BLADE": "moving",
-            "HUB": "sliding",
-            "SHROUD": "sliding",
-            "INFLOW": "sliding",
-            "OUTFLOW": "sliding",
-            "PER1": "periodic",
-            "PER2": "periodic",
-        },
-        motions=(
-            SpanMotion("BLADE", "twist", (0.0, 0.5, 1.0), (0.0, 2.0, 5.0)),
-            SpanMotion("BLADE", "lean", (0.0, 1.0), (0.0, 0.01)),
-        ),
-        sliding="ps",
-        periodic="moving",
-        periodic_type="rotational",
-        kernel="wendland-c0",  # smoother ones overshoot between the thin cells at the blade
-        relax="auto",
-        layers="auto",
-        repair="auto",
-    )

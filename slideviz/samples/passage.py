@@ -21,8 +21,6 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from slideviz.case.model import Case
-from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, row_dots
 
@@ -224,24 +222,6 @@ def passage_mesh(size: int) -> Mesh:
     markers = [Marker(name, Cells.from_blocks([(LINE, side)])) for name, side in sides.items()]
     cells = Cells.from_blocks([(QUADRILATERAL, grid.quads)])
     return Mesh(points, cells, tuple(markers), name="passage")
-
-
-def passage_case() -> Case:
-    """Return the case that turns and lifts the blade, the periodic sides following."""
-    return Case(
-        roles={
-            "airfoil": "moving",
-            "inflow": "sliding",
-            "outflow": "sliding",
-            "periodic_1": "periodic",
-            "periodic_2": "periodic",
-        },
-        motions=(Rotate("airfoil", -8.0), Translate("airfoil", (0.0, 0.12))),
-        sliding="ps",
-        periodic="moving",
-        periodic_type="translational",
-        steps=5,
-    )
 
 
 def make_grid(n: GridCounts) -> Grid:

@@ -20,12 +20,8 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case
-from slideviz.case.motions.file import FromFile
 from slideviz.errors import CaseError
-from slideviz.formats.table import ZoneContent
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.rbf.reduction import Reduction
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
 from slideviz.samples.passage import (
     BladeSection,
     Grid,
@@ -38,7 +34,7 @@ from slideviz.samples.passage import (
     smoothed,
     straight_points,
 )
-from slideviz.samples.thesis import FILE, LARGEST, QUADRILATERAL, mesh_of, zone_of
+from slideviz.samples.thesis import LARGEST, QUADRILATERAL
 
 TWIST_DEG = -8.0  # rotation about the stacking line at the shroud; 0 at the hub
 LEAN_DEG = -3.0
@@ -153,27 +149,21 @@ RADIAL = 0.62  # number of cells in r, divided by that along the inflow
 ROUGH = 1e-3  # tolerance of `smooth` for interpolated grids, in chords
 
 
-def stator_mesh(size: int) -> Mesh:
-    """Return the mesh of ``stator``, about ``size`` hexahedra; CaseError if not in ``SIZES``."""
-    if not SIZES[0] <= size <= SIZES[1]:
-        raise CaseError(
-            f"size {size} is out of range; a stator has {SIZES[0]} to {SIZES[1]}, or up to "
-            f"{LARGEST} as an SU2 binary mesh (slideviz sample stator --format su2b)"
-        )
-    return mesh_of(stator_stack(size), "stator")
+def stator(size: int, streams: bool) -> tuple[Stack, Displacements]:
+    """Return a stator of about ``size`` hexahedra, and the displacement of its blade.
 
-
-def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
-    """Return the zone to write to a file block by block, and the displacement of the blade.
-
-    Raises CaseError if ``size`` is below ``SIZES`` or above ``LARGEST``.
+    Raises CaseError if ``size`` is out of range; a mesh that ``streams`` to its file may be larger.
     """
-    if not SIZES[0] <= size <= LARGEST:
-        raise CaseError(f"size {size} is out of range; a stator has {SIZES[0]} to {LARGEST}")
+    most = LARGEST if streams else SIZES[1]
+    if not SIZES[0] <= size <= most:
+        rule = f"size {size} is out of range; a stator has {SIZES[0]} to {most}"
+        if not streams:
+            rule += f", or up to {LARGEST} as an SU2 binary mesh"
+            rule += " (slideviz sample stator --format su2b)"
+        raise CaseError(rule)
     stack = stator_stack(size)
-    zone = zone_of(stack)
-    nodes = zone.markers[0].nodes
-    return zone, stator_displacement(nodes, stack.points(nodes))
+    nodes = stack.markers()[0].nodes
+    return stack, stator_displacement(nodes, stack.points(nodes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,26 +228,6 @@ def stator_stack(size: int) -> Stack:
     sections = zip(RADII, ANGLES_DEG, strict=True)
     return Stack(
         grid, np.stack([_plane(grid, radius, angles) for radius, angles in sections]), layers
-    )
-
-
-def stator_case() -> Case:
-    """Return the case of thesis section 4.2.3; nodes of hub and shroud move as those inside."""
-    return Case(
-        roles={
-            "BLADE": "moving",
-            "HUB": "internal",
-            "SHROUD": "internal",
-            "INFLOW": "sliding",
-            "OUTFLOW": "sliding",
-            "PER1": "periodic",
-            "PER2": "periodic",
-        },
-        motions=(FromFile(FILE),),
-        sliding="ps",
-        periodic="moving",
-        periodic_type="rotational",
-        reduction=Reduction(tolerance=1e-5),
     )
 
 

@@ -6,19 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from slideviz.case.cfg import write_case
+from slideviz.case.cfg import case_of_text, write_case
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.files import write
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
-from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
-from slideviz.samples.impeller import impeller_case, impeller_mesh
-from slideviz.samples.passage import passage_case, passage_mesh
-from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
-from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
-from slideviz.samples.turbine_row import extruded_case, extruded_row, row_case, row_mesh
+from slideviz.samples.airfoil import airfoil_mesh
+from slideviz.samples.impeller import impeller_mesh
+from slideviz.samples.passage import passage_mesh
+from slideviz.samples.stator import stator
+from slideviz.samples.thesis import FILE, Structured, mesh_of, thesis_case, zone_of
+from slideviz.samples.turbine_row import extruded_row, row_mesh
 from slideviz.system.atomic import atomic_write, make_folder
 from slideviz.terms import FileFormat
 
@@ -34,13 +34,7 @@ class Sample:
     """The content of the case's displacement file; None if it has none."""
 
 
-@dataclass(frozen=True, eq=False)
-class StreamedSample:
-    """A `Sample` whose mesh, of any size, is made while it is written, by its ``zone``."""
-
-    zone: ZoneContent
-    case: Case
-    displacement: Displacements | None = None
+Made = tuple[Mesh | Structured, Case, Displacements | None]
 
 
 @dataclass(frozen=True)
@@ -50,14 +44,14 @@ class SampleKind:
     about: str  # what it is, in words for users
     counts: str  # what its size counts
     size: int  # the default size
-    make: Callable[[str, int, str], Sample]  # returns the sample of a name, a size and a variant
+    make: Callable[[str, int, str, bool], Made]
+    """Returns mesh or grid, case and displacement, by name, size and variant, and whether a grid
+    is written to its file block by block: it may be larger then."""
     variants: tuple[str, ...] = ("motion",)
     """Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
     same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close to
     two sides; ``flat``: that of Figure 4.14, without a component in z; ``layers``: thin cells at
     the wall."""
-    stream: Callable[[str, int, str], StreamedSample] | None = None
-    """Returns the same as a `StreamedSample`; None if that is not possible."""
 
     def words(self, size: int | None = None) -> str:
         """Return what it is, and a size of it; None: the default size."""
@@ -70,23 +64,20 @@ def _thesis(about: str, variants: tuple[str, ...]) -> SampleKind:
         about,
         "cells along a side",
         25,
-        lambda name, size, variant: Sample(name, *thesis_case(name, size, variant)),
+        lambda name, size, variant, _: thesis_case(name, size, variant),
         variants,
-        lambda name, size, variant: StreamedSample(*thesis_zone(name, size, variant)),
     )
 
 
-def _stator(name: str, size: int, _variant: str) -> Sample:
-    mesh = stator_mesh(size)
-    nodes = mesh.marker("BLADE").nodes
-    moved = stator_displacement(nodes, mesh.points[nodes])
-    return Sample(name, mesh, stator_case(), moved)
+def sample_case(name: str) -> Case:
+    """Return the case of a sample whose case is a file beside this module."""
+    text = Path(__file__).with_name(f"{name}.cfg").read_text(encoding="utf-8")
+    return case_of_text(Path(f"{name}.cfg"), text, Case()).change(source=None)
 
 
-def _streamed_stator(_name: str, size: int, _variant: str) -> StreamedSample:
-    """Return the same as `_stator` with a mesh made while it is written."""
-    zone, displacement = stator_zone(size)
-    return StreamedSample(zone, stator_case(), displacement)
+def _stator(name: str, size: int, _variant: str, streams: bool) -> Made:
+    stack, moved = stator(size, streams)
+    return stack, sample_case(name), moved
 
 
 SAMPLES: Mapping[str, SampleKind] = {
@@ -107,26 +98,26 @@ SAMPLES: Mapping[str, SampleKind] = {
         "2D: turbine blade in a periodic passage",
         "cells along the inflow",
         36,
-        lambda name, size, _: Sample(name, passage_mesh(size), passage_case()),
+        lambda name, size, *_: (passage_mesh(size), sample_case(name), None),
     ),
     "airfoil": SampleKind(
         "2D: airfoil turned in a far field of 50 chords",
         "cells around it",
         96,
-        lambda name, size, variant: Sample(name, airfoil_mesh(size, variant), airfoil_case()),
+        lambda name, size, variant, _: (airfoil_mesh(size, variant), sample_case(name), None),
         ("motion", "layers"),
     ),
     "turbine-row": SampleKind(
         "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3)",
         "cells, 5000 or 20000",
         20_000,
-        lambda name, size, _: Sample(name, row_mesh(size), row_case()),
+        lambda name, size, *_: (row_mesh(size), sample_case(name), None),
     ),
     "turbine-row-3d": SampleKind(
         "3D: the vane from hub to shroud, twisted; hexahedra and prisms",
         "cells, about",
         25_000,
-        lambda name, size, _: Sample(name, extruded_row(size), extruded_case()),
+        lambda name, size, *_: (extruded_row(size), sample_case(name), None),
     ),
     "stator": SampleKind(
         "3D: stator passage, 41 around, hexahedra (thesis 4.2.3)",
@@ -134,13 +125,12 @@ SAMPLES: Mapping[str, SampleKind] = {
         240_000,
         _stator,
         ("file",),
-        _streamed_stator,
     ),
     "impeller": SampleKind(
         "3D: centrifugal compressor passage, 13 around, twisted over its span",
         "cells, about",
         12_000,
-        lambda name, size, _: Sample(name, impeller_mesh(size), impeller_case()),
+        lambda name, size, *_: (impeller_mesh(size), sample_case(name), None),
     ),
 }
 """Every kind of sample, by name."""
@@ -155,18 +145,15 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     around it; of turbine rows and stator: all cells. The usual size when left out.
     ``variant``: one of ``SAMPLES[name].variants``; the first when left out.
     """
-    row, kind = _row(name, variant)
-    try:
-        return row.make(name, row.size if size is None else size, kind)
-    except (MemoryError, OverflowError, ValueError) as problem:
-        raise CaseError(
-            f"{name}: size {size:,} needs more memory than there is; choose a smaller one (usual: "
-            f"{row.size:,})"
-        ) from problem
+    mesh, case, moved = _made(name, size, variant, streams=False)
+    assert isinstance(mesh, Mesh)
+    return Sample(name, mesh, case, moved)
 
 
-def _row(name: str, variant: str | None) -> tuple[SampleKind, str]:
-    """Return the row of a sample, and the variant, by default its first; raise CaseError."""
+def _made(
+    name: str, size: int | None, variant: str | None, *, streams: bool
+) -> tuple[Mesh | ZoneContent, Case, Displacements | None]:
+    """Return mesh, case and displacement as `sample`; a grid that ``streams`` as its zone."""
     if name not in SAMPLES:
         hint = nearest(name, SAMPLES)
         raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
@@ -174,7 +161,17 @@ def _row(name: str, variant: str | None) -> tuple[SampleKind, str]:
     kind = variant or row.variants[0]
     if kind not in row.variants:
         raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(row.variants)}")
-    return row, kind
+    size = row.size if size is None else size
+    try:
+        grid, case, moved = row.make(name, size, kind, streams)
+        if isinstance(grid, Mesh):
+            return grid, case, moved
+        return zone_of(grid) if streams else mesh_of(grid, name), case, moved
+    except (MemoryError, OverflowError, ValueError) as problem:
+        raise CaseError(
+            f"{name}: size {size:,} needs more memory than there is; choose a smaller one (usual: "
+            f"{row.size:,})"
+        ) from problem
 
 
 def write_sample(
@@ -197,40 +194,32 @@ def write_sample(
     ``overwrite``: whether to replace files that exist.
     ``file_format``: the format of the mesh.
     """
-    row, kind = _row(name, variant)
-    made: Sample | StreamedSample
-    if file_format == "su2b" and row.stream is not None:
-        made = row.stream(name, row.size if size is None else size, kind)
-    else:
-        made = sample(name, size, variant)
+    content, case, moved = _made(name, size, variant, streams=file_format == "su2b")
     folder = Path(folder)
     mesh = folder / f"mesh.{file_format}"
     table = folder / FILE
-    case = folder / f"{name}.cfg"
-    paths = [mesh, *([table] if made.displacement else []), case]
+    file = folder / f"{name}.cfg"
+    paths = [mesh, *([table] if moved else []), file]
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
         raise CaseError(
             f"{there[0]}: exists already; choose another folder, or replace it with --force"
         )
     make_folder(folder)
-    if isinstance(made, StreamedSample):
-        write_content(mesh, [made.zone], mesh if overwrite else None)
+    if isinstance(content, Mesh):
+        write(mesh, content, overwrite)
     else:
-        write(mesh, made.mesh, overwrite)
-    if made.displacement is not None:
-        nodes = made.displacement.nodes.tolist()
-        vectors = made.displacement.vectors.tolist()
-        with atomic_write(table, CaseError, table if overwrite else None) as file:
+        write_content(mesh, [content], mesh if overwrite else None)
+    if moved is not None:
+        nodes = moved.nodes.tolist()
+        vectors = moved.vectors.tolist()
+        with atomic_write(table, CaseError, table if overwrite else None) as out:
             for node, vector in zip(nodes, vectors, strict=True):
-                file.write(("\t".join([str(node), *map(repr, vector)]) + "\n").encode())
-    placed = _in_folder(made.case, folder, name, file_format)
-    write_case(case, placed.change(source=case if overwrite else None))
+                out.write(("\t".join([str(node), *map(repr, vector)]) + "\n").encode())
+    placed = case.with_paths(folder.joinpath).change(
+        mesh_file=mesh,
+        mesh_out=folder / f"{name}_deformed.{file_format}",
+        source=file if overwrite else None,
+    )
+    write_case(file, placed)
     return paths
-
-
-def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
-    """Return the case of the sample ``name``, with files in a folder, meshes of ``ending``."""
-    mesh = folder / f"mesh.{ending}"
-    out = folder / f"{name}_deformed.{ending}"
-    return case.with_paths(folder.joinpath).change(mesh_file=mesh, mesh_out=out)

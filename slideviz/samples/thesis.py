@@ -110,28 +110,12 @@ _CORNERS = {1: ((0,), (1,)), 2: _RING, 3: tuple((*corner, up) for up in (0, 1) f
 """Corners of a cell as steps along each axis, in SU2's order, by dimension."""
 
 
-def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displacements | None]:
-    """Return mesh, case and the displacement file's content, None if ``variant`` is ``motion``.
+def thesis_case(name: str, size: int, variant: str) -> tuple[Layout, Case, Displacements | None]:
+    """Return grid, case and the displacement file's content, None if ``variant`` is ``motion``.
 
     ``variant`` is one of ``SAMPLES[name].variants``. Raises CaseError if the size is below 3.
     """
     grid = layout(name, size)
-    return mesh_of(grid, name), *_case(grid, variant)
-
-
-def thesis_zone(
-    name: str, size: int, variant: str
-) -> tuple[ZoneContent, Case, Displacements | None]:
-    """Return the same as `thesis_case`, with a zone to write block by block in place of the mesh.
-
-    Raises CaseError if the size is below 3, or has too many cells.
-    """
-    grid = layout(name, size)
-    return zone_of(grid), *_case(grid, variant)
-
-
-def _case(grid: Layout, variant: str) -> tuple[Case, Displacements | None]:
-    """Return the case of a grid, and the content of its displacement file or None."""
     motions = _motions(grid.dim, variant)
     case = Case(
         roles=_roles(grid.markers()),
@@ -142,11 +126,11 @@ def _case(grid: Layout, variant: str) -> tuple[Case, Displacements | None]:
         steps=5 if variant == "translate" else 20,
     )
     if variant == "motion":
-        return case, None
+        return grid, case, None
     nodes = grid.block_nodes()
     block = grid.points(nodes)
     vectors = _polar_shift(block) if grid.polar else displacement_of(motions, block)
-    return case, Displacements(nodes, vectors)
+    return grid, case, Displacements(nodes, vectors)
 
 
 def _roles(markers: tuple[Marker, ...]) -> dict[str, Role]:

@@ -10,12 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.model import Case
-from slideviz.case.motions.box import FfdTwist
-from slideviz.case.motions.rigid import Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
-from slideviz.rbf.reduction import Reduction
 
 LINE = 3  # VTK identifiers
 TRIANGLE = 5
@@ -23,15 +19,8 @@ QUADRILATERAL = 9
 HEXAHEDRON = 12
 PRISM = 13
 SIZES = (5_000, 20_000)  # the numbers of cells of the files
-SPAN = 0.0465
-TWIST_DEG = 10.0
-"""Length of the vane from hub to shroud in 3D, and by how much its case turns the shroud's end."""
-VANE_BOX = ((-0.002, -0.034), (0.03, 0.006))
-VANE_AXIS = (0.016, -0.012)
-"""Corners of a rectangle around the vane; where the axis of the twist meets it."""
+SPAN = 0.0465  # length of the vane from hub to shroud in 3D
 SIZES_3D = (10_000, 200_000)  # least and largest number of cells in 3D
-TOLERANCE = 1e-6
-"""Tolerance of the data reduction in 3D."""
 
 
 def row_mesh(size: int) -> Mesh:
@@ -46,25 +35,6 @@ def row_mesh(size: int) -> Mesh:
     cells = Cells.from_blocks(blocks)
     markers = [Marker(name, Cells.from_blocks([(LINE, side)])) for name, side in arrays.items()]
     return Mesh(points, cells, tuple(markers), name="turbine-row")
-
-
-def row_case() -> Case:
-    """Return the case of thesis Figure 4.11."""
-    return Case(
-        roles={
-            "BLADE": "moving",
-            "INFLOW": "sliding",
-            "OUTFLOW": "sliding",
-            "PER1": "periodic",
-            "PER2": "periodic",
-        },
-        motions=(Scale("BLADE", (1.07,), (0.0, 0.0)), Translate("BLADE", (0.0, -0.001))),
-        sliding="ps",
-        periodic="moving",
-        periodic_type="translational",
-        steps=2,
-        reduction=None,
-    )
 
 
 def extruded_row(size: int) -> Mesh:
@@ -104,28 +74,3 @@ def extruded(flat: Mesh, levels: int) -> Mesh:
     }
     markers = [Marker(name, Cells.from_blocks(b)) for name, b in (strips | ends).items()]
     return Mesh(points, Cells.from_blocks(blocks), tuple(markers), name="turbine-row-3d")
-
-
-def extruded_case() -> Case:
-    """Return the case that twists the vane by `TWIST_DEG` from hub to shroud, which slide.
-
-    A box for free-form deformation does it, with four planes of control points along the span. The
-    first two stay and the last two turn, so that the vane remains perpendicular to hub and shroud.
-    """
-    flat = row_case()
-    (x0, y0), (x1, y1) = VANE_BOX
-    rectangle = ((x0, y0, 0.0), (x0, y1, 0.0), (x0, y1, SPAN), (x0, y0, SPAN))
-    corners = [*rectangle, *((x1, y, z) for _, y, z in rectangle)]
-    return flat.change(
-        roles={**flat.roles, "HUB": "sliding", "SHROUD": "sliding"},
-        ffd_boxes=(("VANE", tuple(value for corner in corners for value in corner)),),
-        ffd_degrees=((1, 3, 1),),
-        motions=tuple(
-            FfdTwist("BLADE", "VANE", plane, TWIST_DEG, (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0))
-            for plane in (2, 3)
-        ),
-        steps=1,
-        relax="auto",
-        layers="auto",
-        reduction=Reduction(tolerance=TOLERANCE),
-    )

@@ -12,8 +12,7 @@ from slideviz.case.moving_nodes import displacements
 from slideviz.case.spans import span_field
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import pair_up
-from slideviz.samples.stator import stator_case, stator_mesh
-from slideviz.samples.table import sample
+from slideviz.samples.table import sample, sample_case
 from slideviz.session.motions import Ghosts
 from tests.builders import cut_blade, passage, square
 from tests.machine.test_span_field import contoured
@@ -134,10 +133,10 @@ def test_what_cannot_be_is_said_before_the_run(mesh):
 
 @pytest.mark.parametrize("angle", [5.0, pytest.param(12.0, marks=pytest.mark.slow)])
 def test_a_stator_twisted_in_five_steps_folds_no_cell(angle):
-    mesh = stator_mesh(5_000)
-    roles = {**stator_case().roles, "HUB": "sliding", "SHROUD": "sliding"}
+    mesh = sample("stator", 5_000).mesh
+    roles = {**sample_case("stator").roles, "HUB": "sliding", "SHROUD": "sliding"}
     twist = sv.SpanMotion("BLADE", "twist", (0.0, 1.0), (0.0, angle))
-    case = stator_case().change(roles=roles, motions=(twist,), steps=5)
+    case = sample_case("stator").change(roles=roles, motions=(twist,), steps=5)
     *_, last = sv.deform(case, mesh)
     found = sv.quality(last.mesh, mesh)
     assert found.inverted == 0

@@ -5,7 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.moving_nodes import displacements
-from slideviz.samples.stator import stator_mesh
+from slideviz.samples.table import sample
 from tests.builders import airfoil
 from tests.machine.test_onto import blade, reshaped, stator_onto, write_target
 
@@ -61,7 +61,7 @@ def test_a_motion_onto_a_target_counts_as_a_displacement_file(after, tmp_path):
 
 @pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
 def test_variables_over_span_add_to_a_motion_onto_a_target(tmp_path):
-    mesh = stator_mesh(5000)
+    mesh = sample("stator", 5000).mesh
     nodes, quads = blade(mesh)
     write_target(tmp_path / "target.stl", reshaped(mesh.points[nodes]), quads)
     case = stator_onto(tmp_path / "target.stl")

@@ -7,16 +7,17 @@ import pytest
 import slideviz as sv
 from slideviz.case.moving_nodes import displacements
 from slideviz.mesh.topology import facet_vectors
-from slideviz.samples.stator import CHORD, LEADING_EDGE, RADII, STACK, stator_case, stator_mesh
+from slideviz.samples.stator import CHORD, LEADING_EDGE, RADII, STACK
+from slideviz.samples.table import sample, sample_case
 from tests.builders import airfoil, sphere_in_box
 
-SLIDING = stator_case().roles | {"HUB": "sliding", "SHROUD": "sliding"}
+SLIDING = sample_case("stator").roles | {"HUB": "sliding", "SHROUD": "sliding"}
 MIDDLE = 0.5 * (RADII[0] + RADII[-1])
 
 
 def stator_onto(path):
     """The case in which a stator's blade goes to a target, along hub and shroud."""
-    return stator_case().change(roles=SLIDING, motions=(sv.Onto(path, "BLADE"),))
+    return sample_case("stator").change(roles=SLIDING, motions=(sv.Onto(path, "BLADE"),))
 
 
 def reshaped(points):
@@ -54,7 +55,7 @@ def far(points, triangles):
 
 @pytest.fixture(scope="module")
 def stators():
-    return stator_mesh(16_000), stator_mesh(10_000)
+    return sample("stator", 16_000).mesh, sample("stator", 10_000).mesh
 
 
 @pytest.mark.parametrize(("noise", "height"), [(0.0, 1.1), (0.0, 1.0), (0.0, 0.999), (1e-3, 1.0)])

@@ -21,7 +21,7 @@ from slideviz.samples.passage import (
     smoothed,
     straight_points,
 )
-from slideviz.samples.stator import refined, stator_mesh
+from slideviz.samples.stator import refined
 from slideviz.samples.table import SAMPLES, Sample, sample, write_sample
 
 made = cache(sample)
@@ -118,7 +118,7 @@ def test_blade_is_twisted():
 @pytest.mark.parametrize("size", [4_999, 5_000_001, 0, -3])
 def test_size_out_of_range_is_told(size):
     with pytest.raises(CaseError, match=rf"size {size} is out of range; a stator has 5000 to 5000"):
-        stator_mesh(size)
+        sample("stator", size)
 
 
 def test_displacement_moves_the_blade_around_the_axis_only():
@@ -229,7 +229,7 @@ def test_a_grid_finer_than_those_that_are_smoothed_is_as_good(monkeypatch):
     monkeypatch.setattr(module, "FINEST", 20)
     monkeypatch.setattr(module, "SPLINED", 16)
     monkeypatch.setattr(module, "COARSE", 12)
-    mesh = stator_mesh(40_000)
+    mesh = sample("stator", 40_000).mesh
     found = sv.quality(mesh)
     assert (found.inverted, found.unproven) == (0, 0)
     assert found.min > 0.4
@@ -237,11 +237,9 @@ def test_a_grid_finer_than_those_that_are_smoothed_is_as_good(monkeypatch):
 
 
 def test_sizes_that_are_out_of_range_are_told(tmp_path):
-    from slideviz.samples.stator import stator_zone
-
     with pytest.raises(CaseError, match=r"up to 200000000 as an SU2 binary mesh"):
-        stator_mesh(6_000_000)
+        sample("stator", 6_000_000)
     with pytest.raises(CaseError, match="out of range; a stator has 5000 to 200000000"):
-        stator_zone(10**9)
+        write_sample("stator", tmp_path, 10**9, file_format="su2b")
     with pytest.raises(CaseError, match=r"728[0-9]+ cells are too many; a sample has 200000000"):
         write_sample("hexahedron", tmp_path, 900, file_format="su2b")

@@ -29,8 +29,8 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.figure_io import empty_figure
 from slideviz.rbf.reduction import Reduction
-from slideviz.samples.table import sample
-from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS, extruded, extruded_case
+from slideviz.samples.table import sample, sample_case
+from slideviz.samples.turbine_row import extruded
 from slideviz.session.reach import scaled
 from tools.shots import shrink
 from tools.study.flows import (
@@ -242,15 +242,16 @@ def _linear_twist() -> dict[str, Any]:
 
     Its wall then leans at hub and shroud, where nodes slide and first edges cannot follow.
     """
-    axis = (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0)
-    planes = ((1, 0.5 * TWIST_DEG), (2, TWIST_DEG))
-    motions = tuple(sv.FfdTwist("BLADE", "VANE", plane, angle, *axis) for plane, angle in planes)
+    twist = sample_case("turbine-row-3d").motions[-1]
+    assert isinstance(twist, sv.FfdTwist)
+    half = replace(twist, plane=1, angle_deg=0.5 * twist.angle_deg)
+    motions = half, replace(twist, plane=2)
     return {"ffd_degrees": ((1, 2, 1),), "motions": motions}
 
 
 def extruded_vane(**changes: Any) -> tuple[sv.Mesh, sv.Case]:
     """Return a turbine row in 3D of 25,000 cells, four along the span, and its changed case."""
-    return extruded(row_mesh(25_000 // 4), 4), extruded_case().change(**changes)
+    return extruded(row_mesh(25_000 // 4), 4), sample_case("turbine-row-3d").change(**changes)
 
 
 def contests(folder: Path | None) -> Iterator[Contest]:
