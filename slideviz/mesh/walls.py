@@ -63,10 +63,12 @@ EQUAL = 0.01
 """Largest difference of the lengths of edges, as a part of the first one's, that are equal."""
 FLAT = 2 / 3  # largest height of a cell of the stack, as a part of its length
 
-_EDGES = np.full((15, 12, 2), -1)
-"""Local nodes of the edges of each element type, by VTK identifier."""
+_LINKED = np.zeros((15, 8), np.int64)
+"""Bits of the nodes at the edges from each local node of an element type, by VTK identifier."""
 for _row in ELEMENTS.values():
-    _EDGES[_row.vtk, : len(_row.edges)] = np.reshape(_row.edges, (-1, 2))
+    for _one, _other in np.reshape(_row.edges, (-1, 2)):
+        _LINKED[_row.vtk, _one] |= 1 << _other
+        _LINKED[_row.vtk, _other] |= 1 << _one
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,27 +105,9 @@ class Columns:
         the length of a line, else the square root of the area); 0 where there are none.
         ``most``: layers that count at most; all by default.
         """
-        return self._flat_stacks(points, most)[0]
-
-    def through_stacks(self, points: FloatArray) -> Columns:
-        """Return the same with columns that end at the first cell beyond a stack of flat cells.
-
-        But not before `LAYERS` layers. ``points`` (n, d).
-        """
-        depth = self._flat_stacks(points)[1]
-        end = np.full(len(self.nodes) + len(self.bare), LAYERS)
-        np.maximum.at(end, self.corner, depth[:, None] + 1)
-        beyond = np.arange(self.nodes.shape[1]) > end[: len(self.nodes), None]
-        return replace(self, nodes=sealed(np.where(beyond, -1, self.nodes)))
-
-    def _flat_stacks(
-        self, points: FloatArray, most: int | None = None
-    ) -> tuple[FloatArray, IntArray]:
-        """Return the thickness of the stack on each facet, and its number of layers, both (f,)."""
         facets = self.boundary.facets
-        width = self.boundary.facets.shape[1]
+        width = facets.shape[1]
         thickness = np.zeros(len(facets))
-        depth = np.zeros(len(facets), np.int64)
         flat = self.depth > 0
         for layer in range(self.nodes.shape[1] - 1 if most is None else most):
             some = np.flatnonzero(flat & (self.depth > layer))
@@ -136,9 +120,29 @@ class Columns:
             size = row_norms(facet_vectors(points, below))
             good = height < FLAT * (size if width == 2 else np.sqrt(size / 2))
             thickness[some[good]] += height[good]
-            depth[some[good]] += 1
             flat[some[~good]] = False
-        return thickness, depth
+        return thickness
+
+    def through_stacks(self, mesh: Mesh) -> Columns:
+        """Return the same with columns that end at the first cell beyond a stack of flat cells.
+
+        But not before those of the mesh that this was found in, nor beyond `DEEPEST` layers.
+        """
+        nodes = np.full((len(self.nodes), DEEPEST + 1), -1)
+        nodes[:, : self.nodes.shape[1]] = self.nodes
+        cells = mesh.cells
+        _lengthen(
+            self.boundary.facets,
+            self.boundary.owner,
+            (cells.types, cells.offsets, cells.connectivity),
+            _around(mesh),
+            _LINKED,
+            mesh.points,
+            self.corner,
+            np.count_nonzero(self.nodes >= 0, axis=1) - 1,
+            nodes,
+        )
+        return replace(self, nodes=sealed(nodes))
 
 
 @check_types
@@ -155,17 +159,15 @@ def find_columns(
     cells = mesh.cells
     facets = boundary.facets
     owner = boundary.owner
-    use = np.ones(len(cells), bool) if mesh.halo is None else ~mesh.halo.cells
-    near = cells_around(cells, len(mesh.points))
     chain = np.full((*facets.shape, layers + 1), -1)
     off = np.full((len(facets), 2), -1)
     depth = np.zeros(len(facets), np.int64)
     table = (cells.types, cells.offsets, cells.connectivity)
-    around = (near.offsets, near.cells)
+    around = _around(mesh)
 
     def climb(part: slice) -> None:
         written = chain[part], depth[part], off[part]
-        _climb(facets[part], owner[part], table, around, use, _EDGES, *written)
+        _climb(facets[part], owner[part], table, around, _LINKED, *written)
 
     in_parts(climb, len(facets))
     deep = depth > 0
@@ -189,6 +191,13 @@ def find_columns(
     return Columns(boundary, markers or boundary.names, *parts)
 
 
+def _around(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the cells around each node (`cells_around`), and which cells are of no halo (m,)."""
+    near = cells_around(mesh.cells, len(mesh.points))
+    use = np.ones(len(mesh.cells), bool) if mesh.halo is None else ~mesh.halo.cells
+    return near.offsets, near.cells, use
+
+
 @njit
 def _has(nodes, node):  # type: ignore[no-untyped-def]
     """Return 1 if ``node`` is one of ``nodes`` (w,), else 0."""
@@ -199,33 +208,26 @@ def _has(nodes, node):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type: ignore[no-untyped-def]
+def _climb(facets, owner, cells, around, linked, chain, depth, off):  # type: ignore[no-untyped-def]
     """Write the nodes of the columns at the corners (f, w, k + 1) of facets, and the depths (f,).
 
-    Also the nodes ``off`` (f, 2) the facet of cells in which no column begins: one or two. Columns
-    lead only through cells of the mask ``use`` (m,).
+    Also the nodes ``off`` (f, 2) the facet of cells in which no column begins: one or two.
     """
     types, offsets, connectivity = cells
     stride = np.zeros(chain.shape[2], np.int64)
     for f in range(len(facets)):
-        width = facets.shape[1]
-        if width == 4 and facets[f, 2] == facets[f, 3]:
-            width = 3
-        cell = owner[f]
+        width = _width(facets[f])
         chain[f, :width, 0] = facets[f, :width]
-        for layer in range(chain.shape[2] - 1):
+        cell = owner[f]
+        while depth[f] < chain.shape[2] - 1:
+            layer = depth[f]
             nodes = connectivity[offsets[cell] : offsets[cell + 1]]
-            if not _cross(chain[f], width, layer, nodes, edges[types[cell]]):
+            if not _cross(chain[f], width, layer, nodes, linked[types[cell]]):
                 break
-            depth[f] = layer + 1
-            side = chain[f, :width, layer + 1]
-            beyond = cell + stride[layer]  # as of the facet before, where cells are in rows
-            if not _is_beyond(side, cell, beyond, offsets, connectivity, use):
-                beyond = _neighbour(side, cell, offsets, connectivity, *around, use)
-                if beyond < 0:
-                    break
-                stride[layer] = beyond - cell
-            cell = beyond
+            depth[f] += 1
+            cell = _next(chain[f, :width, layer + 1], cell, cells, around, stride[layer:])
+            if cell < 0:
+                break
         if depth[f] == 0:
             count = 0
             for k in range(offsets[owner[f]], offsets[owner[f] + 1]):
@@ -235,24 +237,108 @@ def _climb(facets, owner, cells, around, use, edges, chain, depth, off):  # type
 
 
 @njit
-def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
-    """Write the side opposite to ``chain[:width, layer]`` of a cell; return whether it has one."""
+def _lengthen(facets, owner, cells, around, linked, points, corner, length, columns):  # type: ignore[no-untyped-def]
+    """Lengthen ``columns`` (c, k + 1), of ``length`` (c,) layers, through stacks of flat cells.
+
+    To the first cell beyond. ``corner`` (f, w) are the columns at the corners of facets; of those
+    that facets have in common the longest stays.
+    """
+    types, offsets, connectivity = cells
+    deepest = columns.shape[1] - 1
+    chain = np.empty((facets.shape[1], deepest + 1), np.int64)
+    stride = np.zeros(deepest, np.int64)
+    for f in range(len(facets)):
+        width = _width(facets[f])
+        chain[:width, 0] = facets[f, :width]
+        cell = owner[f]
+        layer = 0
+        flat = True
+        while flat and cell >= 0 and layer < deepest:
+            nodes = connectivity[offsets[cell] : offsets[cell + 1]]
+            if not _cross(chain, width, layer, nodes, linked[types[cell]]):
+                break
+            flat = _is_flat(points, chain[:width, layer : layer + 2])
+            layer += 1
+            if flat:
+                cell = _next(chain[:width, layer], cell, cells, around, stride[layer - 1 :])
+        for k in range(width):
+            column = corner[f, k]
+            if column < len(columns) and layer > length[column]:
+                length[column] = layer
+                columns[column, : layer + 1] = chain[k, : layer + 1]
+
+
+@njit
+def _width(facet):  # type: ignore[no-untyped-def]
+    """Return the number of nodes of a facet (w,); a triangle may repeat its last one."""
+    return 3 if len(facet) == 4 and facet[2] == facet[3] else len(facet)
+
+
+@njit
+def _next(side, cell, cells, around, stride):  # type: ignore[no-untyped-def]
+    """Return the cell beyond a side (w,) of ``cell``, -1 if there is none or one of a halo.
+
+    ``stride[0]`` is the difference of the numbers of the last two such cells.
+    """
+    _, offsets, connectivity = cells
+    begin, cells_at, use = around
+    beyond = cell + stride[0]  # as of the facet before, where cells are in rows
+    if not _is_beyond(side, cell, beyond, offsets, connectivity, use):
+        beyond = _neighbour(side, cell, offsets, connectivity, begin, cells_at, use)
+        if beyond >= 0:
+            stride[0] = beyond - cell
+    return beyond
+
+
+@njit
+def _is_flat(points, nodes):  # type: ignore[no-untyped-def]
+    """Return whether a cell between nodes (w, 2) is flat: see `Columns.stack_thickness`."""
+    width = len(nodes)
+    height = 0.0
+    for k in range(width):
+        height += _distance(points, nodes[k, 0], nodes[k, 1]) / width
+    if width == 2:
+        return height < FLAT * _distance(points, nodes[0, 0], nodes[1, 0])
+    a = nodes[0, 0]
+    b = nodes[1 if width == 3 else 2, 0]
+    c = nodes[0 if width == 3 else 1, 0]
+    d = nodes[width - 1, 0]
+    size = 0.0
+    for i in range(3):
+        j = (i + 1) % 3
+        u = (points[b, i] - points[a, i]) * (points[d, j] - points[c, j])
+        size += (u - (points[b, j] - points[a, j]) * (points[d, i] - points[c, i])) ** 2
+    return height < FLAT * np.sqrt(np.sqrt(size) / 2)
+
+
+@njit
+def _distance(points, one, two):  # type: ignore[no-untyped-def]
+    square = 0.0
+    for i in range(points.shape[1]):
+        square += (points[two, i] - points[one, i]) ** 2
+    return np.sqrt(square)
+
+
+@njit
+def _cross(chain, width, layer, nodes, linked):  # type: ignore[no-untyped-def]
+    """Write the side opposite to ``chain[:width, layer]`` of a cell; return whether it has one.
+
+    ``linked`` (8,): the bits of the nodes at the edges from each of its ``nodes``.
+    """
     if len(nodes) != 2 * width:
         return False
+    side = 0
+    for a in range(2 * width):
+        if _has(chain[:width, layer], nodes[a]):
+            side |= 1 << a
     for i in range(width):
         end = -1
-        for e in range(len(edges)):
-            if edges[e, 0] < 0:
-                break
-            one = nodes[edges[e, 0]]
-            two = nodes[edges[e, 1]]
-            other = -1
-            if one == chain[i, layer]:
-                other = two
-            elif two == chain[i, layer]:
-                other = one
-            if other >= 0 and not _has(chain[:width, layer], other):
-                end = other
+        for a in range(2 * width):
+            if nodes[a] == chain[i, layer]:
+                beyond = linked[a] & ~side
+                for b in range(2 * width):
+                    if beyond >> b & 1:
+                        end = nodes[b]
         chain[i, layer + 1] = end
     if _has(chain[:width, layer + 1], -1):  # a cell that has a node twice
         chain[:width, layer + 1] = -1
@@ -310,18 +396,24 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
         some = k < width
         np.add.at(total, columns.corner[some, k], inward[some])
     normal = unit(total)
-    x = points[nodes]
-    edges = x[:, 1:] - x[:, :-1]
-    edges[nodes[:, 1:] < 0] = np.nan
-    length = np.linalg.norm(edges, axis=2)
-    first = row_dots(edges[:, 0], normal[: len(nodes)])
-    along = row_norms(edges[:, 0] - first[:, None] * normal[: len(nodes)])
+    edge = points[nodes[:, 1]] - points[nodes[:, 0]]
+    first = row_dots(edge, normal[: len(nodes)])
+    along = row_norms(edge - first[:, None] * normal[: len(nodes)])
     angle = np.degrees(np.arctan2(first, along))
+    length = np.linalg.norm(edge, axis=1)
+    below = length.copy()
+    growth = np.full(len(nodes), np.nan)
+    equal = (length > 0).astype(float)
     with np.errstate(all="ignore"):
-        steps = np.exp(np.abs(np.log(length[:, 1:] / length[:, :-1])))
-        growth = np.fmax.reduce(steps, axis=1, initial=np.nan)
-        alike = np.abs(length[:, :LAYERS] / length[:, :1] - 1) < EQUAL
-    equal = np.cumprod(alike, axis=1).sum(axis=1).astype(float)
+        for k in range(1, nodes.shape[1] - 1):
+            there = np.flatnonzero(nodes[:, k + 1] >= 0)
+            edge = points[nodes[there, k + 1]] - points[nodes[there, k]]
+            above = np.linalg.norm(edge, axis=1)
+            step = np.exp(np.abs(np.log(above / below[there])))
+            growth[there] = np.fmax(growth[there], step)
+            if k < LAYERS:
+                equal[there] += (equal[there] == k) & (np.abs(above / length[there] - 1) < EQUAL)
+            below[there] = above
     away = points[columns.off].mean(axis=1) - _middles(points, facets[columns.bare])
     height = row_dots(away, normal[len(nodes) :])
     none = np.full(len(columns.bare), np.nan)
@@ -486,7 +578,7 @@ def _statistics(values: FloatArray) -> dict[str, float | None]:
 @weak_cache
 def _columns_of(mesh: Mesh, markers: tuple[str, ...]) -> tuple[Columns, frozenset[str]]:
     """Return the columns at boundaries of a mesh, and those of the boundaries with layers."""
-    columns = find_columns(mesh, DEEPEST, markers)
+    columns = find_columns(mesh, LAYERS, markers)
     boundary = columns.boundary
     flat = columns.stack_thickness(mesh.points, 1) > 0
     layered = set()
@@ -494,7 +586,7 @@ def _columns_of(mesh: Mesh, markers: tuple[str, ...]) -> tuple[Columns, frozense
         member = boundary.marker == boundary.names.index(name)
         if 2 * np.count_nonzero(flat[member]) > np.count_nonzero(member):
             layered.add(name)
-    return columns.through_stacks(mesh.points), frozenset(layered)
+    return columns.through_stacks(mesh), frozenset(layered)
 
 
 @check_types
