@@ -1,6 +1,7 @@
 """The table of all keys of a case file, by which they are read, checked, written and explained.
 
-Values are put into a case in the order of the table, whatever their order in the file. Those of the
+Its words are in ``keys.toml``. Values are put into a case in the order of the table, whatever their
+order in the file. Those of the
 view are in ``Case.view``, by key; `slideviz.session.saving` makes a view of them and back; runs
 without a window ignore them. The numbers of DATA_REDUCTION= AUTO in the text are EXACT_NODES and
 AUTO_TOLERANCE of `slideviz.solver.setup`.
@@ -8,9 +9,9 @@ AUTO_TOLERANCE of `slideviz.solver.setup`.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -135,43 +136,48 @@ def other_method(case: Case, method: Method | None) -> str:
     return f"{label if label[:2].isupper() else label[0].lower() + label[1:]} does not use it"
 
 
-def setting(
-    group: str, name: str, meaning: str, kind: Kind | None = None, *, field: str = "", **window: Any
-) -> Key:
+_TABLE = tomllib.loads(Path(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+_WORDS: dict[str, dict[str, Any]] = {
+    name: {"group": group, **words}
+    for group, rows in _TABLE.items()
+    for name, words in rows.items()
+}
+
+
+def row(name: str, kind: Kind, put: Put, get: Get, **facts: Any) -> Key:
+    """Return the row of a key, with its words in ``keys.toml`` and further ``facts`` of `Key`."""
+    return Key(name, kind=kind, put=put, get=get, **_WORDS[name] | facts)
+
+
+def setting(name: str, kind: Kind | None = None, **facts: Any) -> Key:
     """Return the row of a key whose value is a field of ``Case``, as `field_row`."""
-    field = field or name.lower()
+    field = _WORDS[name]["field"]
     return field_row(
         CaseFields(),
-        group,
         name,
-        meaning,
         kind,
-        field=field,
         put=lambda case, value: case.change(**{field: value}),
         get=lambda case: getattr(case, field),
-        **window,
+        **facts,
     )
 
 
-def field_row(
-    owner: Any, group: str, name: str, meaning: str, kind: Kind | None, field: str, **window: Any
-) -> Key:
-    """Return the row of a key whose value is a field of a dataclass; ``window`` has more of `Key`.
+def field_row(owner: Any, name: str, kind: Kind | None, **facts: Any) -> Key:
+    """Return the row of a key whose value is a field of a dataclass; ``facts`` as of `row`.
 
-    Without a ``kind`` its values are those of the field's enumeration, or YES and NO. A field of
-    the method panel has by default the key as its label. ``owner``: has the default.
+    Without a ``kind`` its values are those of the field's enumeration, or YES and NO. ``owner``:
+    has the default.
     """
+    field = _WORDS[name]["field"]
     terms = owner.__dataclass_fields__[field].metadata
     default = getattr(owner, field)
     kind = kind or (one_of(terms) if terms else YES_NO)
-    if "form" in window:
-        window = {"label": name.replace("_", " ").capitalize(), **window}
     text = NO_DEFAULT if default is None else kind.write(default)
-    return Key(name, group, kind, meaning, default=text, field=field, **window)
+    return row(name, kind, default=text, **facts)
 
 
-def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
-    """Return the row of a key that lists the markers with the role ``wanted``."""
+def role(wanted: Role) -> Key:
+    """Return the row of the key that lists the markers with the role ``wanted``."""
 
     def put(case: Case, names: tuple[str, ...]) -> Case:
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})
@@ -179,7 +185,9 @@ def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
     def get(case: Case) -> tuple[str, ...] | None:
         return case.markers_with(wanted) or None
 
-    return Key(name, BOUNDARIES, kind, meaning, put, get, label=f"the role “{ROLES[wanted].label}”")
+    term = ROLES[wanted]
+    kind = PAIRS if wanted == "periodic" else NAMES
+    return row(term.key, kind, put, get, label=f"the role “{term.label}”")
 
 
 HIDDEN = "hidden"  # the last word of a section that is not drawn
@@ -283,29 +291,26 @@ def hyphened(shown: str) -> str:
     return shown.replace("_", "-")
 
 
-def _row(name: str, kind: Kind, meaning: str) -> Key:
+def _view(name: str, kind: Kind, **facts: Any) -> Key:
+    """Return the row of a key whose value is in ``Case.view``."""
+
     def put(case: Case, value: Any) -> Case:
         return case.change(view={**case.view, name: value})
 
-    return Key(name, VIEW, kind, meaning, put, lambda case: case.view.get(name))
+    return row(name, kind, put, lambda case: case.view.get(name), **facts)
 
 
 VIEW_ROWS = (
-    _row("VIEW_COLOR", choice({w: w for w in COLOR_BY}), "What the colors show."),
-    _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the color bar."),
-    _row("VIEW_MAP", choice({w: w for w in COLOR_MAPS}), "The color map."),
-    _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
-    _row("VIEW_POINTS", choice({w: w for w in POINTS_SHOWN}), "Nodes drawn as points."),
-    _row("VIEW_SHOW", words(tuple(map(hyphened, SHOWN))), "What is drawn beside the boundaries."),
-    _row("VIEW_COPIES", integer(-1), "Passages drawn on each side; -1 draws all."),
-    _row("VIEW_HIDDEN", NAMES, "Boundaries that are not drawn."),
-    _row("VIEW_SECTIONS", SECTIONS, f"Sections of the mesh, each by a {names()}."),
-    _row(
-        "VIEW_CAMERA",
-        numbers(10, "ten or eleven numbers", more=1),
-        "Position of the camera, the point that it looks at, its upward direction, and half the "
-        "height of the view; then width over height of the view, for a narrower one.",
-    ),
+    _view("VIEW_COLOR", one_of(COLOR_BY)),
+    _view("VIEW_RANGE", numbers(2, "two rising numbers", True)),
+    _view("VIEW_MAP", one_of(COLOR_MAPS)),
+    _view("VIEW_THRESHOLD", numbers(2, "two rising numbers", True)),
+    _view("VIEW_POINTS", one_of(POINTS_SHOWN)),
+    _view("VIEW_SHOW", words(tuple(map(hyphened, SHOWN)))),
+    _view("VIEW_COPIES", integer(-1)),
+    _view("VIEW_HIDDEN", NAMES),
+    _view("VIEW_SECTIONS", SECTIONS, meaning=f"Sections of the mesh, each by a {names()}."),
+    _view("VIEW_CAMERA", numbers(10, "ten or eleven numbers", more=1)),
 )
 
 
@@ -400,48 +405,13 @@ ORDERS = Kind(
     "i, j, k", lambda text: _integers(list_of(text), 1), lambda orders: ", ".join(map(str, orders))
 )
 
-_motion_setting = partial(setting, MOTION)
 _FFD = (
-    _motion_setting(
-        "FFD_DEFINITION",
-        "Boxes for free-form deformation, in SU2's order of corners; boxes of the mesh override "
-        "them.",
-        DEFINITION,
-        field="ffd_boxes",
-        label="FFD boxes",
-    ),
-    _motion_setting(
-        "FFD_DEGREE",
-        "The degrees of each box of FFD_DEFINITION: control points of each direction, minus one.",
-        DEGREES,
-        field="ffd_degrees",
-        label="FFD degrees",
-        switch=_without_definition,
-    ),
-    _motion_setting(
-        "FFD_BLENDING",
-        "How control points of these boxes move the nodes inside.",
-        label="FFD blending",
-        switch=_without_definition,
-    ),
-    _motion_setting(
-        "FFD_BSPLINE_ORDER",
-        "With FFD_BLENDING= BSPLINE_UNIFORM, the orders of the splines, 2 or more.",
-        ORDERS,
-        field="ffd_orders",
-        label="FFD orders",
-        switch=_without_definition,
-    ),
-    _motion_setting(
-        "FFD_COORD_SYSTEM",
-        "The coordinates in which boxes are straight, also the boxes of the mesh; their axis is "
-        "along x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
-        field="ffd_system",
-        label="FFD coordinates",
-    ),
-    _motion_setting(
-        "FFD_AXIS", "A point on that axis.", POINT, label="FFD axis", switch=_without_axis
-    ),
+    setting("FFD_DEFINITION", DEFINITION),
+    setting("FFD_DEGREE", DEGREES, switch=_without_definition),
+    setting("FFD_BLENDING", switch=_without_definition),
+    setting("FFD_BSPLINE_ORDER", ORDERS, switch=_without_definition),
+    setting("FFD_COORD_SYSTEM"),
+    setting("FFD_AXIS", POINT, switch=_without_axis),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _FFD)
 
@@ -478,16 +448,11 @@ def _why_no_repair(case: Case) -> str:
     return "repair is off" if case.repair == "no" else ""
 
 
-def greedy(
-    name: str, meaning: str, kind: Kind | None = None, *, field: str = "", **window: Any
-) -> Key:
-    """Return the row of a key whose value is a field of ``Reduction``, as `field_row`.
-
-    Where a case has no data reduction, the value is checked and not kept.
-    """
-    field = field or name.lower()
+def greedy(name: str, kind: Kind | None = None, **facts: Any) -> Key:
+    """Return the row of a key whose value is a field of ``Reduction``, as `field_row`."""
+    field = _WORDS[name]["field"]
     usual = getattr(Reduction(), field)
-    window = {"switch": _why_no_reduction, **window}
+    facts = {"switch": _why_no_reduction, **facts}
 
     def put(case: Case, value: Any) -> Case:
         if case.reduction is None:
@@ -499,13 +464,10 @@ def greedy(
         if reduction is None:
             return None
         value = getattr(reduction, field)
-        # A tolerance without effect is written to a file only where it is not the default.
-        idle = reduction.auto and window["switch"] is why_no_tolerance and value == usual
+        idle = reduction.auto and facts["switch"] is why_no_tolerance and value == usual
         return None if idle else value
 
-    return field_row(
-        Reduction(), REDUCTION, name, meaning, kind, field=field, put=put, get=get, **window
-    )
+    return field_row(Reduction(), name, kind, put=put, get=get, **facts)
 
 
 def _put_double_edge(case: Case, wanted: bool) -> Case:
@@ -528,111 +490,23 @@ def get_reduction(case: Case) -> terms.DataReduction:
 
 
 REDUCTION_ROWS = (
-    Key(
+    row(
         "DATA_REDUCTION",
-        REDUCTION,
         one_of(terms.DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
-        "Interpolate with only some of the boundary nodes; with NO the keys below have no effect. "
-        "AUTO does so if there are more than 2000. Its tolerance is a thousandth of the largest "
-        "displacement, or half of the height of the first layer at sliding boundaries.",
         put_reduction,
         get_reduction,
-        "AUTO",
-        field="reduction",
-        label="Data reduction",
-        form="main",
-        tip="Interpolate with only as many boundary nodes as the tolerance needs, and correct the "
-        "remaining error: for meshes with more than a few thousand boundary nodes. Automatic: "
-        "only for these.",
-        method="rbf",
+        default="AUTO",
     ),
-    greedy(
-        "DATA_RED_TOLERANCE",
-        "Largest error left before the boundary is corrected, over all steps, in the mesh's unit.",
-        real(0.0),
-        field="tolerance",
-        label="Tolerance",
-        form="main",
-        tip="The largest error at the boundary that the control nodes may leave to the "
-        "correction, in the mesh's length unit.",
-        run_label="",
-        switch=why_no_tolerance,
-    ),
-    greedy(
-        "DATA_RED_RELATIVE",
-        "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
-        real(0.0),
-        field="relative",
-        label="a relative tolerance of a case file,",
-        run_label="",
-        switch=why_no_tolerance,
-    ),
-    greedy(
-        "MULTILEVEL",
-        "Select the control nodes in levels.",
-        label="Levels",
-        form="more",
-        tip="Whether data reduction selects in levels, each on the error that the previous ones "
-        "left, and what ends a level.",
-        run_label="",
-    ),
-    greedy(
-        "MULTI_CRIT",
-        "What ends a level: its number of nodes, or the decrease of its error.",
-        field="criterion",
-        run_label="levels by {}",
-        switch=_why_no_levels,
-    ),
-    greedy(
-        "LVL_TOL_CRIT",
-        "Decrease of the error that ends a level.",
-        real(0.0, 1.0),
-        field="level_tolerance",
-        run_label="a level ends at {}",
-        switch=_why_no_levels,
-    ),
-    greedy(
-        "LVL_SIZE",
-        "Number of control nodes of a level.",
-        integer(1),
-        field="level_size",
-        label="A level ends at",
-        form="more",
-        tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        switch=_why_no_levels,
-    ),
-    Key(
-        "DOUBLE_EDGE",
-        REDUCTION,
-        YES_NO,
-        "Select two nodes at a time, with opposite errors (YES), or one (NO); prefer the key "
-        "SELECTION.",
-        _put_double_edge,
-        lambda _: None,
-    ),
-    greedy(
-        "SELECTION",
-        "Nodes added in a cycle: a growing block (fastest), two with opposite errors, or one.",
-        form="more",
-        tip="How many control nodes data reduction adds in a cycle: a growing block (fastest), "
-        "two with opposite errors, or the one with the largest error.",
-    ),
-    greedy(
-        "MAX_CONTROL_NODES",
-        "Stop at this number of control nodes in any case.",
-        integer(1),
-        field="max_nodes",
-        run_label="",
-    ),
-    greedy(
-        "GAMMA",
-        "Radius of the correction, divided by the largest error.",
-        real(0.0),
-        label="Correction radius ×",
-        form="more",
-        tip="How far the last correction of the boundary reaches, as a multiple of the largest "
-        "error that the control nodes leave.",
-    ),
+    greedy("DATA_RED_TOLERANCE", real(0.0), switch=why_no_tolerance),
+    greedy("DATA_RED_RELATIVE", real(0.0), switch=why_no_tolerance),
+    greedy("MULTILEVEL"),
+    greedy("MULTI_CRIT", switch=_why_no_levels),
+    greedy("LVL_TOL_CRIT", real(0.0, 1.0), switch=_why_no_levels),
+    greedy("LVL_SIZE", integer(1), switch=_why_no_levels),
+    row("DOUBLE_EDGE", YES_NO, _put_double_edge, lambda _: None),
+    greedy("SELECTION"),
+    greedy("MAX_CONTROL_NODES", integer(1)),
+    greedy("GAMMA", real(0.0)),
 )
 
 
@@ -690,242 +564,58 @@ def _read_ratio(text: str) -> float:
     return value
 
 
-_method_setting = partial(setting, METHOD)
-
 METHOD_ROWS = (
-    _method_setting(
-        "METHOD",
-        "Radial basis functions, or for comparison inverse distance weighting, or linear "
-        "elasticity (as in SU2; DEFORM_STIFFNESS_TYPE, DEFORM_COEFF). With these two, ps and ds do "
-        "the same, kernel, radius and data reduction have no effect, and nothing is relaxed.",
-        form="main",
-        tip="How the inner nodes follow: by radial basis functions, or for comparison by inverse "
-        "distance weighting, or as an elastic body whose small cells are stiffer (a choice of "
-        "SU2's, not its default).",
-        run_label="",
+    setting("METHOD"),
+    setting(
+        "SLIDING_MODE", idle_reason=nothing_slides, meaning=f"How nodes slide: not at all, {_WAYS}."
     ),
-    _method_setting(
-        "SLIDING_MODE",
-        f"How nodes slide: not at all, {_WAYS}.",
-        field="sliding",
-        label="Sliding",
-        form="main",
-        tip="Whether the nodes of sliding boundaries stay (none), slide and are projected to the "
-        "boundary in stages (pseudo), or slide as part of the system itself (direct).",
-        run_label="",
-        idle_reason=nothing_slides,
+    setting("RIMS", idle_reason=_no_walls),
+    setting(
+        "RELAX", idle_reason=lambda case: "" if case.relax == "yes" else other_method(case, "rbf")
     ),
-    _method_setting(
-        "RIMS",
-        "What a motion does with nodes of moving boundaries that are also on sliding or internal "
-        "ones: FREE takes them off these walls, with a warning; SLIDE keeps them there, at the "
-        "closest point, and the nodes beside them follow smoothly.",
-        label="Nodes on walls",
-        form="main",
-        tip="Whether nodes that a moving boundary shares with a sliding or internal boundary, such "
-        "as nodes of a blade on its hub, stay on that wall whatever the motion is; the nodes "
-        "beside them follow smoothly.",
-        run_label="rims {}",
-        idle_reason=_no_walls,
-    ),
-    _method_setting(
-        "RELAX",
-        "Relax the mesh after the last step, to the least distortion of all cells: they go back "
-        "to their undeformed shapes, turned as they are, and none folds. Cells are better in the "
-        "mean, and boundary layers nearly keep their heights and angles. AUTO does so up to a "
-        "million cells in memory.",
-        label="Relaxation",
-        form="main",
-        tip="Whether cells then go back towards their undeformed shapes, turned as they are: "
-        "better in the mean, boundary layers nearly keep their heights, and no cell folds.",
-        run_label="relaxation {}",
-        idle_reason=lambda case: "" if case.relax == "yes" else other_method(case, "rbf"),
-    ),
-    _method_setting(
-        "STEPS",
-        "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
-        "halves steps that fold a cell, and takes the fewest that are enough.",
-        or_auto(integer(1, MAX_STEPS), "auto"),
-        form="main",
-        tip="Into how many equal parts the motion is divided: more keep large motions valid and "
-        "take longer; automatic (0) takes as few as give no inverted cell.",
-        run_label="",
-    ),
-    _method_setting(
-        "STEPS_GAIN",
-        "With STEPS= auto, steps are enough if more of them raise the minimum quality by less "
-        "than this part.",
-        real(0.0, 1.0),
-        run_label="gain {}",
-        switch=lambda case: "STEPS is a number" if case.steps else "",
+    setting("STEPS", or_auto(integer(1, MAX_STEPS), "auto")),
+    setting(
+        "STEPS_GAIN", real(0.0, 1.0), switch=lambda case: "STEPS is a number" if case.steps else ""
     ),
     replace(
-        _method_setting(
-            "INFLUENCE_FACTOR",
-            "Support radius of the radial function, divided by the largest extent of the mesh. "
-            "AUTO: 15 "
-            "times the largest extent of a connected moving body, or 20 times the largest "
-            "displacement if that is more, and at most 2.5 extents of the mesh.",
-            or_auto(real(*FACTORS), "AUTO"),
-            label="Radius × extent",
-            form="more",
-            tip="Support radius: how far a boundary node reaches into the mesh, as a multiple of "
-            "the mesh's largest extent. Automatic: as far as the motion needs.",
-            run_label="radius × {}",
-            method="rbf",
-        ),
+        setting("INFLUENCE_FACTOR", or_auto(real(*FACTORS), "AUTO")),
         put=lambda case, factor: case.change(influence_factor=factor, support_radius=None),
     ),
-    _method_setting(
-        "SUPPORT_RADIUS",
-        "Support radius in the mesh's length unit, instead of INFLUENCE_FACTOR.",
-        real(0.0),
-        label="Support radius as a length",
-        run_label="radius {}",
-        method="rbf",
-    ),
-    _method_setting(
+    setting("SUPPORT_RADIUS", real(0.0)),
+    setting(
         "RBF_KERNEL",
-        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
         replace(
             one_of(terms.KERNELS),
             allowed="one of the names below",
             details=tuple(f"{name:<22}{kernel.label}" for name, kernel in terms.KERNELS.items()),
             words=terms.names(terms.KERNELS),
         ),
-        field="kernel",
-        label="Kernel",
-        form="more",
-        tip="The radial function; a global one reaches through the whole mesh whatever the "
-        "radius, and needs a smaller support radius.",
-        run_label="{}",
-        method="rbf",
     ),
-    _method_setting(
-        "POLYNOMIAL",
-        "Add a linear polynomial to the radial functions: motions that are linear in the "
-        "coordinates are exact then, with any kernel, and nodes beyond all supports move too. "
-        "AUTO: only where the kernel needs it (thin-plate, multiquadric, quadric).",
-        form="more",
-        tip="Whether a linear polynomial is added to the radial functions: a motion that is linear "
-        "in the coordinates is then exact with any kernel, and nodes far from the motion move too.",
-        run_label="polynomial {}",
-        method="rbf",
-    ),
-    _method_setting(
+    setting("POLYNOMIAL"),
+    setting(
         "LAYERS",
-        "Keep boundary layers: nodes near walls go with the displacement and rotation of the wall, "
-        "so that first heights and angles stay. Walls are moving and fixed boundaries: AUTO takes "
-        "those with flat quadrilaterals, hexahedra or prisms, KEEP all of them.",
-        form="main",
-        tip="Whether nodes near walls go with the wall's own displacement and rotation: this keeps "
-        "the heights of boundary layers.",
-        run_label="layers {}",
         idle_reason=lambda case: "" if case.layers == "keep" else other_method(case, "rbf"),
     ),
-    _method_setting(
-        "LAYER_THICKNESS",
-        "How far from walls LAYERS acts, in the mesh's length unit. AUTO: a fiftieth of the wall's "
-        "largest extent, or the thickness of its boundary layer if that is less.",
-        or_auto(real(0.0), "AUTO"),
-        form="more",
-        tip="How far from walls nodes go with them, in the mesh's length unit. Automatic: a "
-        "fiftieth of the wall's extent, or the thickness of its boundary layer if that is less.",
-        run_label="to {}",
-        switch=_why_no_layers,
-        method="rbf",
-    ),
-    _method_setting(
-        "LAYER_MINIMUM_GAP",
-        "The part of their height that cells beside the layers keep before these give way, where "
-        "walls come near each other. With 0 they never do. Only a relaxed mesh has it.",
-        real(0.0, 1.0, with_low=True),
-        label="Minimum gap",
-        form="more",
-        tip="Layers become thinner where the cells beside them would keep less than this part of "
-        "their height, as walls come near each other. With 0 they never do.",
-        run_label="minimum gap {}",
-        switch=_why_no_minimum_gap,
-    ),
-    _method_setting(
-        "REPAIR",
-        "Mend cells that are inverted, not proved valid, or of a quality below REPAIR_BELOW (and "
-        "lower than before): nodes near them move, never nodes of moving and fixed boundaries. The "
-        "mesh is never worse after it. AUTO is the same as YES.",
-        form="main",
-        tip="Whether inverted and poor cells are then mended, by moving the nodes near them: never "
-        "nodes of moving and fixed boundaries.",
-        run_label="repair {}",
-    ),
-    _method_setting(
-        "REPAIR_BELOW",
-        "The quality below which REPAIR mends valid cells, too; with 0 it mends only those that "
-        "are not proved valid.",
-        real(0.0, 1.0, with_low=True),
-        form="more",
-        tip="The quality below which valid cells are mended, too.",
-        run_label="repair below {}",
-        switch=_why_no_repair,
-    ),
-    _method_setting(
-        "REPAIR_STEPS",
-        "Whether REPAIR acts after each step (YES, not of a streamed mesh), or after the last one "
-        "(NO).",
-        label="Repair each step",
-        form="more",
-        tip="Whether cells are mended after each step, so that the next one starts from a better "
-        "mesh, or only after the last.",
-        run_label="repair of each step",
-        switch=_why_no_repair,
-    ),
-    _method_setting(
-        "IDW_POWER",
-        "With METHOD= idw, the power of the inverse distance; by default the number of dimensions.",
-        real(0.0, 20.0, closed=True),
-        run_label="power {}",
-        method="idw",
-    ),
-    _method_setting(
-        "IDW_FIXED_WEIGHT",
-        "With METHOD= idw, the weight of a boundary node that stays, relative to one that moves.",
-        real(1e-12, 1e12),
-        run_label="fixed weight {}",
-        method="idw",
-    ),
-    _method_setting(
+    setting("LAYER_THICKNESS", or_auto(real(0.0), "AUTO"), switch=_why_no_layers),
+    setting("LAYER_MINIMUM_GAP", real(0.0, 1.0, with_low=True), switch=_why_no_minimum_gap),
+    setting("REPAIR"),
+    setting("REPAIR_BELOW", real(0.0, 1.0, with_low=True), switch=_why_no_repair),
+    setting("REPAIR_STEPS", switch=_why_no_repair),
+    setting("IDW_POWER", real(0.0, 20.0, closed=True)),
+    setting("IDW_FIXED_WEIGHT", real(1e-12, 1e12)),
+    setting(
         "DEFORM_STIFFNESS_TYPE",
-        "With METHOD= elastic, which cells are stiff, like SU2: Young's modulus is one over the "
-        "mean distance of the cell's nodes to the nearest node of a wall (SU2's default), one over "
-        "the cell's volume, or the same everywhere. Walls are moving boundaries, and fixed ones "
-        f"whose names have none of {', '.join(terms.NOT_WALLS)}.",
         one_of(terms.STIFFNESS_TYPES, {"WALL_DISTANCE": "SOLID_WALL_DISTANCE"}),
-        run_label="stiffness {}",
-        method="elastic",
+        meaning="With METHOD= elastic, which cells are stiff, like SU2: Young's modulus is one "
+        "over the mean distance of the cell's nodes to the nearest node of a wall (SU2's "
+        "default), one over the cell's volume, or the same everywhere. Walls are moving "
+        f"boundaries, and fixed ones whose names have none of {', '.join(terms.NOT_WALLS)}.",
     ),
-    _method_setting(
-        "DEFORM_COEFF",
-        "With METHOD= elastic, Poisson's ratio. With SU2's default of 1e6 cells may grow and "
-        "shrink freely, and keep their angles instead.",
-        Kind(_RATIOS, _read_ratio, lambda value: repr(float(value)), entry="real"),
-        run_label="Poisson's ratio {}",
-        method="elastic",
+    setting(
+        "DEFORM_COEFF", Kind(_RATIOS, _read_ratio, lambda value: repr(float(value)), entry="real")
     ),
-    _method_setting(
-        "CURVED",
-        "No effect: RBF-SliDe's switch for curved boundaries, which are always found and followed.",
-        run_label="",
-        no_effect="curved boundaries are always found and followed",
-    ),
-    _method_setting(
-        "FEATURE_ANGLE",
-        "Angle in degrees from which a bend within a boundary is an edge.",
-        real(0.0, 180.0, closed=True),
-        field="feature_angle_deg",
-        unit="°",
-        form="more",
-        tip="A boundary that turns by more than this angle has an edge there, which sliding nodes "
-        "do not cross.",
-    ),
+    setting("CURVED"),
+    setting("FEATURE_ANGLE", real(0.0, 180.0, closed=True)),
 )
 
 
@@ -944,72 +634,22 @@ def _put_direction(case: Case, word: str) -> Case:
     return case.change(direction=direction, periodic_type=implied or case.periodic_type)
 
 
-_periodic_setting = partial(setting, PERIODICITY)
 PERIODIC_ROWS = (
-    _periodic_setting(
-        "PERIODIC_MODE",
-        "How boundaries are periodic: not at all, in the distance only, or also in the "
-        "displacement with fixed or moving vertices.",
-        field="periodic",
-        label="Periodicity",
-        form="main",
-        tip="What the periodic boundaries do: nothing special (none), only the distance is "
-        "periodic (periodic), or both sides deform in the same way, with the corners of the "
-        "domain fixed (fixed vertices) or sliding (moving vertices).",
-        run_label="",
-        idle_reason=no_pair,
-    ),
-    _periodic_setting(
+    setting("PERIODIC_MODE", idle_reason=no_pair),
+    setting(
         "PERIODIC_TYPE",
-        "Shift (0) or rotation (1); auto finds out by matching the markers.",
         one_of(PERIODIC_TYPES, {"0": "translational", "1": "rotational"}),
-        label="Type",
-        form="main",
-        tip="Whether one side is the other one shifted or rotated; automatic takes the one that "
-        "matches.",
-        run_label="{} type",
         idle_reason=no_pair,
     ),
-    Key(
+    row(
         "PERIODIC_DIRECTION",
-        PERIODICITY,
         choice({word: word for word in PERIODIC_DIRECTIONS}),
-        "No effect, except that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
-        "for x, y, z or r, theta, z) is found by matching the markers.",
         _put_direction,
         lambda case: None if case.direction is None else str(case.direction),
-        field="direction",
-        run_label="",
-        no_effect="matching the periodic markers finds the direction",
     ),
-    _periodic_setting(
-        "PERIODIC_AXIS",
-        "Axis of rotational periodicity.",
-        AXIS,
-        field="axis",
-        label="Axis",
-        form="main",
-        tip="The axis that the mesh repeats about, for rotational periodicity.",
-        idle_reason=no_pair,
-    ),
-    _periodic_setting(
-        "PERIODIC_ORIGIN",
-        "A point on that axis.",
-        POINT,
-        field="origin",
-        label="Through",
-        form="main",
-        run_label="axis through {}",
-        idle_reason=no_pair,
-    ),
-    _periodic_setting(
-        "SPAN",
-        "Hub and shroud, between which the span of a machine goes from 0 to 1. AUTO takes the "
-        "boundaries whose names contain hub, and shroud or casing.",
-        ENDS,
-        label="Hub and shroud",
-        run_label="span {}",
-    ),
+    setting("PERIODIC_AXIS", AXIS, idle_reason=no_pair),
+    setting("PERIODIC_ORIGIN", POINT, idle_reason=no_pair),
+    setting("SPAN", ENDS),
 )
 
 
@@ -1026,125 +666,54 @@ def _put_file(case: Case, path: Path | None) -> Case:
 _FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
 
 _ROWS = (
-    setting(FILES, "MESH_FILENAME", "The mesh to deform.", PATH, field="mesh_file"),
-    setting(
-        FILES,
-        "REFERENCE_FILENAME",
-        "The undeformed mesh, of the same cells, if MESH_FILENAME was deformed from it: cells are "
-        "relaxed to its shapes, layers keep its heights, walls are those of it that nodes slid "
-        "along, and qualities compare with it. So a motion and then its reverse lead back.",
-        PATH,
-        field="reference_file",
-    ),
-    setting(
-        FILES, "MESH_OUT_FILENAME", "Where the deformed mesh is written.", PATH, field="mesh_out"
-    ),
-    setting(
-        FILES,
-        "MESH_FORMAT",
-        "SU2's text or binary format; without this key, ending and content of the file decide.",
-        _FORMAT,
-    ),
-    setting(
-        FILES, "MESH_OUT_FORMAT", "SU2's text or binary, whatever the ending of the file.", _FORMAT
-    ),
-    setting(
-        FILES,
-        "ZONE",
-        "The zone to deform alone, from 1, of a mesh with several; without it all.",
-        integer(1),
-    ),
-    role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
-    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay. Boundaries in no list stay, too."),
-    role("MARKER_SLIDING", NAMES, "sliding", "Boundaries along which their nodes may slide."),
-    role("MARKER_PERIODIC", PAIRS, "periodic", "Periodic boundaries, in pairs of any order."),
-    role(
-        "MARKER_INTERNAL",
-        NAMES,
-        "internal",
-        "Boundaries treated as inner nodes: they move freely, only their rim is kept in place.",
-    ),
-    Key(
+    setting("MESH_FILENAME", PATH),
+    setting("REFERENCE_FILENAME", PATH),
+    setting("MESH_OUT_FILENAME", PATH),
+    setting("MESH_FORMAT", _FORMAT),
+    setting("MESH_OUT_FORMAT", _FORMAT),
+    setting("ZONE", integer(1)),
+    *map(role, ROLES),
+    row(
         "MARKER_ZONE_INTERFACE",
-        BOUNDARIES,
         COUPLES,
-        "Pairs of boundaries of two zones whose nodes stay together where they coincide. Without "
-        "it all that coincide do.",
         lambda case, names: case.change(interfaces=names),
         lambda case: case.interfaces or None,
-        field="interfaces",
-        run_label="",
     ),
-    Key(
+    row(
         "MARKER_BDRY",
-        BOUNDARIES,
         NAMES,
-        "All boundaries; those in no other list slide (with SLIDING_MODE= none they stay).",
         lambda case, names: case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles}),
         lambda _: None,
     ),
-    Key(
+    row(
         "DEFORMATION_FILENAME",
-        MOTION,
         PATH,
-        "Displacements of the moving nodes: node, dx, dy[, dz] in each line; the others stay.",
         _put_file,
         lambda case: next((motion.files[0] for motion in _leading_file(case)), None),
-        label="a displacement file",
     ),
-    Key(
+    row(
         "MOTION",
-        MOTION,
         MOTIONS,
-        "Motions of the moving boundaries, one after the other, after DEFORMATION_FILENAME.",
         lambda case, motions: case.change(motions=(*_leading_file(case), *motions)),
         lambda case: case.motions[len(_leading_file(case)) :] or None,
-        label="Motion",
     ),
     *FFD_ROWS,
     *PERIODIC_ROWS,
     *METHOD_ROWS,
     *REDUCTION_ROWS,
-    setting(
-        QUALITY, "GENERATE_QUALITY", "Write the quality of the deformed mesh too.", run_label=""
-    ),
-    setting(
-        QUALITY,
-        "QUALITY_METRIC",
-        "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
-        label="Quality",
-        form="more",
-        tip="How the quality of cells is measured: Knupp's published size-skew, or as the program "
-        "RBF-SliDe computes it for hexahedra.",
-    ),
-    Key(
+    setting("GENERATE_QUALITY"),
+    setting("QUALITY_METRIC"),
+    row(
         "LIMITS",
-        QUALITY,
         LIMITS,
-        "What the deformed mesh must meet; if it does not, `run` ends with exit code 4. A number "
-        "that each cell or wall has must be within its limit everywhere. Numbers of walls cover "
-        "all boundaries with layers, or one, e.g. growth@blade < 1.5.",
         lambda case, limits: case.change(limits=limits),
         lambda case: case.limits or None,
-        field="limits",
-        label="Limits",
-        run_label="",
     ),
     *VIEW_ROWS,
 )
-_RBF_SLIDE = {
-    *("MESH_FILENAME", "MESH_OUT_FILENAME", "DEFORMATION_FILENAME", "GENERATE_QUALITY"),
-    *("MARKER_BDRY", "MARKER_MOVING", "MARKER_INTERNAL", "MARKER_PERIODIC"),
-    *("PERIODIC_MODE", "PERIODIC_TYPE", "PERIODIC_DIRECTION"),
-    *("SLIDING_MODE", "STEPS", "INFLUENCE_FACTOR", "CURVED"),
-    *("DATA_REDUCTION", "DATA_RED_TOLERANCE", "DOUBLE_EDGE", "GAMMA"),
-    *("MULTILEVEL", "MULTI_CRIT", "LVL_TOL_CRIT", "LVL_SIZE"),
-}
-
-KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name in _RBF_SLIDE) for row in _ROWS}
-
+KEYS: dict[str, Key] = {key.name: key for key in _ROWS}
 _FIRST = (
-    *("METHOD", "SLIDING_MODE", *(row.name for row in PERIODIC_ROWS), "STEPS"),
+    *("METHOD", "SLIDING_MODE", *(key.name for key in PERIODIC_ROWS), "STEPS"),
     *("RBF_KERNEL", "INFLUENCE_FACTOR", "DATA_REDUCTION", "DATA_RED_TOLERANCE", "FEATURE_ANGLE"),
     *("STEPS_GAIN", "IDW_POWER", "IDW_FIXED_WEIGHT", "QUALITY_METRIC"),
     *("DEFORM_STIFFNESS_TYPE", "DEFORM_COEFF"),
