@@ -11,13 +11,14 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.su2.config import KINDS, form
+from slideviz.design.su2.config import KINDS, Group, form
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from tests.builders import airfoil, annulus, grid, sphere_in_box
@@ -318,6 +319,10 @@ def test_configurations_of_su2_do_what_the_table_says(name, tmp_path, monkeypatc
 def test_table_has_a_row_for_each_configuration_and_no_other():
     rows = PAGE.read_text(encoding="utf-8").partition(BEGIN)[2].splitlines()
     assert [line.split("`")[1] for line in rows] == list(CONFIGURATIONS)
+
+
+def test_each_kind_is_of_a_group():
+    assert {kind.group for kind in KINDS.values()} == set(get_args(Group))
 
 
 def test_table_of_kinds_in_the_docs_has_all_of_them():

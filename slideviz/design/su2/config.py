@@ -7,6 +7,7 @@ parts between semicolons, and passes over what follows the last one.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -64,51 +65,8 @@ class VariableKind:
         return self.form.replace(",", " ").split()
 
 
-KINDS = {
-    "NO_DEFORMATION": VariableKind("nothing"),
-    "TRANSLATION": VariableKind("surface", "x, y, z", 1),
-    "ROTATION": VariableKind("surface", "x0, y0, z0, x1, y1, z1", 1),
-    "SCALE": VariableKind("surface", "", 1),
-    "HICKS_HENNE": VariableKind("surface", "side, x", 2),
-    "CST": VariableKind("surface", "side, k, n", 3),
-    "SURFACE_BUMP": VariableKind("surface", "x0, x1, x", 4),
-    "ANGLE_OF_ATTACK": VariableKind("surface", "one", 5),
-    "HICKS_HENNE_CAMBER": VariableKind("surface", "x", 6),
-    "NACA_4DIGITS": VariableKind("naca", "digit1, digit2, digits34"),
-    "PARABOLIC": VariableKind("parabolic", "x, thickness"),
-    "AIRFOIL": VariableKind(
-        "nothing",
-        "one, two",
-        refused="is not supported, because SU2 asks for its file at a terminal; use SURFACE_FILE",
-    ),
-    "SURFACE_FILE": VariableKind("file"),
-    "TRANSLATE_GRID": VariableKind("grid", "x, y, z"),
-    "ROTATE_GRID": VariableKind("grid", "x0, y0, z0, x1, y1, z1"),
-    "SCALE_GRID": VariableKind("grid"),
-    "FFD_SETTING": VariableKind("boxes"),
-    "FFD_CONTROL_POINT": VariableKind("ffd", "BOX, i, j, k, dx, dy, dz", several="dx, dy, dz"),
-    "FFD_CONTROL_POINT_2D": VariableKind("ffd", "BOX, i, j, dx, dy", several="dx, dy"),
-    "FFD_CAMBER": VariableKind("ffd", "BOX, i, j"),
-    "FFD_CAMBER_2D": VariableKind("ffd", "BOX, i"),
-    "FFD_THICKNESS": VariableKind("ffd", "BOX, i, j"),
-    "FFD_THICKNESS_2D": VariableKind("ffd", "BOX, i"),
-    "FFD_TWIST": VariableKind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1"),
-    "FFD_ROTATION": VariableKind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
-    "FFD_CONTROL_SURFACE": VariableKind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
-    "FFD_GULL": VariableKind("ffd", "BOX, j"),
-    "FFD_NACELLE": VariableKind("ffd", "BOX, i, j, k, dr, dx"),
-    "FFD_ANGLE_OF_ATTACK": VariableKind("ffd", "BOX, one"),
-    "FFD_TWIST_2D": VariableKind(
-        "ffd",
-        "BOX, x, y",
-        refused="is not supported: it moved nothing in SU2 7, and SU2 8 lacks it",
-    ),
-    "ELECTRIC_FIELD": VariableKind("nothing", "one, two"),
-    "YOUNG_MODULUS": VariableKind("nothing"),
-    "POISSON_RATIO": VariableKind("nothing"),
-    "STRUCTURAL_DENSITY": VariableKind("nothing"),
-    "DEAD_WEIGHT": VariableKind("nothing"),
-}
+_ROWS = tomllib.loads(Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
+KINDS = {name: VariableKind(**row) for name, row in _ROWS.items()}
 """SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
 WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
 """Groups whose values mean nothing."""
