@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from slideviz import __version__
 from slideviz.cli.argument_readers import glued
-from slideviz.cli.commands import COMMANDS
+from slideviz.cli.commands import COMMANDS, add_arguments
 from slideviz.errors import CaseError, nearest
 
 _DESCRIPTION = """\
@@ -134,8 +134,7 @@ def _parser(names: Iterable[str]) -> ArgumentParser:
             epilog=row.examples or row.epilog,
             formatter_class=RawDescriptionHelpFormatter if row.examples else HelpFormatter,
         )
-        for add in row.arguments:
-            add(call)
+        add_arguments(call, row.arguments)
         run = partial(_command, name)
         call.set_defaults(command=run, holds=row.holds, wrong_usage=call.error)
     return parser
