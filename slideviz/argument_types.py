@@ -16,8 +16,17 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Union, get_args
-from typing import get_origin as origin_of
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,6 +66,15 @@ class _Misfit(NamedTuple):
     place: str
     value: object
     needed: Any
+
+
+def origin_of(hint: Any) -> Any:
+    """Return the class of a type with arguments, such as tuple or np.ndarray; None of others.
+
+    From NumPy 2.5 on, ``NDArray`` is an alias, whose value is an array's type.
+    """
+    origin = get_origin(hint)
+    return get_origin(getattr(origin or hint, "__value__", None)) or origin
 
 
 def check_types(function: Callable[P, Result]) -> Callable[P, Result]:
@@ -170,7 +188,7 @@ def _misfit(value: object, hint: Any, place: str) -> _Misfit | None:
 def _fits(value: Any, hint: Any, kind: Any, inner: tuple[Any, ...]) -> bool:
     """Return whether a value is of a type that is not a union, whatever is in it."""
     if hint is ArrayLike or kind is np.ndarray:
-        return _is_numeric(value, whole=kind is np.ndarray and "int" in str(inner[1]))
+        return _is_numeric(value, whole=kind is np.ndarray and "int" in str(hint))
     if kind is Literal:
         # Which of several texts it is has better words where the text is used.
         return isinstance(value, str) and (value in inner or len(inner) > 1)
@@ -229,7 +247,7 @@ def _type_words(hint: Any) -> str:
     if kind is Annotated:
         return str(inner[1])
     if hint is ArrayLike or kind is np.ndarray:
-        return "an array of whole numbers" if "int" in str(inner[1:2]) else "an array of numbers"
+        return "an array of whole numbers" if "int" in str(hint) else "an array of numbers"
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if len(members := _members(hint)) > 1:

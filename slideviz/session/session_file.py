@@ -17,13 +17,13 @@ from dataclasses import dataclass, field, is_dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args
 from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import annotations_of
+from slideviz.argument_types import annotations_of, origin_of
 from slideviz.case.cfg import case_of_text, case_text
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, SlidevizError, printable
@@ -318,7 +318,7 @@ class _Reader:
         ``name``: the field that it is the value of.
         """
         inner = get_args(kind)
-        kind = get_origin(kind) or kind
+        kind = origin_of(kind) or kind
         if kind in (Union, UnionType):
             return self._first(value, inner, name)
         if kind is Literal and value in inner:
@@ -331,7 +331,8 @@ class _Reader:
             if points.shape == mesh.points.shape and np.isfinite(points).all():
                 return mesh.with_points(points)
         if kind is np.ndarray:
-            return self._numbers(value, get_args(inner[1])[0], name)
+            (number,) = get_args(inner[-1]) or inner  # of a dtype, or of an alias
+            return self._numbers(value, number, name)
         if is_dataclass(kind) and isinstance(value, dict):
             return self._dataclass(dict(value), kind)
         if kind in (tuple, frozenset) and isinstance(value, list):
