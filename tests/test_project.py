@@ -12,6 +12,7 @@ import yaml
 
 import slideviz
 from slideviz.cli import PACKAGES
+from slideviz.system import libraries
 from tools import smoke
 
 ROOT = Path(__file__).parents[1]
@@ -76,6 +77,15 @@ def test_every_dependency_has_a_tested_version():
     wanted = [*PROJECT["project"]["dependencies"], *chain.from_iterable(extras)]
     wanted = [line for line in wanted if not line.startswith("slideviz[")]  # its own extras
     assert {_name(line) for line in wanted} <= pinned
+
+
+def test_setup_installs_the_libraries_that_the_window_needs():
+    text = (ROOT / "tools" / "setup.sh").read_text(encoding="utf-8")
+    (listed,) = re.findall(r"^PACKAGES=\((.*?)\)$", text, re.MULTILINE | re.DOTALL)
+    # These come with one of the others.
+    assert {*libraries.WINDOW.values(), *libraries.OPENGL} - {*listed.split()} <= {
+        "libx11-xcb1", "libxcb-xkb1", "libgl1-mesa-dri",
+    }  # fmt: skip
 
 
 def _name(requirement: str) -> str:

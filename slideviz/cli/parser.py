@@ -14,6 +14,7 @@ from slideviz import __version__
 from slideviz.cli.argument_readers import glued
 from slideviz.cli.commands import COMMANDS, add_arguments
 from slideviz.errors import CaseError, nearest
+from slideviz.system.libraries import apt_install, missing_for_window
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -109,6 +110,11 @@ def _window(arguments: Namespace) -> int:
     why = display_fault() if sys.platform.startswith("linux") else ""
     if why:
         raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
+    if packages := missing_for_window():
+        raise CaseError(
+            "the window needs libraries of the system that are not installed; on Debian or Ubuntu "
+            f"use `{apt_install(packages)}`"
+        )
     # Late: the window takes 2 s.
     from slideviz.gui.app import launch
 

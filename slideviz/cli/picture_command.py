@@ -12,7 +12,7 @@ from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
-from slideviz.export.offscreen import check_png, check_size
+from slideviz.export.offscreen import check_drawable, check_png
 from slideviz.mesh.model import Mesh
 from slideviz.scene.overview import require_detail
 from slideviz.solver.deform import Step
@@ -21,7 +21,7 @@ from slideviz.solver.deform import Step
 def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, and write a picture of a step; return the exit code."""
     check_png(arguments.output)
-    check_size(arguments.size)
+    check_drawable(arguments.size)
     case, mesh = read_inputs(arguments)
     require_detail(arguments.zoom, mesh)
     beside: tuple[Case, Step] | Literal["undeformed"] | None = None

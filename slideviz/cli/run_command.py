@@ -234,11 +234,11 @@ def _require_output_paths(
         )
     if arguments.picture:
         # Late: VTK takes 0.6 s.
-        from slideviz.export.offscreen import check_png, check_size
+        from slideviz.export.offscreen import check_drawable, check_png
         from slideviz.export.offscreen_renderer import PICTURE_SIZE
 
         check_png(arguments.picture)
-        check_size(arguments.picture_size or PICTURE_SIZE)
+        check_drawable(arguments.picture_size or PICTURE_SIZE)
     require_output_paths(
         arguments,
         mesh,

@@ -16,7 +16,7 @@ from typing import Any
 
 from slideviz.errors import SlidevizError
 from slideviz.export.encode import MAX_FPS, EncoderSettings, Pixels, film_kind, targets, writer
-from slideviz.export.offscreen import LETTERS, check_size
+from slideviz.export.offscreen import LETTERS, check_drawable
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
 from slideviz.export.titles import (
@@ -80,7 +80,7 @@ def check_film(
     """
     kind = film_kind(file)
     size = film_options.pixels(file)
-    check_size(size)
+    check_drawable(size)
     if kind == ".mp4" and (size[0] % 2 or size[1] % 2):
         raise SlidevizError(
             f"an MP4 of {size[0]}x{size[1]} pixels cannot be made: width and height must be even; "

@@ -8,18 +8,23 @@ import socket
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  # whose windows vtkRenderWindow makes
 from numpy.typing import NDArray
 from PIL import Image
+from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.scene.legend import set_letters
+from slideviz.system.libraries import OPENGL, apt_install, is_loadable
 
 SMALLEST = 64
 LARGEST = 8192
@@ -29,18 +34,16 @@ _NORMAL_HEIGHT = 620  # height in pixels of a picture with letters of normal siz
 CAPTION_AT = 0.02  # left end of the title of a picture or film, relative to the width
 LETTERS = 1.25
 """Size of the letters of pictures and films relative to the view's; they are often shown small."""
+_OSMESA = ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6")
 
 
 @contextmanager
 def offscreen(size: tuple[int, int]) -> Iterator[Any]:
     """Yield an off-screen plotter of ``size`` pixels, which works without a display too.
 
-    Raises SlidevizError if the size cannot be drawn.
+    Raises SlidevizError if the size cannot be drawn, or nothing can.
     """
-    check_size(size)
-    if sys.platform.startswith("linux") and not has_x_server():
-        # VTK would try X first, and log errors, before it uses EGL.
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    check_drawable(size)
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
     try:
         plotter.set_background("white")  # type: ignore[arg-type]  # the decorator loses self
@@ -50,13 +53,35 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
         plotter.close()
 
 
-def check_size(size: tuple[int, int]) -> None:
-    """Raise SlidevizError if a picture cannot have this width and height in pixels."""
+def check_drawable(size: tuple[int, int]) -> None:
+    """Raise SlidevizError if a picture of this width and height in pixels cannot be drawn."""
     if not all(SMALLEST <= length <= LARGEST for length in size):
         raise SlidevizError(
             f"a picture of {size[0]}x{size[1]} pixels cannot be drawn; width and height are "
             f"{SMALLEST} to {LARGEST}"
         )
+    if not has_opengl():
+        raise SlidevizError(
+            "pictures need OpenGL, which this system does not have; on Debian or Ubuntu use "
+            f"`{apt_install(OPENGL)}`"
+        )
+
+
+@cache
+def has_opengl() -> bool:
+    """Return whether VTK finds a library to draw with; without one it would crash."""
+    if not sys.platform.startswith("linux"):
+        return True
+    if has_x_server():
+        return is_loadable(("libGLX.so.0", "libGL.so.1"))
+    # VTK would try X first, and log errors, before it uses EGL.
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    shown = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    kind = vtkRenderWindow().GetClassName()
+    vtkLogger.SetStderrVerbosity(shown)
+    # VTK's last resort, which it takes without a look whether its library is there.
+    return kind != "vtkOSOpenGLRenderWindow" or is_loadable(_OSMESA)
 
 
 def font_scale(size: tuple[int, int]) -> float:

@@ -20,8 +20,8 @@ from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import (
     LETTERS,
     TITLE,
+    check_drawable,
     check_png,
-    check_size,
     image_of,
     offscreen,
     png_bytes,
@@ -159,7 +159,7 @@ class OffscreenRenderer:
         the one that the session shows.
         """
         shown = self.session if frame is None else show_frame(self.session, frame)
-        check_size(options.size)
+        check_drawable(options.size)
         yield from self.prepare_steps()
         sessions = self.shown(shown, options)
         if aim:
