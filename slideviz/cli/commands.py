@@ -33,6 +33,7 @@ class Command:
     examples: str = ""  # instead of an epilog, its lines as they are
     holds: bool = False
     """Whether notes and warnings wait until nothing can be refused any more."""
+    compiles: bool = True  # whether it may compile loops, and says so
 
 
 _WORDS = {

@@ -143,4 +143,6 @@ def _parser(names: Iterable[str]) -> ArgumentParser:
         add_arguments(call, row.arguments)
         run = partial(_command, name)
         call.set_defaults(command=run, holds=row.holds, wrong_usage=call.error)
+        if not row.compiles:
+            call.set_defaults(quiet=True)
     return parser
