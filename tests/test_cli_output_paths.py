@@ -146,7 +146,7 @@ def path_options(name: str) -> set[str]:
     """Return what the arguments of a command are called that are paths."""
     calls = next(
         action
-        for action in parser._parser([name])._actions
+        for action in parser.command_parser([name])._actions
         if isinstance(action, argparse._SubParsersAction)
     )
     return {action.dest for action in calls.choices[name]._actions if action.type is Path}

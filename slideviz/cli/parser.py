@@ -49,7 +49,7 @@ def parse(argv: Sequence[str]) -> Namespace:
             parser.error(f"there is no command or file {argv[0]!r}{meant}")
         return parser.parse_args(argv)
     called = argv[:1] if argv[0] in COMMANDS else COMMANDS
-    return _parser(called).parse_args(glued(argv))
+    return command_parser(called).parse_args(glued(argv))
 
 
 class _Parser(ArgumentParser):
@@ -126,7 +126,8 @@ def _command(name: str, arguments: Namespace) -> int:
     return int(import_module(f"slideviz.cli.{name}_command").main(arguments))
 
 
-def _parser(names: Iterable[str]) -> ArgumentParser:
+def command_parser(names: Iterable[str]) -> ArgumentParser:
+    """Return a parser of some commands."""
     parser = _base()
     calls = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, parser_class=_Parser
