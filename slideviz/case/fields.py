@@ -48,6 +48,7 @@ class CaseFields(CheckedFields):
     origin: terms.Vector = (0.0, 0.0, 0.0)
     direction: int | None = None
     span: tuple[str, str] | None = None
+    span_axis: terms.Vector | None = None
     feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
     curved: bool = False
     steps: Annotated[int, 'a whole number, or "auto"'] = 1

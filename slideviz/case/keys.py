@@ -650,6 +650,16 @@ PERIODIC_ROWS = (
     setting("PERIODIC_AXIS", AXIS, idle_reason=no_pair),
     setting("PERIODIC_ORIGIN", POINT, idle_reason=no_pair),
     setting("SPAN", ENDS),
+    setting(
+        "SPAN_AXIS",
+        replace(
+            AXIS,
+            allowed=f"AUTO | {AXIS.allowed}",
+            read=lambda text: None if text.upper() == "AUTO" else AXIS.read(text),
+            write=lambda axis: "AUTO" if axis is None else AXIS.write(axis),
+            entry="text",
+        ),
+    ),
 )
 
 

@@ -35,7 +35,9 @@ class Case(CaseFields):
     * ``reference_file``: the undeformed mesh, if ``mesh_file`` was deformed from it.
     * ``mesh_format``, ``mesh_out_format``: None: by the ending of the file.
     * ``axis``, ``origin``: direction and a point of the axis of rotational periodicity.
-    * ``span``: hub and shroud, between which the span is from 0 to 1; None: by their names.
+    * ``span``: hub and shroud, or root and tip of a wing, between which the span is from 0 to 1;
+      None: by their names, or where the wing meets a flat boundary. ``span_axis``: the direction of
+      a straight span; None: the normal of flat walls that do not turn about ``axis``.
     * ``direction``, ``curved``: RBF-SliDe's, without effect: both are found from the mesh.
       ``direction`` is 0, 1, 2 for x, y, z or r, theta, z, or None.
     * ``feature_angle_deg``: the angle in degrees from which a bend in a boundary is an edge; the
@@ -123,6 +125,12 @@ class Case(CaseFields):
     def markers_with(self, role: terms.Role) -> tuple[str, ...]:
         """Return the names of the markers with a role, in the order of ``roles``."""
         return tuple(name for name, given in self.roles.items() if given == role)
+
+    @property
+    def around_span(self) -> tuple[object, ...]:
+        """Return the fields of the case on which the span of a mesh depends."""
+        roles = tuple(self.roles.items())
+        return self.span, self.span_axis, self.axis, self.origin, self.periodic_type, roles
 
     def walls(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return those of the boundaries ``names`` that are neither periodic nor internal.

@@ -26,7 +26,7 @@ from slideviz.plots.meridional import draw_meridional, meridional_bins
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, require_picture_name
 from slideviz.sections.model import Section
-from slideviz.sections.span import SpanWalls, find_walls
+from slideviz.sections.span import SpanWalls, between_walls, find_walls
 from slideviz.session.passages import find_period, find_periods, keeps, passages
 from slideviz.streaming.quality import quality_blocks
 from slideviz.streaming.source import cut_cells, join_blocks
@@ -222,7 +222,7 @@ def _section_and_passages(
         base = read_base() or mesh
         periods = find_periods(base, case)
         walls = find_walls(base, case, periods, arguments.between, about, WALLS_OPTION)
-        chosen = replace(chosen, walls=walls)
+        chosen = between_walls(chosen, walls)
     if not arguments.copies:
         return chosen, {0: np.eye(4)}
     if pair is None:

@@ -21,6 +21,7 @@ from slideviz.machine.smallest_distances import (
     smallest,
     turned,
 )
+from slideviz.machine.straight_span import StraightSpan
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.interfaces import ROUNDING
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, frozen_array
@@ -183,10 +184,14 @@ class _Measure:
         self.turn = lambda points, k: transformed(points, model.matrix(k)) if model else points
         self.walls: SpanChannel | None = None
         # Without hub and shroud, distances are not by span; a SPAN that is wrong is an error.
-        with suppress(CaseError) if case.span is None else nullcontext():
+        unknown = case.span is None and case.span_axis is None
+        with suppress(CaseError) if unknown else nullcontext():
             self.walls = find_walls(mesh, case, pairs).channels[0] if mesh.dim == 3 else None
         ends = () if self.walls is None else (self.walls.hub, self.walls.shroud)
-        self.blades = tuple(n for n in case.markers_with("moving") if n not in ends)
+        moving = case.markers_with("moving")
+        self.blades = tuple(name for name in moving if name not in ends)
+        if self.walls is not None and isinstance(self.walls.field, StraightSpan):
+            self.blades = self.blades or moving  # a wing is its own tip
 
     def all(self, between: Sequence[tuple[str, str]]) -> Iterator[Gap]:
         throat = self.throat() if self.blades else None

@@ -25,7 +25,7 @@ from slideviz.plots.section_picture import (
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange
-from slideviz.sections.span import ConstantSpan, find_walls
+from slideviz.sections.span import ConstantSpan, between_walls, find_walls
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.passages import find_periods, matrices, period_of, show_passages
@@ -194,7 +194,7 @@ def section(
         base = reference or mesh
         walls = find_walls(base, case, find_periods(base, case), between)
         of = walls.field
-        at = ConstantSpan("span", of.origin, of.axis, span=span or 0.0, walls=walls)
+        at = between_walls(ConstantSpan("span", of.origin, of.axis, span=span or 0.0), walls)
     if color_map not in COLOR_MAPS:
         raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")
     measured = quality(mesh, reference=reference) if rated is None else rated

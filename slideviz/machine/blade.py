@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.machine.span_field import SpanCurves, SpanField
+from slideviz.machine.span import Span
 from slideviz.mesh.model import FloatArray, IntArray
 
 SECTIONS = 24  # sections of a blade, of which centroids and edges are found
@@ -102,7 +102,7 @@ class BladeSections:
 
     def __init__(
         self,
-        field: SpanField,
+        field: Span,
         points: FloatArray,
         triangles: IntArray,
         stack: FloatArray | None = None,
@@ -125,11 +125,11 @@ class BladeSections:
             away = (coords[:, 2] + self._turns).mean() - middle[2]
             middle[2] += period * np.round(away / period)
         self.field = field
-        self.curves = SpanCurves(field, middle[:2])
+        self.curves = field.curves_through(middle[:2])
         plane = self.curves.plane(coords)
         plane[:, 1] += self._turns
         self.spans = plane[:, 2]
-        self._radius = coords[:, 1]
+        self._radius = field.girth(coords)
         self._start = plane[:, 0] + 1j * plane[:, 1]
         self._length = self.curves.length(plane)
         low = self.spans.min()

@@ -32,10 +32,11 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.machine.span import Curves, Distances, Span, facets_of
 from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
-from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
+from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.system.weak_cache import weak_cache
@@ -57,11 +58,9 @@ ON_AXIS = 1e-9  # a point nearer to the axis, as a part of the largest radius, h
 
 WHOLE = 2.0 * np.pi  # the period of a mesh that repeats by no rotation
 
-Distances = tuple[FloatArray, FloatArray, FloatArray]
-
 
 @dataclass(frozen=True, eq=False)
-class SpanField:
+class SpanField(Span):
     """The normalised span between two walls, and meridional coordinates about the axis."""
 
     axis: tuple[float, float, float]
@@ -73,6 +72,8 @@ class SpanField:
     holes: IntArray  # (t, 4): nodes of triangles that close holes of walls contoured along theta
     start: tuple[float, float] = (0.0, 0.0)  # z and r of a node in the middle between the walls
 
+    words = ("z", "r")
+
     @cached_property
     def curves(self) -> SpanCurves:
         """Return curves of constant span that begin in the middle of the passage.
@@ -80,6 +81,13 @@ class SpanField:
         Raises MeshError as `SpanCurves` does.
         """
         return SpanCurves(self, self.start)
+
+    @property
+    def first_coords(self) -> FloatArray:
+        return np.array([[*self.start, self.middle]])
+
+    def curves_through(self, start: FloatArray) -> SpanCurves:
+        return SpanCurves(self, start)
 
     @property
     def revolved(self) -> bool:
@@ -108,31 +116,32 @@ class SpanField:
         out[:, :, 2] = (r * cos)[:, None] * e[1] - (r * sin)[:, None] * e[0]
         return out
 
-    def span(self, coords: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the span (n,) at meridional coordinates (n, 3), and its derivative (n, 3) by them.
+    def girth(self, coords: FloatArray) -> FloatArray:
+        return coords[:, 1]
 
-        Beyond a wall it is below 0, or above 1.
-        """
-        return self.span_of(self.distances(coords))
+    def branch(self, coords: FloatArray) -> FloatArray:
+        turns = np.round((coords[:, 2] - self.middle) / (2.0 * np.pi))
+        return coords - np.outer(2.0 * np.pi * turns, (0.0, 0.0, 1.0))
 
-    def span_of(self, ends: Sequence[Distances]) -> tuple[FloatArray, FloatArray]:
-        """Return the same as `span`, of `distances`."""
-        (hub, to_hub, _), (shroud, to_shroud, _) = ends
-        total = hub + shroud
-        total = np.where(np.abs(total) > 0.0, total, 1.0)
-        slope = (shroud[:, None] * to_hub - hub[:, None] * to_shroud) / total[:, None] ** 2
-        out = np.zeros((len(slope), 3))
-        out[:, : slope.shape[1]] = slope
-        out[:, 2] *= self.radius
-        return hub / total, out
+    def shift(self, pair: Pair) -> float:
+        return pair.angle
+
+    @cached_property
+    def level_scale(self) -> float:
+        if self.revolved:
+            return 1.0
+        least = min(float(wall.corners[..., 1].min()) for wall in self.walls)
+        return max(least, 1e-3 * self.radius) / self.radius
+
+    def begin(self, spans: FloatArray) -> FloatArray:
+        ends = []
+        for wall in self.walls:
+            coords = np.unique(wall.corners[..., :2].reshape(-1, 2), axis=0)
+            coords = np.column_stack([coords, np.full(len(coords), self.middle)])
+            ends.append(coords[np.argmin(self.curves.plane(coords)[:, 0])])
+        return np.outer(1.0 - spans, ends[0]) + np.outer(spans, ends[1])
 
     def distances(self, coords: FloatArray) -> list[Distances]:
-        """Return for hub and shroud distances (n,), their slopes (n, d), and how oblique they are.
-
-        Distances are negative beyond a wall. Oblique is the sine (n,) of the angle between the way
-        to the wall and its normal: it is not small where the wall has ended. d is 2 where theta
-        does not matter; else the slope's third number is that along radius theta.
-        """
         x = coords[:, : self.walls[0].corners.shape[2]].copy()
         x[:, 2:] *= self.radius
         hub, at_hub = self.walls[0].nearest(x)
@@ -209,13 +218,7 @@ def _span_between(
 ) -> SpanField:
     if mesh.dim != 3:
         raise MeshError(f"{mesh.name}: the span between two boundaries needs a mesh in 3D")
-    boundary = boundary_of(mesh)
-    facets = list[IntArray]()
-    for name in (hub, shroud):
-        mesh.marker(name)  # which knows what to say of an unknown one
-        facets.append(boundary.facets[boundary.marker == boundary.names.index(name)])
-        if not len(facets[-1]):
-            raise MeshError(f"{mesh.name}: boundary {name!r} has no facets, so there is no span")
+    facets = [facets_of(mesh, name) for name in (hub, shroud)]
     nodes = np.unique(np.concatenate([table.ravel() for table in facets]))
     local = in_axis_frame(mesh.points[nodes], axis, origin)
     tables = [np.searchsorted(nodes, table) for table in facets]
@@ -223,8 +226,8 @@ def _span_between(
         raise MeshError(
             f"{mesh.name}: hub {hub!r} and shroud {shroud!r} do not turn about the axis "
             f"{tuple(axis)} through {tuple(origin)}, and a span needs an axis; correct "
-            "PERIODIC_AXIS and PERIODIC_ORIGIN, name the periodic sides of a passage, or move the "
-            "boundaries of a wing in another way, e.g. by rotate or ffd-twist"
+            "PERIODIC_AXIS and PERIODIC_ORIGIN, name the periodic sides of a passage, or give the "
+            "direction of a straight span by SPAN_AXIS, e.g. SPAN_AXIS= y"
         )
     x, y, _ = local.T
     middle = float(np.arctan2(y.sum(), x.sum()))
@@ -255,7 +258,7 @@ def _face(field: SpanField, coords: FloatArray) -> bool:
     return bool(apart and np.median(opposite) > FACING)
 
 
-class SpanCurves:
+class SpanCurves(Curves):
     """Curves of constant span in the meridional plane: the maps to (m', theta, span) and back.
 
     m' and m are 0 on the line from hub to shroud through ``start`` that is normal to the curves.
@@ -264,7 +267,7 @@ class SpanCurves:
     until the span is exact. Beyond the rims of the walls curves go on straight.
     """
 
-    def __init__(self, field: SpanField, start: Sequence[float]) -> None:
+    def __init__(self, field: SpanField, start: Sequence[float] | FloatArray) -> None:
         """Trace the curves; ``start``: z and r of a point between the walls.
 
         Raises MeshError if it is not between them, or on the axis.
@@ -342,10 +345,6 @@ class SpanCurves:
     def growth(self, m_prime: FloatArray, span: FloatArray) -> FloatArray:
         """Return the derivative dm / dm' (n,) at m' of the curves at spans (n,)."""
         return self._value(span, m_prime, 2, 1)
-
-    def coords(self, plane: FloatArray) -> FloatArray:
-        """Return meridional coordinates (n, 3) of (m', theta, span), (n, 3)."""
-        return self.coords_and_slopes(plane)[0]
 
     def coords_and_slopes(self, plane: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return meridional coordinates (n, 3), and their derivatives (n, 3, 2) by (m', theta).

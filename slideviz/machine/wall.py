@@ -43,18 +43,25 @@ def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
     Flat walls alone, as those beside a wing, have no axis. ``local`` (n, 3): Cartesian, in the
     frame of the axis. ``walls``: facets (f, 4) of each.
     """
-    flat = []
+    flat = [plane_normal(local, facets) is not None for facets in walls]
     for facets in walls:
         vectors = facet_vectors(local, facets)
         middles = local[facets].mean(axis=1)
         size = row_norms(vectors)
-        flat.append(np.linalg.norm(vectors.sum(axis=0)) >= (1.0 - PLANE) * size.sum())
         across = vectors[:, 1] * middles[:, 0] - vectors[:, 0] * middles[:, 1]
         normal = size * np.hypot(middles[:, 0], middles[:, 1])
         along_theta = across / np.where(normal > 0.0, normal, 1.0)
         if np.sqrt(np.average(along_theta**2, weights=size)) > TURNED:
             return False
     return not all(flat) or all(_is_ring(local[np.unique(facets)]) for facets in walls)
+
+
+def plane_normal(points: FloatArray, facets: IntArray) -> FloatArray | None:
+    """Return the unit normal (3,) of a flat wall, of either sign; None if it is not flat."""
+    vectors = facet_vectors(points, facets)
+    total = vectors.sum(axis=0)
+    length = np.linalg.norm(total)
+    return total / length if length >= (1.0 - PLANE) * row_norms(vectors).sum() else None
 
 
 def _is_ring(local: FloatArray) -> bool:

@@ -36,6 +36,7 @@ class MeridionalBins:
     bin_of: IntArray  # (m,): the bin of each cell, row by row
     walls: tuple[str, str]
     cells: slice  # those of the zone in the mesh
+    words: tuple[str, str]  # what both coordinates of places are called
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -95,7 +96,9 @@ def _zone_bins(whole: Mesh, walls: SpanChannel) -> MeridionalBins:
     m_prime = curves.at_length((low + share * (high - low)).ravel(), span.ravel())
     plane = np.stack([m_prime, 0.0 * m_prime, span.ravel()], axis=1)
     places = curves.traced(plane).reshape(k + 1, n + 1, 2)
-    return MeridionalBins(places, at_row * n + at_column, (walls.hub, walls.shroud), part)
+    named = walls.hub, walls.shroud
+    bin_of = at_row * n + at_column
+    return MeridionalBins(places, bin_of, named, part, walls.field.words)
 
 
 def _bins_of(mesh: Mesh, used: FloatArray) -> int:
@@ -117,7 +120,7 @@ def draw_meridional(
 ) -> None:
     """Draw the means of values of all cells by z and r, with a color bar."""
     axes: Any = figure.add_subplot()
-    style_axes(axes, style, "z [mesh units]", "r [mesh units]")
+    style_axes(axes, style, *(f"{word} [mesh units]" for word in zones[0].words))
     axes.grid(False)
     for bins in zones:
         z, r = np.moveaxis(bins.places, -1, 0)

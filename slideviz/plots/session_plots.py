@@ -133,7 +133,7 @@ def _profile(
             profile = along(mesh, values, coordinate, case.axis, case.origin, label=label)
         return replace(profile, series=UNDEFORMED if run is None else series_of(run))
 
-    key = coordinate, case.axis, case.origin, case.span, label
+    key = coordinate, case.around_span, label
     return _PROFILES.of(frame, key, made)
 
 
@@ -185,7 +185,7 @@ def gaps_of(session: Session) -> list[Measured]:
     """
     case = session.case
     run = session.run_shown
-    key = tuple(case.roles.items()), case.span, case.axis, case.origin, case.periodic_type
+    key = case.around_span
     measured: list[Measured] = []
     for frame in dict.fromkeys((session.first, session.frame)):
         if frame is None:

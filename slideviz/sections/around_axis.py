@@ -156,15 +156,10 @@ class AboutAxis(Section):
 
     def patch(self, points: FloatArray) -> Patch:
         """Return the part of it at points (n, 3): those of its cut or, if none, of the mesh."""
-        angle, along = self.places(points).T
-        turned = np.sort(angle)
-        gaps = np.diff(turned, append=turned[0] + TURN)
-        # Angles count from the end of the widest gap, so that no seam is between them.
-        start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
-        angle = start + (angle - start) % TURN
+        places = self.opened(self.places(points))
+        angle, along = places.T
         low = (float(angle.min()), float(angle.max()))
         high = (float(along.min()), float(along.max()))
-        places = np.column_stack([angle, along])
         middle = np.array([np.mean(low), np.mean(high)])
         flat = (places - middle) * (self.girth(float(middle[1])), 1.0)
         far = row_norms(flat)
@@ -173,6 +168,14 @@ class AboutAxis(Section):
             middle = places[nearest]
         some = places[:: max(len(places) // _MOST, 1)]
         return Patch(low, high, (float(middle[0]), float(middle[1])), some)
+
+    def opened(self, places: FloatArray) -> FloatArray:
+        """Return places (n, 2) with no seam: angles count from the end of their widest gap."""
+        angle, along = places.T
+        turned = np.sort(angle)
+        gaps = np.diff(turned, append=turned[0] + TURN)
+        start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
+        return np.column_stack([start + (angle - start) % TURN, along])
 
     def facing(self, points: FloatArray) -> FloatArray:
         """Return the camera's axes (3, 3) to look from outside at the middle of points (n, 3).

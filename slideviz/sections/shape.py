@@ -158,6 +158,8 @@ class Section:
     def __new__(cls, kind: str = "", *_: object, **__: object) -> Self:
         """Return a section of the class of the shape ``kind``; raises CaseError if of another."""
         shape = SHAPES.get(kind, cls)
+        if issubclass(cls, shape):  # a kind of that shape
+            shape = cls
         if not issubclass(shape, cls):  # it would have the default numbers
             raise CaseError(
                 f"{kind} section: a {cls.terms.value} cannot become one; make a new one"

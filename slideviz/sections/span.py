@@ -8,7 +8,7 @@ this shape; shapes of arrays are in `slideviz.sections.shape` and
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Self
 
@@ -16,15 +16,18 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
-from slideviz.case.spans import WALLS_KEY, span_ends
+from slideviz.case.spans import WALLS_KEY, span_between, span_ends
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import CaseError
-from slideviz.machine.span_field import WHOLE, SpanCurves, SpanField, find_span
+from slideviz.machine.span import Curves, Span
+from slideviz.machine.straight_span import StraightSpan
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import names_from
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
-from slideviz.sections.shape import Label, Triple
+from slideviz.sections.plane import Plane
+from slideviz.sections.polygons import Polygons
+from slideviz.sections.shape import Label, Section, Triple, triple
 
 _SPANS = np.linspace(0.0, 1.0, 33)  # at which zones are joined to each other
 _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number of right digits
@@ -36,42 +39,24 @@ class SpanChannel:
 
     hub: str  # its boundary, as that of the shroud
     shroud: str
-    field: SpanField
+    field: Span
     zone: int  # the number of the zone in the mesh, from 0
 
     @property
-    def curves(self) -> SpanCurves:
+    def curves(self) -> Curves:
         """Return the curves of constant span."""
         return self.field.curves
-
-    @cached_property
-    def scale(self) -> float:
-        """The most that `level` may change per length, over its usual rate of 1: its inverse."""
-        if self.field.revolved:
-            return 1.0
-        least = min(float(wall.corners[..., 1].min()) for wall in self.field.walls)
-        return max(least, 1e-3 * self.field.radius) / self.field.radius
 
     def level(self, coords: FloatArray, span: float) -> FloatArray:
         """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
         (hub, _, _), (shroud, _, _) = self.field.distances(coords)
-        return ((1.0 - span) * hub - span * shroud) * self.scale
+        return ((1.0 - span) * hub - span * shroud) * self.field.level_scale
 
     def outside(self, coords: FloatArray) -> FloatArray:
         """Return numbers (n,): 0 between the walls, and more beyond them or their rims."""
         ends = self.field.distances(coords)
         span = self.field.span_of(ends)[0]
         return np.maximum(np.maximum(-span, span - 1.0), 0.0) + np.maximum(ends[0][2], ends[1][2])
-
-    @cached_property
-    def begin(self) -> FloatArray:
-        """Meridional coordinates (s, 3) at `_SPANS`, on a line between the first ends of walls."""
-        ends = []
-        for wall in self.field.walls:
-            coords = np.unique(wall.corners[..., :2].reshape(-1, 2), axis=0)
-            coords = np.column_stack([coords, np.full(len(coords), self.field.middle)])
-            ends.append(coords[np.argmin(self.curves.plane(coords)[:, 0])])
-        return np.outer(1.0 - _SPANS, ends[0]) + np.outer(_SPANS, ends[1])
 
 
 @dataclass(frozen=True)
@@ -84,7 +69,7 @@ class SpanWalls:
     channels: tuple[SpanChannel, ...]
 
     @property
-    def field(self) -> SpanField:
+    def field(self) -> Span:
         """Return the span of the first zone, with the axis of all."""
         return self.channels[0].field
 
@@ -105,15 +90,16 @@ class SpanWalls:
         """(c, 3, s): by how much m' and m of each zone go on, and m at its begin, at `_SPANS`."""
         out = np.zeros((len(self.channels), 3, len(_SPANS)))
         before = -1
-        middles = [np.array([[*one.field.start, one.field.middle]]) for one in self.channels]
-        order = np.argsort([float(self.field.curves.plane(at)[0, 0]) for at in middles])
+        starts = [one.field.first_coords for one in self.channels]
+        order = np.argsort([float(self.field.curves.plane(at)[0, 0]) for at in starts])
         for k in order.tolist():
             one = self.channels[k]
             last = self.channels[before].curves
-            start = one.curves.plane(one.begin)
+            begin = one.field.begin(_SPANS)
+            start = one.curves.plane(begin)
             length = one.curves.length(start)
             if k != order[0]:
-                met = last.plane(one.begin)
+                met = last.plane(begin)
                 out[k, 0] = out[before, 0] + met[:, 0] - start[:, 0]
                 out[k, 1] = out[before, 1] + last.length(met) - length
             out[k, 2] = out[k, 1] + length
@@ -140,8 +126,7 @@ class SpanWalls:
 
     def _branch(self, k: int, coords: FloatArray) -> FloatArray:
         """Return meridional coordinates (n, 3), theta within half a turn of the walls' middle."""
-        turns = np.round((coords[:, 2] - self.channels[k].field.middle) / (2.0 * np.pi))
-        return coords - np.outer(2.0 * np.pi * turns, (0.0, 0.0, 1.0))
+        return self.channels[k].field.branch(coords)
 
     def level(self, coords: FloatArray, span: float) -> FloatArray:
         """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
@@ -302,6 +287,64 @@ class ConstantSpan(AboutAxis):
         return walls.coords(np.array([[walls.field.middle, along, self.span]]))
 
 
+class SpanPlane(ConstantSpan):
+    """A section of a span along a direction: a plane normal to that, looked at as any plane.
+
+    Its direction is that of the span, and its point one where the span is 0.
+    """
+
+    @cached_property
+    def plane(self) -> Plane:
+        """Return the section as a plane."""
+        field = self.known_walls.field
+        (point,) = field.points(field.begin(np.array([self.span])))
+        return Plane("plane", triple(point), self.direction)
+
+    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+        return along(2) - float((self.plane.point - self.point) @ self.basis[2])
+
+    def crossings(
+        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+    ) -> FloatArray:
+        return self.plane.crossings(edges, level)
+
+    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
+        return self.plane.keeps(turned, step)
+
+    def flatten(self, polygons: Polygons, near: float | None, ahead: float | None) -> Polygons:
+        return self.plane.flatten(polygons, near, ahead)
+
+    def middle_angle(self, polygons: Polygons, near: float | None = None) -> float | None:
+        return None
+
+    def flat_labels(self) -> tuple[Label, Label]:
+        return self.plane.flat_labels()
+
+    def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:
+        return self.plane.flat_matrix(matrix, angle)
+
+    def opened(self, places: FloatArray) -> FloatArray:
+        return places
+
+    def girth(self, along: float) -> float:
+        return 1.0
+
+    def facing(self, points: FloatArray) -> FloatArray:
+        return self.plane.facing(points)
+
+    def aslant(self, points: FloatArray) -> FloatArray:
+        return self.plane.aslant(points)
+
+
+def between_walls(section: Section, walls: SpanWalls) -> Section:
+    """Return a section of constant span between walls, of the class of their kind of span."""
+    values = {each.name: getattr(section, each.name) for each in fields(section)}
+    values["walls"] = walls
+    if not isinstance(walls.field, StraightSpan):
+        return ConstantSpan(**values)
+    return SpanPlane(**values | {"direction": walls.field.axis, "origin": walls.field.origin})
+
+
 def find_walls(
     mesh: Mesh,
     case: Case | None = None,
@@ -315,8 +358,7 @@ def find_walls(
     ``periods``: that of each zone. ``about``: the axis of the span, and a point on it; without that
     it is the axis of the period, and without a period that of the case. ``remedy``: see
     `span_ends`. Zones without walls are left out, unless they all are.
-    Raises CaseError where none are known, or passages are not turned about an axis; and MeshError
-    as `find_span` does.
+    Raises CaseError where none are known, and MeshError as `span_between` does.
     """
     case = case or Case()
     case = case if between is None else case.change(span=between)
@@ -330,16 +372,11 @@ def find_walls(
             continue
         label = names_from(mesh, mesh.parts[number])
         pair = next((each for each in periods if each.first in label.values()), None)
-        if pair is not None and pair.kind != "rotational":
-            if mesh.dim == 3 and one.markers_with("periodic"):
-                raise CaseError(
-                    f"{mesh.name}: passages repeat by {pair.describe()}, but sections of constant "
-                    "span need an axis about which they turn: set PERIODIC_TYPE= rotational"
-                )
+        if pair is not None and pair.kind != "rotational" and not one.markers_with("periodic"):
             pair = None  # it was guessed: inflow and outflow match, too
-        about = about or ((one.axis, one.origin) if pair is None else (pair.axis, pair.origin))
-        period = WHOLE if pair is None else pair.period
-        field = find_span(zone, hub, shroud, *about, period)
+        field = span_between(one, zone, (hub, shroud), pair, about)
+        if not isinstance(field, StraightSpan):
+            about = field.axis, field.origin
         channels.append(SpanChannel(label[hub], label[shroud], field, number))
     if not channels:
         raise missing[0]

@@ -305,7 +305,7 @@ def set_case(session: Session, **values: Any) -> Session:
     Sections of constant span get the walls that SPAN has then.
     """
     changed = replace(session, case=session.case.change(**values))
-    if session.mesh is None or changed.case.span == session.case.span:
+    if session.mesh is None or not {"span", "span_axis"} & {*values}:
         return changed
     bound = bound_sections(session.view.sections, session.mesh, changed.case, session.pairs)
     return set_view(changed, sections=bound)

@@ -155,10 +155,9 @@ def save_steps(
 def intersection_key(session: Session) -> tuple[object, ...]:
     """Return the values on which the check depends: its result holds while they are the same."""
     case = session.case
-    roles = tuple(sorted(case.roles.items()))
-    around = case.span, case.periodic_type, case.axis, case.origin, case.interfaces
+    around = case.around_span, case.interfaces
     rims = case.rims, case.feature_angle_deg
-    return (session.mesh, case.motions, roles, case.periodic, case.sliding, *around, *rims)
+    return (session.mesh, case.motions, case.periodic, case.sliding, *around, *rims)
 
 
 def find_intersection(

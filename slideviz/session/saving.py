@@ -13,7 +13,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.sections.model import Section
-from slideviz.sections.span import find_walls
+from slideviz.sections.span import between_walls, find_walls
 from slideviz.session.state import Run, Session, ViewState
 from slideviz.terms import SHOWN
 
@@ -228,7 +228,7 @@ def with_walls(section: Section, mesh: Mesh, case: Case, pairs: Sequence[Pair] =
         return section
     periods = [pair for pair in pairs if pair.kind == "rotational"]
     about = section.direction, section.origin
-    return replace(section, walls=find_walls(mesh, case, periods, about=about))
+    return between_walls(section, find_walls(mesh, case, periods, about=about))
 
 
 def bound_sections(

@@ -241,9 +241,8 @@ def _bodies(
 
 def rims_key(case: Case) -> object:
     """Return what the rims of a mesh depend on."""
-    period = case.periodic, case.periodic_type, case.axis, case.origin
-    over_span = (case.span, case.motions) if moves_over_span(case) else ()
-    return tuple(case.roles.items()), *period, case.sliding, case.feature_angle_deg, over_span
+    over_span = case.motions if moves_over_span(case) else ()
+    return case.around_span, case.periodic, case.sliding, case.feature_angle_deg, over_span
 
 
 def are_ready(case: Case, mesh: Mesh) -> bool:

@@ -16,7 +16,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_field
 from slideviz.errors import Message, note
-from slideviz.machine.span_field import SpanField
+from slideviz.machine.span import Span
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.topology import TINY
@@ -182,7 +182,7 @@ class Setup(Domain):
     """Settings of the greedy selection; None: all candidates are control nodes."""
     layers: float  # as of a ``Step``
     tracks: Tracks  # the edges and surfaces along which nodes slide
-    span: SpanField | None  # along which blades move; None: they do not
+    span: Span | None  # along which blades move; None: they do not
     solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
     zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
     minimum_gap: float  # of the case, below which layers give way

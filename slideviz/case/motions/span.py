@@ -25,6 +25,7 @@ from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.smallest_distances import bodies
+from slideviz.machine.span import Span
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -290,7 +291,7 @@ def _blade(case: Case, mesh: Mesh, on: NodesOn, names: list[str], places: list[i
         triangles = np.searchsorted(nodes, np.concatenate([some[:, :3], quads[:, [0, 2, 3]]]))
         stack = None if point is None else np.array(point)
         try:
-            turns = _turns(case, mesh, nodes[triangles])[nodes]
+            turns = _turns(case, mesh, field, nodes[triangles])[nodes]
             return BladeSections(field, mesh.points[nodes], triangles, stack, turns)
         except MeshError as problem:
             raise CaseError(f"motion {places[0] + 1}: {', '.join(names)}: {problem}") from problem
@@ -304,8 +305,8 @@ def _blade(case: Case, mesh: Mesh, on: NodesOn, names: list[str], places: list[i
     return Blade(nodes, made, tuple(places), tuple(motions), tuple(reached))
 
 
-def _turns(case: Case, mesh: Mesh, triangles: IntArray) -> FloatArray:
-    """Return the angles (n,) of all nodes by which parts of a blade are turned to be together.
+def _turns(case: Case, mesh: Mesh, field: Span, triangles: IntArray) -> FloatArray:
+    """Return by how much (n,) parts of a blade are moved to be together, in the third coordinate.
 
     ``triangles`` (t, 3): its facets, which periodic sides may cut.
     """
@@ -314,9 +315,12 @@ def _turns(case: Case, mesh: Mesh, triangles: IntArray) -> FloatArray:
     if sides:
         inside = without_halo(mesh)[0]
         pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)
-        images = [pair.nodes if pair.angle > 0.0 else pair.nodes[:, ::-1] for pair in pairs]
+        period = abs(field.shift(pairs[0]))
+        if period == 0.0:  # passages repeat along the span
+            return out
+        images = [p.nodes if field.shift(p) > 0.0 else p.nodes[:, ::-1] for p in pairs]
         for body in bodies(triangles, np.unique(np.concatenate(images), axis=0)):
-            out[triangles[body.facets]] = pairs[0].period * body.turns[:, None]
+            out[triangles[body.facets]] = period * body.turns[:, None]
     return out
 
 

@@ -229,7 +229,7 @@ class CurvesPanel(Panel):
 def _shown(session: Session) -> object:
     case = session.case
     view = session.view.color_by, session.view.color_map, session.view.color_range
-    of_case = case.axis, case.origin, case.motions, case.span, case.roles
+    of_case = case.around_span, case.motions
     return session.frame, session.runs, session.shown, view, of_case
 
 
