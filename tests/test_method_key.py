@@ -145,6 +145,7 @@ SIZES = {
     "turbine-row-3d": 10_000,
     "stator": 5_000,
     "impeller": 3_000,
+    "wing": 2_000,
     "airfoil": 24,
 }
 

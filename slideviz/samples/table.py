@@ -19,6 +19,7 @@ from slideviz.samples.passage import passage_mesh
 from slideviz.samples.stator import stator
 from slideviz.samples.thesis import FILE, Structured, mesh_of, thesis_case, zone_of
 from slideviz.samples.turbine_row import extruded_row, row_mesh
+from slideviz.samples.wing import wing_mesh
 from slideviz.system.atomic import atomic_write, make_folder
 from slideviz.terms import FileFormat
 
@@ -131,6 +132,12 @@ SAMPLES: Mapping[str, SampleKind] = {
         "cells, about",
         12_000,
         lambda name, size, *_: (impeller_mesh(size), sample_case(name), None),
+    ),
+    "wing": SampleKind(
+        "3D: swept, tapered wing on a symmetry plane, twisted over its span and bent up",
+        "cells, about",
+        20_000,
+        lambda name, size, *_: (wing_mesh(size), sample_case(name), None),
     ),
 }
 """Every kind of sample, by name."""

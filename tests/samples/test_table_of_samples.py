@@ -201,6 +201,7 @@ def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, na
         "turbine-row-3d": 10_000,
         "stator": 5_000,
         "impeller": 3_000,
+        "wing": 2_000,
     }
     size = (size | {"airfoil": 16}).get(name, 5)
     paths = write_sample(name, tmp_path / "a" / "b", size, variant)
