@@ -232,6 +232,29 @@ def test_motions_over_span_of_each_zone_have_its_walls(driver, tmp_path):
     assert hub.currentData() == "1:hub"
 
 
+@pytest.mark.window("own")
+def test_a_wing_is_twisted_between_its_root_and_tip(driver, tmp_path):
+    driver.open(write_sample("wing", tmp_path, 2000)[0])
+    window = driver.window
+    window.resize(1280, 800)
+    driver.role("wing", "moving")
+    driver.add_motion(SpanMotion)
+    form = editor(driver)
+    driver.type(form.curve, "0:0, 1:8")
+    root, tip = form.walls.ends
+    assert (root.currentData(), tip.currentData()) == ("symmetry", "wing")
+    mesh = driver.session.mesh
+    moved = window.scene.motion_ghosts["wing"] - mesh.points[mesh.marker("wing").nodes]
+    assert np.abs(moved[:, 1]).max() == 0.0
+    assert np.linalg.norm(moved, axis=1).max() > 0.02
+    driver.choose(form.walls.along, "x")
+    assert driver.session.case.span_axis == (1.0, 0.0, 0.0)
+    assert (root.currentData(), tip.currentData()) == ("wing", "wing"), "no flat wall is across x"
+    driver.choose(form.walls.along, "AUTO")
+    assert driver.session.case.span_axis is None
+    QApplication.processEvents()
+
+
 # Tables ---------------------------------------------------------------------------------------
 
 

@@ -1,9 +1,12 @@
-"""Hub and shroud of a machine, chosen among the boundaries of the mesh."""
+"""Hub and shroud of a machine, or root and tip of a wing, and the direction of its span."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 
+from qtpy.QtWidgets import QVBoxLayout
+
+from slideviz.case.keys import KEYS
 from slideviz.case.spans import span_ends
 from slideviz.errors import CaseError
 from slideviz.gui.widgets.build import Choice, in_row
@@ -13,11 +16,12 @@ from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
-WALLS = {"Hub": "0, the hub", "Shroud": "1, the shroud"}  # each with the span there, in words
+WALLS = {"Hub": "0, the hub or root", "Shroud": "1, the shroud or tip"}
+"""Each with the span there, in words."""
 
 
 class SpanWalls(Panel):
-    """Two drop-down lists for hub and shroud, which are set (SPAN=) once both are chosen."""
+    """Drop-down lists for hub and shroud (SPAN), set once both are chosen, and for SPAN_AXIS."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -32,12 +36,19 @@ class SpanWalls(Panel):
             end.setAccessibleName(name)
             end.setPlaceholderText(f"{name}…")
             end.chosen.connect(self._chosen)
+        self.along = Choice({}, KEYS["SPAN_AXIS"].meaning)
+        self.along.setAccessibleName(KEYS["SPAN_AXIS"].label)
+        self.along.chosen.connect(
+            lambda text: self.change(changes.set_case, span_axis=KEYS["SPAN_AXIS"].kind.read(text))
+        )
         row = in_row(*self.ends, wide=self.ends, spacing=4)
-        row.setContentsMargins(0, 0, 0, 0)
-        self.setLayout(row)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.addLayout(row)
+        rows.addWidget(self.along)
         self._by_name: tuple[str, str] | None = None
         self._blade: tuple[str, ...] = ()
-        self.follow(lambda session: (session.mesh, session.case.span))
+        self.follow(lambda session: (session.mesh, session.case.around_span))
 
     def show_for(self, blade: tuple[str, ...]) -> None:
         """Offer the walls of the zone that has these boundaries; where none has them, of all."""
@@ -64,6 +75,10 @@ class SpanWalls(Panel):
         if span is not None:
             span = names.get(span[0], span[0]), names.get(span[1], span[1])
             span = span if {*span} <= {*names.values()} else None  # of another zone
+        along = KEYS["SPAN_AXIS"].kind.write(case.span_axis)
+        words = {text: f"span along {text}" for text in (*"xyz", along)}
+        self.along.offer(words | {"AUTO": "direction automatic"})
+        self.along.show_value(along)
         for k, end in enumerate(self.ends):
             end.offer({name: name for name in names.values()})
             end.setCurrentIndex(-1)
