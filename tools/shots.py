@@ -82,7 +82,8 @@ STATOR_CELLS = 40_000
 """Approximate number of cells of the sample ``stator``."""
 
 IMPELLER_CELLS = 30_000
-"""Approximate number of cells of the centrifugal compressor."""
+WING_CELLS = 40_000
+"""Approximate numbers of cells of the centrifugal compressor, and of the sample ``wing``."""
 
 TURNED: tuple[Motion, ...] = (
     Rotate("BLADE", 15.0, (0.275, 0.0, 0.0525), (1.0, 0.0, 0.0)),
@@ -182,6 +183,23 @@ def twist(window: MainWindow, place: Path) -> None:
     window.store.change(changes.show_boundaries, OUTER, False)
     window.motions.editor.drawn.setFocus()
     _look(window, 30.0, -8.0)
+
+
+def wing(window: MainWindow, place: Path) -> None:
+    """Show a wing's twist, with its ghost, between the symmetry plane and its tip."""
+    _, case = write_sample("wing", place / "wing", WING_CELLS)
+    _open(window, case)
+    window.store.change(changes.show_boundaries, ("farfield",), False)
+    window.store.change(
+        changes.set_case, motions=(SpanMotion("wing", "twist", (0.0, 1.0), (0.0, 25.0)),)
+    )
+    window.motions.editor.drawn.setFocus()
+    _look(window, 140.0, 0.0)
+    camera = window.scene.plotter.camera
+    camera.focal_point = (0.9, 1.2, 0.0)
+    camera.zoom(4.2)
+    window.viewing.render()
+    settle(window)
 
 
 def handle(window: MainWindow, place: Path) -> None:
@@ -328,6 +346,7 @@ STATES = (
     ShotState("roles", roles),
     ShotState("quality", quality),
     ShotState("twist", twist),
+    ShotState("wing", wing),
     ShotState("handle", handle),
     ShotState("box", box),
     ShotState("wheel", wheel),
