@@ -10,12 +10,7 @@ import signal
 import sys
 
 from slideviz import __version__
-
-_ENDS = {signal.SIGINT: "cancelled", signal.SIGTERM: "ended by SIGTERM"}
-"""Signals that end any command at any moment, with words for a message; the exit code is 128 plus
-the number of the signal."""
-if hasattr(signal, "SIGHUP"):  # Windows has none
-    _ENDS[signal.SIGHUP] = "ended by SIGHUP"
+from slideviz.system.platform import ENDING_SIGNALS, wakeup_pipe
 
 
 def main() -> int:
@@ -49,17 +44,14 @@ def _hold_streams() -> None:
 
 
 def _heed_signals() -> None:
-    """Start a thread that ends the process at a signal of `_ENDS`; ignored signals stay ignored.
+    """Start a thread that ends the process at an ending signal; ignored signals stay ignored.
 
     Python's own handlers raise an error in the main thread at any place: also in the middle of the
     import of VTK or Matplotlib, which crash then, or where a library swallows it. And they do not
     run while compiled code computes.
     """
-    heeded = [number for number in _ENDS if signal.getsignal(number) != signal.SIG_IGN]
-    read, write = os.pipe()
-    os.set_blocking(write, False)
-    _thread.start_new_thread(_wait, (read,))
-    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
+    _thread.start_new_thread(_wait, (wakeup_pipe(),))
     for number in heeded:
         signal.signal(number, lambda *_: None)
     # Functions registered first are called last: signals count until all others are done.
@@ -75,7 +67,7 @@ def _ignore(numbers: list[signal.Signals]) -> None:
 def _wait(read: int) -> None:
     """Wait for a signal at the pipe ``read``, then clean up and end the process with a message."""
     number = 0
-    while number not in _ENDS:
+    while number not in ENDING_SIGNALS:
         number = os.read(read, 1)[0]
     try:
         # As long as this module is not loaded, there is nothing to clean up.
@@ -85,7 +77,7 @@ def _wait(read: int) -> None:
             message = cleanup.leftover_message()
             cleanup.clean_up()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
-        words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; {message}\n"
+        words = f"{wipe}slideviz: {ENDING_SIGNALS[signal.Signals(number)]}; {message}\n"
         # Not by Python's streams, which another thread may have locked.
         os.write(2, words.encode())
     finally:

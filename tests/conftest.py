@@ -6,6 +6,11 @@ import os
 import pytest
 from hypothesis import settings
 
+from tests.portable import rules
+
+if os.environ.get("SLIDEVIZ_TESTS") == "portable":
+    rules.install()
+
 # No test fails because a machine was busy for a moment.
 settings.register_profile("slideviz", deadline=None)
 settings.load_profile("slideviz")

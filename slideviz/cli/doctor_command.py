@@ -19,6 +19,7 @@ from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
 from slideviz.system.atomic import atomic_write
 from slideviz.system.libraries import OPENGL, apt_install, missing_for_window
+from slideviz.system.platform import free_memory
 
 Problem = tuple[str, str]
 """What is missing or wrong, and the line that mends it."""
@@ -111,9 +112,6 @@ def _threads(_: Report) -> Iterator[tuple[str, object]]:
 
 
 def _memory(report: Report) -> Iterator[tuple[str, object]]:
-    # Late: the solver takes 0.5 s, and packages that it needs may be missing.
-    from slideviz.solver.deform import free_memory
-
     free = free_memory()
     yield "free", _size(free)
     if free < LEAST_MEMORY:

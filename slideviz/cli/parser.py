@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, HelpFormatter, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -107,7 +106,7 @@ def _window(arguments: Namespace) -> int:
             f"{arguments.file}: there is no such file or command (commands: "
             f"{', '.join(COMMANDS)}){nearest(str(arguments.file), COMMANDS)}"
         )
-    why = display_fault() if sys.platform.startswith("linux") else ""
+    why = display_fault()
     if why:
         raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
     if packages := missing_for_window():

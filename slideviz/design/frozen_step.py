@@ -55,7 +55,7 @@ from slideviz.rbf.solve import (
     pseudo_inverse,
 )
 from slideviz.rbf.tape import Array, Variable, recorded, value
-from slideviz.solver.deform import Progress, all_steps, free_memory, require_memory
+from slideviz.solver.deform import Progress, all_steps, require_memory
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import (
     Stepping,
@@ -65,6 +65,7 @@ from slideviz.solver.stepping import (
     with_halo_copies,
 )
 from slideviz.solver.steps import step_timer
+from slideviz.system.platform import free_memory
 
 REMEDY = (
     "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "

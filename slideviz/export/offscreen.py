@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import socket
-import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -25,6 +22,7 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.scene.legend import set_letters
 from slideviz.system.libraries import OPENGL, apt_install, is_loadable
+from slideviz.system.platform import has_wayland, has_x_server, needs_server
 
 SMALLEST = 64
 LARGEST = 8192
@@ -70,7 +68,7 @@ def check_drawable(size: tuple[int, int]) -> None:
 @cache
 def has_opengl() -> bool:
     """Return whether VTK finds a library to draw with; without one it would crash."""
-    if not sys.platform.startswith("linux"):
+    if not needs_server():
         return True
     if has_x_server():
         return is_loadable(("libGLX.so.0", "libGL.so.1"))
@@ -141,40 +139,9 @@ def check_png(file: Path) -> None:
         raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
 
 
-def has_x_server() -> bool:
-    """Return whether the X server named by ``DISPLAY`` accepts connections."""
-    if not os.environ.get("DISPLAY"):
-        return False
-    try:
-        library = ctypes.CDLL("libX11.so.6")
-    except OSError:
-        return True  # without libX11 it cannot be tested
-    library.XOpenDisplay.restype = ctypes.c_void_p
-    library.XOpenDisplay.argtypes = [ctypes.c_char_p]
-    library.XCloseDisplay.argtypes = [ctypes.c_void_p]
-    server = library.XOpenDisplay(None)
-    if server:
-        library.XCloseDisplay(server)
-    return bool(server)
-
-
-def has_wayland() -> bool:
-    """Return whether the compositor named by ``WAYLAND_DISPLAY`` accepts connections."""
-    name = os.environ.get("WAYLAND_DISPLAY")
-    if not name:
-        return False
-    place = Path(os.environ.get("XDG_RUNTIME_DIR", "/"), name)
-    try:
-        with closing(socket.socket(socket.AF_UNIX)) as line:
-            line.connect(str(place))
-    except OSError:
-        return False
-    return True
-
-
 def display_fault() -> str:
     """Return why no window can be shown, in words; empty if a display is available."""
-    if has_x_server() or has_wayland():
+    if not needs_server() or has_x_server() or has_wayland():
         return ""
     named = [
         f"{name}={os.environ[name]}"

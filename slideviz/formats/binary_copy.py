@@ -26,11 +26,12 @@ from slideviz.formats.su2.numbers import (
 )
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2b.layout import NAME_BYTES, ElementTable, ZonePlace
-from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of, write_at
+from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
 from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
+from slideviz.system.platform import open_unlinked, write_at
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, cuts, equal_shares, ordered_map
 
@@ -176,7 +177,7 @@ def _layout_tasks(
     These are the results of `_write_cells` or `_write_points`, (k, ...). ``synced`` is whether the
     bytes are on the disk when the function returns.
     """
-    out = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
+    out = open_unlinked(path, os.O_WRONLY)
 
     def work(task: _Task) -> IntArray:
         kind, first, end = task
@@ -213,8 +214,8 @@ def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
         some = cells if len(mine) == len(types) else cells.take(mine)
         rows = rows_of(some.types, some.connectivity, piece.row + mine)
         offsets = start + width * np.arange(len(mine))
-        write_at(out, table.offsets + row * size, offsets.astype(layout.conn))
-        write_at(out, table.entries + start * size, rows.astype(layout.conn))
+        write_at(out, offsets.astype(layout.conn), table.offsets + row * size)
+        write_at(out, rows.astype(layout.conn), table.entries + start * size)
     return 0
 
 
@@ -233,5 +234,5 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
     block = np.empty(piece.rows, layout.point)
     block["x"] = points
     block["i"] = np.arange(piece.row, piece.row + piece.rows)
-    write_at(out, layout.place.points + piece.row * layout.point.itemsize, block)
+    write_at(out, block, layout.place.points + piece.row * layout.point.itemsize)
     return filled

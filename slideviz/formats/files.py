@@ -7,11 +7,8 @@ and memory, can be stopped at any moment, and leaves the window responsive.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import pickle
-import select
-import signal
 import subprocess
 import sys
 import time
@@ -40,6 +37,13 @@ from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.walls import Walls
 from slideviz.system.cleanup import killed_at_end
+from slideviz.system.platform import (
+    end_with,
+    limit_process,
+    limits_time,
+    ran_out_of_time,
+    total_memory,
+)
 from slideviz.system.threads import Tick
 from slideviz.terms import SIZE_SKEW, WALL_VALUES, FileFormat, Metric, Quantity, field_of
 
@@ -48,10 +52,9 @@ _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
 _MEMORY = 8 << 30
 _MEMORY_PER_BYTE = 200
+_ON_THE_CLOCK = 3  # limit of time over that of processor time, where there is none of that
 _TICK_SECONDS = 0.05  # seconds between two calls of the progress function
 _BYTES_PER_SECOND = 5e6  # speed of reading that the progress assumes
-_CHUNK_BYTES = 1 << 20  # most bytes that are read from the process at a time
-_SET_DEATH_SIGNAL = 1  # ``PR_SET_PDEATHSIG`` of Linux's ``prctl``
 
 
 def read_surface(path: Path) -> Mesh:
@@ -75,8 +78,9 @@ def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
     # Without -P a file numpy.py in the folder of the mesh would be run.
+    seconds, memory = _limits(path.stat().st_size)
     command = [sys.executable, "-P", "-c", f"from {__name__} import main; main()"]
-    command += [*map(str, (os.getpid(), *_limits(path.stat().st_size))), str(path)]
+    command += [*map(str, (os.getpid(), seconds, memory)), str(path)]
     command += [function or format_for(path).reader]
     environment = {
         **os.environ,
@@ -84,7 +88,6 @@ def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
         # Threads reserve memory, which counts against the limit.
         "OPENBLAS_NUM_THREADS": "1",
     }
-    answer = bytearray()
     try:
         reader = subprocess.Popen(
             command,
@@ -99,36 +102,36 @@ def read_in_subprocess(path: Path, progress: Tick, function: str = "") -> Mesh:
             f"cannot be read: its reader does not start: {problem.strerror}; close other programs",
         ) from problem
     with reader, killed_at_end(reader):
-        assert reader.stdout is not None
-        while True:
+        answer = None
+        while answer is None:
             spent = time.monotonic() - begun
             progress(0.9 * spent / (spent + expected))
-            if not select.select([reader.stdout], [], [], _TICK_SECONDS)[0]:
-                continue
-            chunk = os.read(reader.stdout.fileno(), _CHUNK_BYTES)
-            if not chunk:
-                break
-            answer += chunk
-        code = reader.wait()
-    mesh = _unpacked(path, bytes(answer), code)
+            if spent > _ON_THE_CLOCK * seconds and not limits_time():
+                raise _too_slow(path)
+            with suppress(subprocess.TimeoutExpired):
+                answer, _ = reader.communicate(timeout=_TICK_SECONDS)
+    mesh = _unpacked(path, answer, reader.returncode)
     progress(1.0)
     return mesh
 
 
+def _too_slow(path: Path) -> MeshError:
+    return path_error(
+        path,
+        "cannot be read: it takes longer than a file of this size should; check its counts, "
+        "or use another format, such as .su2 or .vtu",
+    )
+
+
 def _limits(size: int) -> tuple[int, int]:
-    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    memory = min(_MEMORY + _MEMORY_PER_BYTE * size, 0.8 * present)
+    memory = min(_MEMORY + _MEMORY_PER_BYTE * size, 0.8 * total_memory())
     return int(_SECONDS + _SECONDS_PER_BYTE * size), int(memory)
 
 
 def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
     """Return the mesh that the process sent, or raise MeshError with its message or exit code."""
-    if code == -signal.SIGXCPU:
-        raise path_error(
-            path,
-            "cannot be read: it takes longer than a file of this size should; check its counts, "
-            "or use another format, such as .su2 or .vtu",
-        )
+    if ran_out_of_time(code):
+        raise _too_slow(path)
     if code or not answer:
         library = "meshio" if format_for(path).reader == MESHIO.reader else "HDF5"
         raise path_error(
@@ -149,18 +152,13 @@ def main() -> None:
     Its command-line arguments are the parent's process number, the limits (seconds and bytes of
     memory), the path, and the reader. If the file cannot be read, it writes the error's message.
     """
-    _die_with(int(sys.argv[1]))
+    if not end_with(int(sys.argv[1])):  # it was killed before
+        sys.exit(1)
     # Whatever prints must not get into the answer.
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        # Late: Windows has none.
-        import resource
-
-        seconds = int(sys.argv[2])
-        memory = int(sys.argv[3])
+        limit_process(int(sys.argv[2]), int(sys.argv[3]))
         path = Path(sys.argv[4])
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         try:
             mesh = replace(MESHIO, reader=sys.argv[5]).function("reader")(path)
         except MeshError as problem:
@@ -180,14 +178,6 @@ def main() -> None:
 
 def _bare(cells: Cells) -> Cells:
     return Cells(cells.types, cells.offsets, cells.connectivity)
-
-
-def _die_with(parent: int) -> None:
-    """Let the system end this process when the process ``parent`` ends; end now if it has."""
-    with suppress(OSError, AttributeError):  # other systems than Linux have no such call
-        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != parent:  # it was killed before
-        sys.exit(1)
 
 
 @check_types

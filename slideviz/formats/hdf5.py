@@ -7,7 +7,6 @@ to be raised afterwards.
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ import h5py
 
 from slideviz.errors import path_error
 from slideviz.system.atomic import atomic_write, reason_of
+from slideviz.system.platform import open_unlinked
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer, WriteableBuffer
@@ -42,9 +42,7 @@ class Hdf5Draft(FileIO):
     tree: h5py.File
 
     def __init__(self, path: Path, draft: Path) -> None:
-        super().__init__(
-            draft, "r+", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW)
-        )
+        super().__init__(draft, "r+", opener=open_unlinked)
         self._path = path
         self._problem: OSError | None = None
 

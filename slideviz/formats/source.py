@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from slideviz.errors import MeshError, path_error
+from slideviz.system.platform import read_at
 
 KEPT_BYTES = 1 << 26
 """Files up to this size are kept in memory, so that they may change while the mesh is in use."""
@@ -48,7 +49,7 @@ class Source:
         pieces = []
         try:
             while begin < end:  # the system gives at most 2 GiB at once
-                pieces.append(os.pread(self._file.fileno(), end - begin, begin))
+                pieces.append(read_at(self._file.fileno(), end - begin, begin))
                 if not pieces[-1]:
                     raise self.changed()
                 begin += len(pieces[-1])

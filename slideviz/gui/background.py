@@ -25,7 +25,7 @@ from slideviz.session.panes import shown_views
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
 from slideviz.session.state import CheckedLimits, Preview, Session, StepFrame
 from slideviz.session.store import Store
-from slideviz.solver.deform import free_memory
+from slideviz.system.platform import free_memory
 
 log = logging.getLogger("slideviz")
 

@@ -14,11 +14,11 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import QualityTotals, quality
 from slideviz.session.inspect import WORST
 from slideviz.session.state import StepFrame
-from slideviz.solver.deform import free_memory
 from slideviz.streaming.quality import measure_mesh
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.source import CellBlock, FileSource
 from slideviz.streaming.stream_input import NEEDED
+from slideviz.system.platform import free_memory
 from slideviz.terms import SkewMetric
 
 LARGE_CELLS = 5_000_000

@@ -19,10 +19,10 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.reach import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
-from slideviz.solver.deform import free_memory
 from slideviz.solver.layers import height_warnings
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
+from slideviz.system.platform import free_memory
 from slideviz.terms import KERNELS
 
 LARGE = 1e9  # bytes of memory from which on there is a message before a run on what it takes

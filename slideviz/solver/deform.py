@@ -26,6 +26,7 @@ from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
 from slideviz.solver.steps import Progress, Step, Trial, step_timer
+from slideviz.system.platform import free_memory
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
@@ -313,15 +314,3 @@ def _require_free(needed: float, what: str, remedy: str) -> None:
         raise DeformError(
             f"{what} {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free; {remedy}"
         )
-
-
-def free_memory() -> float:
-    """Return the bytes a process may still take; infinite where the system does not say."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return float(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return float("inf")

@@ -16,7 +16,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -29,7 +29,6 @@ from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, MeshError, NodeError
 from slideviz.formats.binary_copy import HEAD
-from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import zones_of
@@ -64,8 +63,9 @@ from slideviz.streaming.stream_input import (
 from slideviz.streaming.streamed_repair import mend_file
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import draft, open_temporary
+from slideviz.system.platform import copied, give_back, open_unlinked, write_at
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import Tick, cuts, give_back
+from slideviz.system.threads import Tick, cuts
 from slideviz.terms import FileFormat, SkewMetric
 
 CHUNK = 1 << 20  # most nodes or cells of a part: one part is in memory at a time
@@ -231,7 +231,7 @@ def point_writer(
     """
     with ExitStack() as stack:
         (source,) = FileSource.open(stack, (path, zone)).zones
-        out = os.open(target, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
+        out = open_unlinked(target, os.O_WRONLY, synced=synced)
         try:
             yield lambda part: write_points(source.points, displacer, out, part)
         finally:
@@ -247,7 +247,7 @@ def write_points(
     for now in displacer.after_steps(np.arange(*part), points) if displacer else ():
         points = now
     rows["x"] = points
-    write_at(out, table.byte(part[0]), rows)
+    write_at(out, rows, table.byte(part[0]))
 
 
 @contextmanager
@@ -324,22 +324,13 @@ def _copying(source: Path, ours: Path) -> Iterator[Callable[[Part], None]]:
         def copy(task: Part) -> None:
             at, end = task
             while at < end:
-                at += _copied(given, file, at, end - at)
+                moved = copied(given.fileno(), file.fileno(), at, end - at)
+                if not moved:
+                    raise MeshError(f"{given.name}: became shorter while it was read; run it again")
+                at += moved
             os.fsync(file.fileno())
 
         yield copy
-
-
-def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
-    """Copy up to ``count`` bytes at ``at``, in the kernel if possible; return how many."""
-    with suppress(OSError, AttributeError):
-        moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
-        if moved:
-            return moved
-    block = os.pread(given.fileno(), count, at)
-    if not block:
-        raise MeshError(f"{given.name}: became shorter while it was read; run it again")
-    return os.pwrite(file.fileno(), block, at)
 
 
 SECONDS = {"text": 4.3, "read": 1.0, "solve": 5.0, "evaluate": 3.2, "quality": 2.7, "write": 3.0}

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
-from slideviz.formats.su2b.write import write_at
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, frozen_array
 from slideviz.mesh.quality import Quality
 from slideviz.sections.cut import crossed_cells
 from slideviz.sections.model import Section
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
+from slideviz.system.platform import allocate, release_pages, write_at
 from slideviz.system.threads import Tick
 
 CELLS = 1 << 17  # cells of a block of a file: one block is in memory at a time
@@ -206,7 +206,7 @@ class PointTable:
             first = int(nodes[part[0]])
             rows = np.array(self.rows(first, int(nodes[part[-1]]) + 1 - first))
             rows["x"][nodes[part] - first] = points[part]
-            write_at(file, self.byte(first), rows)
+            write_at(file, rows, self.byte(first))
         os.fsync(file)
 
 
@@ -395,10 +395,8 @@ class Scratch:
         path = stack.enter_context(draft(folder))
         size = max(count * np.dtype(kind).itemsize, 1)
         try:
-            with open_temporary(path, new=True) as file:
-                file.truncate(size)
-                if hasattr(os, "posix_fallocate"):  # else a full disk would end the process
-                    os.posix_fallocate(file.fileno(), 0, size)
+            with open_temporary(path, new=True, brief=True) as file:
+                allocate(file.fileno(), size)
                 self._map = mmap.mmap(file.fileno(), 0)
         except OSError as problem:
             raise MeshError(
@@ -409,5 +407,4 @@ class Scratch:
 
     def release(self) -> None:
         """Give the memory of the array back to the system; its values stay in the file."""
-        if hasattr(mmap, "MADV_DONTNEED"):  # other systems than Linux do it in their own time
-            self._map.madvise(mmap.MADV_DONTNEED)
+        release_pages(self._map)

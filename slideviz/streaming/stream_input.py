@@ -23,11 +23,11 @@ from slideviz.formats.su2b.layout import ZonePlace, open_zones
 from slideviz.formats.su2b.write import require_binary_names
 from slideviz.formats.table import format_of
 from slideviz.mesh.model import Mesh
-from slideviz.solver.deform import free_memory
 from slideviz.streaming.skin import naming_text, read_skin
 from slideviz.streaming.source import ZoneSource
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
+from slideviz.system.platform import free_memory
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, progress_share
 from slideviz.terms import FileFormat

@@ -15,7 +15,6 @@ from slideviz.mesh.quality import VALID, Quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
 from slideviz.mesh.repair.repair import Region, mend_cells
-from slideviz.solver.deform import free_memory
 from slideviz.solver.repair_stage import (
     find_freedom,
     moved_layers,
@@ -26,6 +25,7 @@ from slideviz.solver.repair_stage import (
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import MeshRepair
 from slideviz.streaming.source import CELLS, ZoneSource
+from slideviz.system.platform import free_memory
 from slideviz.system.threads import Tick
 
 BYTES = 3000  # of memory that repair takes for each cell of a region: measured on hexahedra

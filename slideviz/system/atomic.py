@@ -17,6 +17,7 @@ from typing import BinaryIO
 from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.system.cleanup import draft
 from slideviz.system.file_checks import require_no_input
+from slideviz.system.platform import is_in_use, set_mode
 
 _REMEDIES = {  # reason and remedy by errno
     errno.ENOENT: "the folder does not exist; create it first",
@@ -61,7 +62,7 @@ def atomic_write(
                 # after the renaming could leave an empty file.
                 os.fsync(file.fileno())
                 if mode is not None:
-                    os.fchmod(file.fileno(), mode)
+                    set_mode(file.fileno(), temporary, mode)
             temporary.replace(real)
     except OSError as problem:
         # The block may have failed to read some other file, which is not ours to explain.
@@ -129,5 +130,7 @@ def reason_of(problem: OSError, folder: Path | None = None) -> str:
     """
     if problem.errno == errno.ENOENT and folder is not None and folder.is_dir():
         return "nothing can be made there; choose another folder"
+    if is_in_use(problem):
+        return "it is open, here or in another program; close it, or choose another name"
     text = problem.strerror or str(problem)
     return _REMEDIES.get(problem.errno or 0, text)

@@ -17,6 +17,8 @@ from pathlib import Path
 from threading import Lock
 from typing import BinaryIO, Protocol
 
+from slideviz.system.platform import is_alive, open_unlinked, process_space, set_mode
+
 
 def private_folder(folder: Path) -> Path:
     """Make a folder that only its owner may enter, and return it; OSError if it is another's."""
@@ -28,7 +30,7 @@ def private_folder(folder: Path) -> Path:
 def private_file(path: Path) -> None:
     """Make an empty file for its owner only; OSError if it is another's, or a link."""
     with open_temporary(path, new=True) as file:
-        os.fchmod(file.fileno(), 0o600)
+        set_mode(file.fileno(), path, 0o600)
 
 
 PREFIX = ".slideviz-"  # beginning of the names of all drafts
@@ -76,14 +78,14 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
             _remove(path)
 
 
-def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> BinaryIO:
+def open_temporary(path: Path, *, new: bool = False, brief: bool = False) -> BinaryIO:
     """Return a temporary file, open for reading and writing; never through a symbolic link.
 
-    With ``new`` it is made if there is none, for its owner only. Raises OSError if it cannot be
-    opened, or is a symbolic link, a device or a pipe.
+    With ``new`` it is made if there is none, for its owner only. ``brief``: as of `open_unlinked`.
+    Raises OSError if it cannot be opened, or is a symbolic link, a device or a pipe.
     """
     try:
-        opened = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CREAT * new, 0o600)
+        opened = open_unlinked(path, os.O_RDWR | os.O_CREAT * new, brief=brief)
     except OSError as problem:
         if problem.errno != errno.ELOOP:
             raise
@@ -92,7 +94,7 @@ def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> Bin
     if not stat.S_ISREG(os.fstat(opened).st_mode):
         os.close(opened)
         raise OSError(errno.EINVAL, f"{path} is a device or pipe; remove it", str(path))
-    return open(opened, "r+b", buffering)  # noqa: PTH123
+    return open(opened, "r+b")  # noqa: PTH123
 
 
 @contextmanager
@@ -138,33 +140,9 @@ def leftover_message() -> str:
     return next(sentences, NOTHING_LEFT)
 
 
-def is_alive(pid: str) -> bool:
-    """Return whether a process with the number ``pid`` runs; False if it is not a number."""
-    try:
-        os.kill(int(pid), 0)
-    except (ValueError, OverflowError, ProcessLookupError):
-        return False
-    except OSError:
-        return True
-    return True
-
-
 def _owned(pid: int | str) -> str:
     """Return the prefix of the names of unfinished files of process ``pid`` on this machine."""
-    return f"{PREFIX}{_machine()}-{pid}-"
-
-
-def _machine() -> str:
-    """Return a name of this machine and its process namespace, that of a container.
-
-    Several machines may use the same folder, and a process that does not exist on this one may run
-    on another.
-    """
-    name = "".join(sign if sign.isalnum() else "_" for sign in os.uname().nodename)[:40]
-    try:
-        return f"{name}-{os.stat('/proc/self/ns/pid').st_ino:x}"  # noqa: PTH116
-    except OSError:  # no Linux
-        return f"{name}-0"
+    return f"{PREFIX}{process_space()}-{pid}-"
 
 
 def _sweep(folder: Path) -> None:

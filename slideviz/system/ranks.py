@@ -8,7 +8,6 @@ same code. Between such work the other ranks sleep.
 
 from __future__ import annotations
 
-import os
 import pickle
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +20,7 @@ from numba import config, set_num_threads
 from threadpoolctl import threadpool_limits
 
 from slideviz.errors import MeshError, SlidevizError
+from slideviz.system.platform import cores_of_all, machine_name
 from slideviz.system.threads import Result, Task, core_limit, cores, submit_ahead
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ class Ranks(SerialPool):
         """Return an error that can be pickled; if a file is missing, it names the rank."""
         if isinstance(problem, FileNotFoundError):
             return MeshError(
-                f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; put "
+                f"{problem.filename}: not there for rank {self.rank} on {machine_name()}; put "
                 "mesh and results into a folder that all machines see under the same name"
             )
         try:
@@ -259,16 +259,8 @@ class Ranks(SerialPool):
 
 
 def _threads_of(near: Comm) -> int:
-    """Return the number of threads for each of the ranks ``near``, which are on one machine.
-
-    It also lets each process run on all cores that any of them has: a launcher binds each to a
-    few, but rank 0 needs all where it works alone.
-    """
-    if not hasattr(os, "sched_setaffinity"):  # no Linux
-        return max(1, (os.cpu_count() or 1) // near.size)
-    every = set().union(*near.allgather(os.sched_getaffinity(0)))
-    os.sched_setaffinity(0, every)
-    return max(1, len(every) // near.size)
+    """Return the number of threads for each of the ranks ``near``, which are on one machine."""
+    return max(1, cores_of_all(near) // near.size)
 
 
 @contextmanager

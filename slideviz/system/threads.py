@@ -7,12 +7,11 @@ depend on where its part begins.
 
 from __future__ import annotations
 
-import ctypes
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TypeVar
 
 from numba import get_num_threads
@@ -104,12 +103,6 @@ def submit_ahead(
     finally:
         for future in waiting:
             future.cancel()
-
-
-def give_back() -> None:
-    """Return freed memory to the system; the C library of Linux would keep it for later use."""
-    with suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:

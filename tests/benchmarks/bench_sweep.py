@@ -11,8 +11,8 @@ import time
 import pytest
 
 import slideviz as sv
-from slideviz.design.sweeps.sweep import usable_cores
 from slideviz.samples.table import sample
+from slideviz.system.platform import usable_cores
 
 DESIGNS = 200
 

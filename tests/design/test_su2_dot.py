@@ -453,6 +453,10 @@ def test_several_objectives_and_names_of_files(case):
             "adj_cd.csv:2: expected a number for each of the 2 columns, separated by commas; dec",
         ),
         (
+            lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n1, 1_0\n'),
+            "adj_cd.csv:2: expected a number for each of the 2 columns, separated by commas; dec",
+        ),
+        (
             lambda p, w: write_csv("adj_cd.csv", p[on := square(8).marker("BLOCK").nodes], w[on]),
             "points, as many as move of mesh.su2; sensitivities at moving nodes only are read with",
         ),

@@ -147,7 +147,7 @@ def test_limits_grow_with_the_file():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has such a call")
 def test_the_reader_does_not_outlive_a_killed_program():
-    child = "import os, time; from slideviz.formats.files import _die_with; _die_with(os.getppid())"
+    child = "import os, time; from slideviz.system.platform import end_with; end_with(os.getppid())"
     code = (
         "import subprocess, sys\n"
         f"call = [sys.executable, '-c', {child + '; print(1, flush=True); time.sleep(300)'!r}]\n"

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from slideviz.case.lines import read_text
 from slideviz.case.motions.airfoil import normals_at
+from slideviz.case.words import is_number
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.surface import MovingSurface, convex_part, make_surface
@@ -52,15 +53,6 @@ def angle_sensitivity(path: Path) -> float | None:
     return float(words[-1]) if words and is_number(words[-1]) else None
 
 
-def is_number(word: str) -> bool:
-    """Return whether Python reads a word as a number."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
 def _csv(path: Path) -> tuple[list[str], FloatArray]:
     text, _ = read_text(path, "file of sensitivities")
     head, _, body = text.partition("\n")
@@ -77,12 +69,17 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
         table = np.empty((0, 0))
     if table.shape[1:] != (len(names),):
         rows = enumerate((line.split(",") for line in lines), start=2)
-        line = next(k for k, row in rows if len(row) != len(names) or not all(map(is_number, row)))
+        wrong = (k for k, row in rows if len(row) != len(names) or not all(map(_is_word, row)))
+        line = next(wrong, 2)  # NumPy may refuse what is a number here
         raise CaseError(
             f"{path}:{line}: expected a number for each of the {len(names)} columns, separated by "
             "commas; decimals are written with a point"
         )
     return names, table
+
+
+def _is_word(cell: str) -> bool:
+    return is_number(cell.strip())
 
 
 def _without_last_comma(line: str) -> str:

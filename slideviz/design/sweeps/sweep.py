@@ -68,6 +68,12 @@ from slideviz.solver.prepare import referenced
 from slideviz.solver.steps import Step
 from slideviz.streaming.run import require_stream, stream
 from slideviz.system.cleanup import clean_up, starting
+from slideviz.system.platform import (
+    interrupt_blocked,
+    machine_name,
+    termination_waits,
+    usable_cores,
+)
 from slideviz.terms import FileFormat
 
 _KEPT = 2  # number of meshes that a process keeps: that of the sweep, and one of another sweep
@@ -182,7 +188,7 @@ def _warnings(last: Step) -> tuple[str, ...]:
 
 
 def _worker_name() -> str:
-    return f"{os.uname().nodename}, process {os.getpid()}"
+    return f"{machine_name()}, process {os.getpid()}"
 
 
 @contextmanager
@@ -206,13 +212,6 @@ def _libraries() -> Any:
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTS = 2
 """Number of processes in a row that end before their first call, at which no more are started."""
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class _Call(NamedTuple):
@@ -366,11 +365,10 @@ def _settings_of_workers() -> Iterator[None]:
         before = {name: os.environ.get(name) for name in _THREADS}
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         resource_tracker.ensure_running()  # which would unblock the signal where it starts later
-        masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            yield
+            with interrupt_blocked():
+                yield
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
             for name, value in before.items():
                 if value is None:
                     os.environ.pop(name, None)
@@ -409,8 +407,7 @@ def _begin() -> None:
 
     Threads wait for both, for Python's signal handlers run only after a compiled loop.
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-    for ending in (lambda: signal.sigwait({signal.SIGTERM}), _wait_for_parent):
+    for ending in (*termination_waits(), _wait_for_parent):
         threading.Thread(target=_leave_after, args=(ending,), daemon=True).start()
 
 

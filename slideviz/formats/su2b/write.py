@@ -8,7 +8,6 @@ that it had.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -177,15 +176,6 @@ def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = No
         out[ends - 1] = ids
     out[keep] = nodes
     return out
-
-
-def write_at(file: int, at: int, content: NDArray) -> None:
-    """Write an array to a file descriptor, from byte ``at`` on."""
-    left = content.view(np.uint8).data
-    while left:
-        written = os.pwrite(file, left, at)
-        at = at + written
-        left = left[written:]
 
 
 def _by_type(cells: Cells) -> IntArray | None:

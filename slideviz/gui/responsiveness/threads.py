@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import os
 import sys
 import time
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from threading import Event, Thread, get_native_id
 from threading import enumerate as enumerate_threads
 from typing import Any
@@ -29,6 +27,7 @@ from slideviz.gui.responsiveness.timers import (
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
 from slideviz.session import jit_warmup
+from slideviz.system import platform
 from slideviz.system.jit_cache import compilation_watched
 
 
@@ -163,11 +162,7 @@ def lower_priority(thread: int | None = None) -> None:
     Without a graphics card, the GUI thread draws on the processors that compute. Only on Linux.
     ``thread``: its native id (see `threading.get_native_id`).
     """
-    if sys.platform == "linux":  # elsewhere a priority is that of the whole process
-        thread = get_native_id() if thread is None else thread
-        with contextlib.suppress(OSError):
-            before = os.getpriority(os.PRIO_PROCESS, thread)
-            os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
+    platform.lower_priority(get_native_id() if thread is None else thread, NICENESS)
 
 
 def lower_library_priority() -> None:
@@ -176,16 +171,11 @@ def lower_library_priority() -> None:
     They are recognized by their name: unlike threads of Qt and of the graphics driver, they have
     that of the main thread.
     """
-    tasks = Path("/proc/self/task")
-    if not tasks.is_dir():
-        return
     pythons = {thread.native_id for thread in enumerate_threads()}
-    name = (tasks / str(get_native_id()) / "comm").read_text()
-    for task in tasks.iterdir():
-        # A thread may have ended meanwhile.
-        with contextlib.suppress(OSError):
-            if int(task.name) not in pythons and (task / "comm").read_text() == name:
-                lower_priority(int(task.name))
+    names = platform.thread_names()
+    for thread, name in names.items():
+        if thread not in pythons and name == names[get_native_id()]:
+            lower_priority(thread)
 
 
 class GarbageCollector(QObject):

@@ -22,7 +22,8 @@ from qtpy.QtWidgets import QApplication
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
-from slideviz.system.cleanup import is_alive, private_file, private_folder
+from slideviz.system.cleanup import private_file, private_folder
+from slideviz.system.platform import is_alive
 from slideviz.system.versions import versions as library_versions
 
 if TYPE_CHECKING:
