@@ -14,7 +14,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden smoke mutants bench laws shots study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -58,6 +58,9 @@ docs: setup ## build the documentation into build/docs/html; its examples run
 
 golden: setup ## record what users get, which test-all compares (PARTS="films window")
 	$(BIN)/python -m tests.golden.record $(PARTS)
+
+bits: setup ## record the hashes of runs, which test compares with, after an intended change
+	$(BIN)/python -m tests.bits.record
 
 smoke: setup ## build the wheel and try it outside of the clone, also without Qt and VTK
 	$(BIN)/python tools/smoke.py
