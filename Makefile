@@ -12,9 +12,10 @@ XVFB = $(if $(shell command -v xvfb-run),xvfb-run -a)
 ROOM := rbf
 RUNS := 5000
 SEED := 0
+MINUTES := 10
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws shots study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -73,6 +74,9 @@ bench: setup ## measure the speed (needs a quiet machine); all of it with ARGS='
 
 laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=0)
 	$(BIN)/python -m tools.laws --runs $(RUNS) --seed $(SEED) $(ARGS)
+
+fuzz: setup ## search for faults with damaged files and absurd cases (MINUTES=10)
+	$(BIN)/python -m tools.fuzz --minutes $(MINUTES) $(ARGS)
 
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/python -m tools.shots
