@@ -25,6 +25,7 @@ from slideviz.errors import (
     raise_all,
     shown,
 )
+from slideviz.formats.openfoam_paths import mesh_path
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
@@ -49,7 +50,7 @@ def case_of_text(path: Path, text: str, start: Case) -> Case:
     """Return the case that the text of a file describes, as `read_case`."""
     case, problems, remarks = _parsed(path, text, start)
     raise_all(listed(path, problems))
-    case = case.with_paths(lambda file: _from_folder(file, path.parent))
+    case = case.with_paths(lambda file: mesh_path(_from_folder(file, path.parent)))
     if case.mesh_file is not None and case.mesh_file == case.mesh_out:
         remarks += (
             f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
@@ -102,7 +103,7 @@ def set_key(case: Case, key: str, value: str, option: str = "--set") -> Case:
             role = _ROLE_OF[row.name]
             roles = case.roles.items()
             case = case.change(roles={k: r for k, r in roles if r != role and k not in wanted})
-        changed = row.put(case, wanted)
+        changed = row.put(case, mesh_path(wanted) if isinstance(wanted, Path) else wanted)
     except CaseError as problem:
         raise CaseError(*problem.within(place)) from problem
     remark = row.kind.remark(value.strip())

@@ -415,7 +415,7 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
             cells = np.empty(0, np.int64)
             if row.status is not None and not limit.holds(actual):
                 mask = quality.status == row.status
-                cells = np.flatnonzero(mask if quality.halo is None else mask & ~quality.halo)
+                cells = np.flatnonzero(mask if quality.copies is None else mask & ~quality.copies)
             return LimitResult(limit, actual, cells)
     assert row.values is not None
     values, ids, boundary, names = row.values(measured, limit.marker)
@@ -426,7 +426,7 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
     for first in range(0, len(values), PIECE):  # they may be in a file, and not fit into memory
         some = values[first : first + PIECE]
         cells = np.arange(first, first + len(some)) if ids is None else ids[first : first + PIECE]
-        counts = ~np.isnan(some) & (True if quality.halo is None else ~quality.halo[cells])
+        counts = ~np.isnan(some) & (True if quality.copies is None else ~quality.copies[cells])
         if counts.any() and not total:
             worst = some[counts].min() if low else some[counts].max()
             actual = float(np.fmin(actual, worst) if low else np.fmax(actual, worst))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from slideviz.case.motions.motion import Motion, applies_to, named
 from slideviz.case.words import first_of
@@ -23,7 +23,23 @@ def with_marker_names(case: Case, mesh: Mesh) -> Case:
     another zone has a boundary of that name. For a mesh of one zone among several, what the case
     has for boundaries with the numbers of others is left out, with a note.
     """
-    return renamed(_of_zone(case, mesh), spellings(mesh))
+    return _with_own_roles(renamed(_of_zone(case, mesh), spellings(mesh)), mesh)
+
+
+def _with_own_roles(case: Case, mesh: Mesh) -> Case:
+    """Return a case with the roles that boundaries have by their file, if they have none in it.
+
+    Then boundaries slide, and stay periodic, unless that is asked for otherwise.
+    """
+    roles = {name: role for name, role in mesh.roles.items() if name not in case.roles}
+    if not roles:
+        return case
+    modes: dict[str, Any] = {}
+    if "sliding" in roles.values() and case.sliding == "none" and not case.markers_with("sliding"):
+        modes["sliding"] = "ps"
+    if "periodic" in roles.values() and case.periodic == "none":
+        modes["periodic"] = "moving"
+    return case.change(roles={**case.roles, **roles}, **modes)
 
 
 def _of_zone(case: Case, mesh: Mesh) -> Case:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
+from slideviz.formats.openfoam_paths import ENDING, case_folder, ending_of, mesh_path, stem_of
 from slideviz.formats.table import MESHIO, format_for
 from slideviz.system.atomic import make_folder, require_writable
 from slideviz.system.file_checks import require_no_input, same_file
@@ -48,6 +49,10 @@ class OutputPath:
     replaces: Path | None = None  # the only input file that it may overwrite
     remedy: str = ""  # the advice in the message where it is an input file
 
+    def __post_init__(self) -> None:
+        if self.is_mesh and self.path is not None:
+            object.__setattr__(self, "path", mesh_path(self.path))
+
 
 def input_paths(arguments: Namespace) -> dict[Path, str]:
     """Return the input files of a command line, with words for what each is."""
@@ -59,7 +64,8 @@ def qualities_path(output: Path) -> Path:
     """Return the path of the qualities of cells, beside a mesh; CaseError if that is a folder."""
     if not output.name:
         raise CaseError(f"{output}: is a folder; expected the name of the mesh to write")
-    return output.with_name(f"{output.stem}_qual.txt")
+    folder = case_folder(output) if ending_of(output) == ENDING else output.parent
+    return folder / f"{stem_of(output)}_qual.txt"
 
 
 def add_case_inputs(arguments: Namespace, case: Case) -> None:
@@ -87,6 +93,7 @@ def require_output_paths(arguments: Namespace, *outputs: OutputPath) -> None:
             raise CaseError(
                 f"{output.option} and {other.option} both name {file}; give each a file of its own"
             )
+    is_case = any(ending_of(one.path) == ENDING for one in there if one.path is not None)
     for output in there:
         assert output.path is not None
         if output.is_mesh and format_for(output.path).writer == MESHIO.writer:
@@ -97,7 +104,10 @@ def require_output_paths(arguments: Namespace, *outputs: OutputPath) -> None:
         if output.files:
             make_folder(output.path)
         else:
-            require_writable(output.path, CaseError, output.replaces)
+            place = output.path
+            while is_case and not place.parent.exists():
+                place = place.parent  # folders of a new case are made with it
+            require_writable(place, CaseError, output.replaces)
     old_files = []
     for output in there:
         old = [path for path in _paths(output) if path.exists()]

@@ -13,6 +13,7 @@ from slideviz import __version__
 from slideviz.cli.argument_readers import glued
 from slideviz.cli.commands import COMMANDS, add_arguments
 from slideviz.errors import CaseError, nearest
+from slideviz.formats.openfoam_paths import mesh_path
 from slideviz.system.libraries import apt_install, missing_for_window
 
 _DESCRIPTION = """\
@@ -46,9 +47,17 @@ def parse(argv: Sequence[str]) -> Namespace:
         if argv[1:] and not argv[0].startswith("-") and not Path(argv[0]).exists():
             meant = nearest(argv[0], COMMANDS)
             parser.error(f"there is no command or file {argv[0]!r}{meant}")
-        return parser.parse_args(argv)
+        return _placed(parser.parse_args(argv))
     called = argv[:1] if argv[0] in COMMANDS else COMMANDS
-    return command_parser(called).parse_args(glued(argv))
+    return _placed(command_parser(called).parse_args(glued(argv)))
+
+
+def _placed(arguments: Namespace) -> Namespace:
+    """Return arguments with the file of an OpenFOAM mesh for a folder that stands for it."""
+    for name in ("file", "mesh", "reference"):
+        if isinstance(path := getattr(arguments, name, None), Path):
+            setattr(arguments, name, mesh_path(path))
+    return arguments
 
 
 class _Parser(ArgumentParser):

@@ -33,6 +33,7 @@ from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
 from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.losses import warning_of_losses
+from slideviz.formats.openfoam_paths import ending_of, mesh_path, stem_of
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 from slideviz.mesh.metrics import MetricValues, rated_metric
 from slideviz.mesh.model import Mesh
@@ -55,7 +56,7 @@ def main(arguments: Namespace) -> int:
     begin = time.perf_counter()
     case = read_case(arguments)
     require_mesh_file(arguments, case)
-    output = arguments.output or case.mesh_out or _default_output(case)
+    output = mesh_path(arguments.output or case.mesh_out or _default_output(case))
     kind = _format_of(output, case)
     qualities = qualities_path(output) if case.generate_quality else None
     require_streamable(arguments, case, output, kind)
@@ -251,7 +252,7 @@ def _require_output_paths(
             arguments.steps_dir,
             "--steps-dir",
             named=False,
-            files=rf"{re.escape(case.mesh_file.stem)}_\d+({ours})",
+            files=rf"{re.escape(stem_of(case.mesh_file))}_\d+({ours})",
         ),
     )
 
@@ -259,8 +260,8 @@ def _require_output_paths(
 def _default_output(case: Case) -> Path:
     """Return ``name_def.su2`` for ``.../name.su2``, in the current folder (or MESH_OUT_FORMAT)."""
     assert case.mesh_file is not None
-    ending = f".{case.mesh_out_format}" if case.mesh_out_format else case.mesh_file.suffix
-    return Path(f"{case.mesh_file.stem}_def{ending}")
+    ending = f".{case.mesh_out_format}" if case.mesh_out_format else ending_of(case.mesh_file)
+    return Path(f"{stem_of(case.mesh_file)}_def{ending}")
 
 
 def _format_of(output: Path, case: Case) -> FileFormat | None:
@@ -308,7 +309,7 @@ def run_steps(
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))
-                name = f"{case.mesh_file.stem}_{step.index:0{width}d}{usual_ending(mesh)}"
+                name = f"{stem_of(case.mesh_file)}_{step.index:0{width}d}{usual_ending(mesh)}"
                 write(folder / name, step.mesh)
             add(step.mesh)
             steps.append(step)

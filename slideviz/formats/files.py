@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from slideviz.argument_types import check_types
 from slideviz.errors import MeshError, path_error, printable
 from slideviz.formats.losses import warning_of_losses
+from slideviz.formats.openfoam_paths import mesh_path
 from slideviz.formats.table import (
     FILE_FORMATS,
     MESHIO,
@@ -216,8 +217,8 @@ def convert(
     >>> sv.convert("square.su2", "square.su2b")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    source = Path(source)
-    target = Path(target)
+    source = mesh_path(Path(source))
+    target = mesh_path(Path(target))
     row = format_for(target)
     mesh = read(source, zone)
     alone = zone is not None and mesh.zones > 1
@@ -367,11 +368,14 @@ def write(
 
 
 def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
-    """Return the path of a file; MeshError if ``file_format`` is given and none of SU2's."""
+    """Return the path of a file; MeshError if ``file_format`` is given and none of SU2's.
+
+    For a folder of an OpenFOAM case, that is the file which stands for its mesh.
+    """
     if file_format not in (None, *FILE_FORMATS):
         known = " | ".join(FILE_FORMATS)
         raise path_error(Path(path), f"file_format {file_format!r} is not one of {known}")
-    return Path(path)
+    return mesh_path(Path(path))
 
 
 def quality_data(path: Path, found: Quality) -> dict[str, NDArray] | None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from slideviz.errors import MeshError
+from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
@@ -154,6 +155,17 @@ _ROWS = (
         copies=True,
         require="cgns.read:require_cgns",
     ),
+    MeshFormat(
+        ".foam",
+        "OpenFOAM case (its points; polyhedra by parts)",
+        "openfoam.read:read_polymesh",
+        "openfoam.write:write_polymesh",
+        isolated=False,
+        solver=True,
+        copies=True,
+        require="openfoam.write:require_polymesh",
+        zones=True,
+    ),
     MeshFormat(".med", "MED for Salome, with quality", quality=True),
     MeshFormat(".msh", "Gmsh"),
     MeshFormat(".inp", "Abaqus"),
@@ -171,7 +183,7 @@ FILE_FORMATS: dict[FileFormat, Term] = {
 
 def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """Return the format of a file to write: ``file_format``, or that of its ending."""
-    return FORMATS.get(f".{file_format}" if file_format else path.suffix.lower(), MESHIO)
+    return FORMATS.get(f".{file_format}" if file_format else ending_of(path), MESHIO)
 
 
 def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
@@ -181,7 +193,7 @@ def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """
     try:
         require_regular_file(path, MeshError)
-        ending = path.suffix.lower()
+        ending = ending_of(path)
         row = FORMATS.get(ending, MESHIO)
         if not (file_format or row.detects or ending in _UNSURE):
             return row

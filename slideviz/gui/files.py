@@ -16,6 +16,7 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 from slideviz.errors import SlidevizError
 from slideviz.formats.files import is_source
 from slideviz.formats.losses import left_out
+from slideviz.formats.openfoam_paths import mesh_path, stem_of
 from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
@@ -96,14 +97,15 @@ class Files(QObject):
 
         What is not a file at all is told without a question.
         """
+        path = mesh_path(Path(path))
         try:
-            jobs.require_openable(Path(path))
+            jobs.require_openable(path)
         except SlidevizError as error:
             self.window.banner.show_error(error)
             log.error("%s", error)
             return
         if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
-            self.start_opening(Path(path).absolute(), zone, self._opened)
+            self.start_opening(path.absolute(), zone, self._opened)
 
     def start_opening(
         self,
@@ -226,7 +228,7 @@ class Files(QObject):
         """Return the stem of file names that dialogs suggest: that of the case or the mesh."""
         session = self.window.store.session
         path = session.case.source or session.path
-        return path.stem if path is not None else "mesh"
+        return stem_of(path) if path is not None else "mesh"
 
     def save_mesh(self, last: bool = False, then: Callable[[], object] | None = None) -> None:
         """Ask for a file name and start the job that writes the mesh of the shown (or last) step.

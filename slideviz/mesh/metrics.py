@@ -36,6 +36,7 @@ from slideviz.mesh.model import (
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.topology import vertex_normals
+from slideviz.mesh.zones import zones_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import WeakCache
@@ -192,12 +193,15 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     check_cells(mesh)
     check_size(mesh)
     counted = slice(None) if mesh.halo is None else ~mesh.halo.cells
+    if mesh.whole_cells is not None and METRICS[name].where == "cells":
+        counted = np.diff(mesh.whole_cells, prepend=-1) > 0
     if METRICS[name].compares:
         if reference is None:
             raise CaseError(f"{name} compares with the undeformed mesh; give a reference")
         base = checked_reference(reference, mesh)
         key = name, None if base is mesh else base  # a key must not keep its own mesh alive
         values = _cached(mesh, key, lambda: {key: path_margins(mesh, base)})
+        values = _of_whole(mesh, name, values)
         return MetricValues(name, values, values, counted)
     signs = reference_of(mesh if reference is None else reference)[1]
     turned = hash(signs.tobytes()) if (signs < 0).any() else 0
@@ -207,6 +211,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         lambda: {(each, turned): v for each, v in _FAMILIES[name](mesh, signs).items()},
     )
     if METRICS[name].where == "cells":
+        values = _of_whole(mesh, name, values)
         return MetricValues(name, values, values, counted)
     place = ("cells", name, turned)
     best = METRICS[name].best
@@ -260,6 +265,15 @@ def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no
         found[i] = worst
 
 
+def _of_whole(mesh: Mesh, name: Metric, values: FloatArray) -> FloatArray:
+    """Return values (m,) in which each part of a polyhedron has the worst of its parts."""
+    if mesh.whole_cells is None:
+        return values
+    first = np.diff(mesh.whole_cells, prepend=-1) > 0
+    worst = np.minimum if METRICS[name].best == "high" else np.maximum
+    return sealed(worst.reduceat(values, np.flatnonzero(first))[np.cumsum(first) - 1])
+
+
 Made = Mapping[Metric, FloatArray]  # metrics that are computed together, with their values
 
 
@@ -278,8 +292,15 @@ def _shapes(mesh: Mesh, signs: Signs) -> Made:
 
 
 def _faces(mesh: Mesh, signs: Signs) -> Made:
-    """Return the metrics that compare a cell with its neighbours."""
+    """Return the metrics that compare a cell with its neighbours; of polyhedra as such."""
     cells = mesh.cells
+    if mesh.whole_cells is not None:
+        rated = []
+        for zone in zones_of(mesh):
+            polyhedra = zone.origin.polyhedra
+            assert polyhedra is not None
+            rated.append(np.stack(polyhedra.faces.worst_of_faces(zone.points))[:, polyhedra.cell])
+        return dict(zip(_OF_FACES, np.concatenate(rated, axis=1), strict=True))
     sides = sides_of(mesh.cells)
     centres = np.empty((len(cells), 3))
     volumes = np.empty(len(cells))
@@ -301,7 +322,10 @@ def _faces(mesh: Mesh, signs: Signs) -> Made:
 
     cells.in_parts(find_centres)
     cells.in_parts(rate_faces)
-    return {"non-orthogonality": found[0], "skewness": found[1], "expansion": found[2]}
+    return dict(zip(_OF_FACES, found, strict=True))
+
+
+_OF_FACES: tuple[Metric, ...] = ("non-orthogonality", "skewness", "expansion")
 
 
 def _nodes(mesh: Mesh, signs: Signs) -> Made:

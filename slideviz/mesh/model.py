@@ -18,6 +18,8 @@ from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
+    from slideviz.mesh.polyhedra import Polyhedra
+    from slideviz.terms import Role
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -278,6 +280,10 @@ class Origin:
     """The lines of the file, from 0, that its boxes are on, if that is known."""
     ffd_elsewhere: Mapping[str, int] = field(default_factory=dict, kw_only=True)
     """Names of the boxes that other zones of the file have, and the numbers of these zones."""
+    roles: Mapping[str, Role] = field(default_factory=dict, kw_only=True)
+    """Roles that boundaries have by the file, by their names in it, where a case gives none."""
+    polyhedra: Polyhedra | None = field(default=None, kw_only=True)
+    """The cells of the file where cells of the mesh may be parts of these; None: they are not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,6 +354,29 @@ class Mesh:
     def undeformed(self) -> Mesh:
         """Return the mesh with the undeformed cells: its reference, or itself without one."""
         return self if self.reference is None else self.reference
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """Return the roles that boundaries have by the file, where it says so."""
+        return {
+            name: part.mesh.origin.roles[alone.name]
+            for part in self.parts
+            for name, alone in zip(self.marker_names[part.markers], part.mesh.markers, strict=True)
+            if alone.name in part.mesh.origin.roles
+        }
+
+    @cached_property
+    def whole_cells(self) -> IntArray | None:
+        """Return the number (m,) of the file's cell that each cell is in, ascending.
+
+        None where each is one itself.
+        """
+        of_parts = [part.mesh.origin.polyhedra for part in self.parts]
+        if None in of_parts:
+            return None
+        cells = [one.cell for one in of_parts if one is not None]
+        begin = offsets_of([one[-1] + 1 for one in cells])
+        return sealed(np.concatenate([one + a for one, a in zip(cells, begin, strict=False)]))
 
     @check_types
     def with_reference(self, reference: Mesh | None) -> Self:
@@ -427,8 +456,8 @@ class Mesh:
         return node
 
     def cell_number(self, cell: int) -> int:
-        """Return the number that a cell has in its file, for messages."""
-        return cell
+        """Return the number that a cell, or the polyhedron it is in, has in its file."""
+        return cell if self.whole_cells is None else int(self.whole_cells[cell])
 
     @check_types
     def with_points(self, points: ArrayLike) -> Self:

@@ -182,8 +182,11 @@ class Quality:
     halo: BoolArray | None = None
     """(m,): the cells of the halo. They have values like all others, but are copies: numbers of the
     whole mesh (minimum, mean, counts, histogram, worst cells) leave them out."""
+    first: BoolArray | None = None
+    """(m,): the first part of each polyhedron, and all other cells; the parts of a polyhedron have
+    the values of its lowest one, and count as one cell. None: there are no polyhedra."""
     derivative: QualityDerivative | None = None
-    """By the points, if it was asked for."""
+    """By the points, if it was asked for; of parts of polyhedra, each by itself."""
     of_mesh: QualityTotals | None = None
     """Those of all cells of the mesh, where the arrays are of a part of them or in a file."""
     limits: tuple[LimitResult, ...] = ()
@@ -194,8 +197,13 @@ class Quality:
 
     @property
     def counted(self) -> BoolArray | slice:
-        """Return an index (slice or mask) into ``values`` that leaves out the halo's cells."""
-        return slice(None) if self.halo is None else ~self.halo
+        """Return an index (slice or mask) into ``values`` that leaves out `copies`."""
+        return slice(None) if self.copies is None else ~self.copies
+
+    @property
+    def copies(self) -> BoolArray | None:
+        """Return a mask (m,) of the halo's cells, or of the further parts of polyhedra, or None."""
+        return self.halo if self.first is None else ~self.first
 
     @cached_property
     def totals(self) -> QualityTotals:
@@ -263,13 +271,13 @@ class Quality:
     @check_types
     def worst(self, n: int) -> IntArray:
         """Return the ids of the ``n`` cells of lowest value, worst first, ties by id."""
-        return lowest(self.values, n, None if self.halo is None else ~self.halo)
+        return lowest(self.values, n, None if self.copies is None else ~self.copies)
 
     @check_types
     def inverted_cells(self, n: int | None = None) -> IntArray:
         """Return the ids, ascending, of the (first ``n``) inverted cells, without the halo's."""
         mask = self.status == INVERTED
-        return np.flatnonzero(mask if self.halo is None else mask & ~self.halo)[:n]
+        return np.flatnonzero(mask if self.copies is None else mask & ~self.copies)[:n]
 
     @check_types
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
@@ -331,10 +339,29 @@ def quality(
         metric=metric,
         halo=None if mesh.halo is None else mesh.halo.cells,
     )
-    if not derivative:
-        return result
-    before = None if reference is None else sums
-    return replace(result, derivative=derivative_of(mesh, result, before, p, going_on))
+    if derivative:
+        before = None if reference is None else sums
+        result = replace(result, derivative=derivative_of(mesh, result, before, p, going_on))
+    return result if mesh.whole_cells is None else _of_whole(result, mesh.whole_cells)
+
+
+def _of_whole(parts: Quality, cell: IntArray) -> Quality:
+    """Return the quality in which each cell has that of the lowest part of its polyhedron.
+
+    ``cell`` (m,), ascending: the number of the polyhedron that each is in.
+    """
+    first = np.diff(cell, prepend=-1) > 0
+    worst = np.lexsort((parts.values, cell))[first][np.cumsum(first) - 1]
+    rank = np.array([VALID, UNPROVEN, INVERTED])  # from the best to the worst, and back
+    states = rank[np.maximum.reduceat(rank[parts.status], np.flatnonzero(first))]
+    return replace(
+        parts,
+        values=sealed(parts.values[worst]),
+        size=sealed(parts.size[worst]),
+        skew=sealed(parts.skew[worst]),
+        status=sealed(states[np.cumsum(first) - 1].astype(np.uint8)),
+        first=sealed(first),
+    )
 
 
 def cell_quality(

@@ -23,6 +23,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.formats.openfoam_paths import stem_of
 from slideviz.gui.commands import COMPARE, Command, fill_compare
 from slideviz.gui.widgets.build import (
     ModelIndex,
@@ -460,7 +461,7 @@ class RunsPanel(Panel):
         """Ask for a file name and write the table of all runs as CSV."""
         session = self.session
         folder = session.path.parent if session.path is not None else Path.home()
-        stem = session.path.stem if session.path is not None else "mesh"
+        stem = stem_of(session.path) if session.path is not None else "mesh"
         ask_and_write(
             self,
             "Export the table of runs",

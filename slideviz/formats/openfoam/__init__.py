@@ -1,0 +1,1 @@
+"""OpenFOAM's meshes (``polyMesh``): reading, and writing back with other points."""

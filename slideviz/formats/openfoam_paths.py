@@ -1,0 +1,64 @@
+"""Where a mesh of OpenFOAM is: the file that stands for it.
+
+That is its ``points`` (``points.gz``), or of several regions ``regionProperties``. A case's folder,
+one of its times, its ``polyMesh``, and a ``.foam`` file in it lead to that file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ENDING = ".foam"
+REGIONS = "regionProperties"
+_NAMES = ("points", "points.gz", REGIONS)
+
+
+def ending_of(path: Path) -> str:
+    """Return the ending of a mesh file, in lower case: ``.foam`` for one of OpenFOAM."""
+    return ENDING if path.name in _NAMES else path.suffix.lower()
+
+
+def instance_of(path: Path) -> tuple[Path, str]:
+    """Return the folder ``constant`` or time of a mesh's file, and the region of its ``points``."""
+    within = path.parent if path.name == REGIONS else path.parent.parent
+    outside = within.parent
+    if outside.name == "constant" or is_time(outside):
+        return outside, within.name
+    return within, ""
+
+
+def case_folder(path: Path) -> Path:
+    """Return the folder of the case of a mesh's ``points`` or ``regionProperties``."""
+    return instance_of(path.absolute())[0].parent
+
+
+def stem_of(path: Path) -> str:
+    """Return the name of a mesh file without its ending; of OpenFOAM that of its case."""
+    if path.name in _NAMES:
+        return case_folder(path).name or "mesh"
+    return path.stem
+
+
+def is_time(folder: Path) -> bool:
+    """Return whether a folder is one of a case's times."""
+    return folder.name.replace(".", "", 1).isdecimal() and (folder.parent / "constant").is_dir()
+
+
+def mesh_path(path: Path) -> Path:
+    """Return the file that stands for a mesh, which need not exist; other paths as they are."""
+    folder = path
+    if path.suffix.lower() == ENDING:
+        folder = path.parent if (path.parent / "constant").is_dir() else path.with_suffix("")
+    constant = folder / "constant"
+    if folder.name == "polyMesh" and folder.is_dir():
+        mesh = folder
+    elif (folder / "polyMesh").is_dir() or is_time(folder):
+        mesh = folder / "polyMesh"
+    elif (constant / REGIONS).is_file() and any(constant.glob("*/polyMesh")):
+        return constant / REGIONS
+    elif folder != path or (constant / "polyMesh").is_dir():
+        mesh = constant / "polyMesh"
+    else:
+        return path
+    packed = mesh / "points.gz"
+    return packed if packed.exists() and not (mesh / "points").exists() else mesh / "points"
