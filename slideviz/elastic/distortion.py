@@ -15,7 +15,7 @@ round some work on what the one before left. A cell in a plane has a third edge 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -25,7 +25,7 @@ from slideviz.elastic.stiffness import by_node
 from slideviz.mesh.jacobians import CORNERS, LANES, add3, cross3, dot3, edge, gather
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.system.jit_cache import njit
-from slideviz.system.threads import in_parts
+from slideviz.system.threads import PART, in_parts
 
 COUPLING = 1.5
 THIN = 0.3
@@ -44,6 +44,7 @@ class Part:
 
     vtk: int
     nodes: IntArray  # (m, n)
+    rows: IntArray  # (m, n): of `Distortion.owners`, one after the other in each part of the cells
     coupling: FloatArray  # (m,): lam
 
 
@@ -53,6 +54,8 @@ class Distortion:
 
     points: FloatArray  # (n, d): undeformed
     parts: tuple[Part, ...]
+    owners: IntArray
+    """(r,): the nodes of each part of the cells that threads share, whose sums are added last."""
 
     @property
     def count(self) -> int:
@@ -63,11 +66,20 @@ class Distortion:
     def of(cls, points: FloatArray, cells: Cells) -> Distortion:
         """Return the energy of ``cells`` with undeformed ``points`` (n, d)."""
         points = frozen_array(points, np.float64)
-        parts = tuple(
-            Part(vtk, sealed(nodes), sealed(_coupling(points[nodes])))
-            for vtk, (_, nodes) in cells.by_type.items()
-        )
-        return cls(points, parts)
+        last = np.full(len(points), -1, np.int32)
+        owners = []
+        parts = []
+        count = 0
+        for vtk, (_, nodes) in cells.by_type.items():
+            rows = np.empty(nodes.shape, np.int32)
+            own = np.empty(nodes.size, np.int32)
+            own = own[: number_rows(nodes, PART, count, last, rows, own)].copy()
+            owners.append(own)
+            count += len(own)
+            coupling = np.empty(len(nodes))
+            in_parts(partial(_write_coupling, points, nodes, coupling), len(nodes))
+            parts.append(Part(vtk, sealed(nodes), sealed(rows), sealed(coupling)))
+        return cls(points, tuple(parts), sealed(np.concatenate(owners)))
 
     def slopes(
         self, x: FloatArray, worst: float = WORST, epsilon: float = 0.0
@@ -81,32 +93,36 @@ class Distortion:
         least = np.empty(self.count)
         folded: list[bool] = []
 
-        def add(part: Part, rows: slice, place: slice, out: FloatArray) -> None:
+        def add(part: Part, cells: slice, place: slice) -> None:
             if folded:
                 return
             write_slopes(
                 self.points,
                 x,
-                part.nodes[rows],
+                part.nodes[cells],
+                part.rows[cells],
                 CORNERS[part.vtk],
-                part.coupling[rows],
+                part.coupling[cells],
                 worst,
                 epsilon,
                 values[place],
-                out,
+                sums,
                 least[place],
             )
             if not np.isfinite(values[place.start]):
                 folded.append(True)
 
-        each = self._by_corner(add)
+        sums = np.zeros((len(self.owners), x.shape[1]))
+        self._in_parts(add)
         if folded:
             return np.inf, np.zeros_like(x), np.full(self.count, -np.inf)
-        return float(values.sum()), self._by_node(each), least
+        return float(values.sum()), self._by_node(sums), least
 
     def product(self, x: FloatArray, t: FloatArray) -> FloatArray:
         """Return the Hessian at x (n, d), where no cell is folded, times t (n, d)."""
-        return self._by_node(self._products(x, t))
+        sums = np.zeros((len(self.owners), x.shape[1]))
+        self._add_products(x, t, [part.rows for part in self.parts], sums)
+        return self._by_node(sums)
 
     def stiffness(self, x: FloatArray) -> FloatArray:
         """Return the mean curvatures of cells at x (n, d) by rows of their maps F, (m, d, d, d).
@@ -115,87 +131,104 @@ class Distortion:
         """
         d = x.shape[1]
         out = np.empty((self.count, d, d, d))
+        sizes = [part.nodes.size for part in self.parts]
+        ends = np.cumsum(sizes)
+        corners = [
+            np.arange(end - size, end, dtype=np.int32).reshape(part.nodes.shape)
+            for part, size, end in zip(self.parts, sizes, ends, strict=True)
+        ]
         for i, j in np.ndindex(d, d):
             stretch = np.zeros_like(x)
             stretch[:, i] = self.points[:, j]
-            each = self._products(x, stretch)[:, i]
-            first = 0
+            each = np.zeros((sum(sizes), d))
+            self._add_products(x, stretch, corners, each)
             cell = 0
-            for part in self.parts:
-                m, n = part.nodes.shape
+            for part, rows in zip(self.parts, corners, strict=True):
+                m = len(part.nodes)
                 edges = self.points[part.nodes] - self.points[part.nodes[:, :1]]
-                pulls = each[first : first + m * n].reshape(m, n)
-                out[cell : cell + m, i, j] = np.einsum("mn,mnk->mk", pulls, edges)
-                first += m * n
+                out[cell : cell + m, i, j] = np.einsum("mn,mnk->mk", each[rows, i], edges)
                 cell += m
         size, along = np.linalg.eigh(out)
         size = np.maximum(size, LEAST * np.abs(size).max(axis=-1, keepdims=True))
         return np.einsum("mixk,mik,miyk->mixy", along, size, along)
 
-    def _products(self, x: FloatArray, t: FloatArray) -> FloatArray:
-        """Return the Hessians of cells at x (n, d) times t (n, d), for the corners of each."""
+    def _add_products(
+        self, x: FloatArray, t: FloatArray, rows: Sequence[IntArray], out: FloatArray
+    ) -> None:
+        """Add the Hessians of cells at x (n, d) times t (n, d) to ``rows`` (m, n) of out."""
         x = sealed(np.ascontiguousarray(x))
         t = sealed(np.ascontiguousarray(t))
+        of_part = dict(zip(self.parts, rows, strict=True))
 
-        def add(part: Part, rows: slice, _place: slice, out: FloatArray) -> None:
+        def add(part: Part, cells: slice, _place: slice) -> None:
             write_product(
                 self.points,
                 x,
                 t,
-                part.nodes[rows],
+                part.nodes[cells],
+                of_part[part][cells],
                 CORNERS[part.vtk],
-                part.coupling[rows],
+                part.coupling[cells],
                 WORST,
                 out,
             )
 
-        return self._by_corner(add)
+        self._in_parts(add)
 
-    def _by_corner(self, add: Callable[[Part, slice, slice, FloatArray], None]) -> FloatArray:
-        """Return what ``add`` writes for the corners of all cells, one after the other."""
-        each = np.empty((sum(part.nodes.size for part in self.parts), self.points.shape[1]))
+    def _in_parts(self, add: Callable[[Part, slice, slice], None]) -> None:
+        """Call ``add`` for all cells, with slices of a type's cells and of all of them."""
         first = 0
-        cell = 0
-        for part in self.parts:
-            m, a = part.nodes.shape
-            corners = each[first : first + m * a].reshape(m, a, -1)
-            in_parts(partial(_one_part, add, part, cell, corners), m)
-            first += m * a
-            cell += m
-        return each
 
-    def _by_node(self, each: FloatArray) -> FloatArray:
-        """Return the sums (n, d) over the corners of each node."""
+        def with_place(part: Part, cells: slice) -> None:
+            add(part, cells, slice(first + cells.start, first + cells.stop))
+
+        for part in self.parts:
+            in_parts(partial(with_place, part), len(part.nodes))
+            first += len(part.nodes)
+
+    def _by_node(self, sums: FloatArray) -> FloatArray:
+        """Return the sums (n, d) over the rows of each node."""
         out = np.empty(self.points.shape)
-        indptr, entries = self._corners
+        indptr, entries = self._rows_of_nodes
         in_parts(
-            lambda s: add_by_node(indptr[s.start : s.stop + 1], entries, each, out[s]), len(out)
+            lambda s: add_by_node(indptr[s.start : s.stop + 1], entries, sums, out[s]), len(out)
         )
         return out
 
     @cached_property
-    def _corners(self) -> tuple[IntArray, IntArray]:
-        nodes = np.concatenate([part.nodes.ravel() for part in self.parts])
-        return by_node(nodes, len(self.points))
+    def _rows_of_nodes(self) -> tuple[IntArray, IntArray]:
+        return by_node(self.owners, len(self.points))
 
 
-def _one_part(
-    add: Callable[[Part, slice, slice, FloatArray], None],
-    part: Part,
-    cell: int,
-    corners: FloatArray,
-    rows: slice,
-) -> None:
-    add(part, rows, slice(cell + rows.start, cell + rows.stop), corners[rows])
-
-
-def _coupling(corners: FloatArray) -> FloatArray:
-    """Return lam (m,) of cells with corner points (m, n, d)."""
+def _write_coupling(points: FloatArray, nodes: IntArray, out: FloatArray, rows: slice) -> None:
+    """Write lam of cells (m,) with ``nodes`` (m, n), in ``rows``."""
+    corners = points[nodes[rows]]
     apart = corners - corners.mean(axis=1, keepdims=True)
     squares = np.linalg.eigvalsh(np.einsum("mai,maj->mij", apart, apart))
     thinness = np.sqrt(np.maximum(squares[:, 0], 0.0) / np.maximum(squares[:, -1], 1e-300))
     t = np.minimum(thinness / THIN, 1.0)
-    return COUPLING * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    out[rows] = COUPLING * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+
+
+@njit
+def number_rows(nodes, size, count, last, rows, owners):  # type: ignore[no-untyped-def]
+    """Write the row of each corner of cells (m, n), from ``count`` on; return how many there are.
+
+    Each part of ``size`` cells has one for each of its nodes, which is written to ``owners``.
+    ``last``: the row that a node had last, or -1.
+    """
+    stop = count
+    for first in range(0, len(nodes), size):
+        begin = stop
+        for cell in range(first, min(first + size, len(nodes))):
+            for k in range(nodes.shape[1]):
+                node = nodes[cell, k]
+                if last[node] < begin:
+                    last[node] = stop
+                    owners[stop - count] = node
+                    stop += 1
+                rows[cell, k] = last[node]
+    return stop - count
 
 
 @njit
@@ -304,10 +337,12 @@ def _add_pulls(pull, corner, slope):  # type: ignore[no-untyped-def]
 
 
 @njit
-def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out, least):  # type: ignore[no-untyped-def]
-    """Write the energies of cells (m,), their slopes (m, n, d) by nodes, and least J (m,).
+def write_slopes(  # type: ignore[no-untyped-def]
+    points, x, nodes, rows, table, coupling, worst, epsilon, values, out, least
+):
+    """Write the energies of cells (m,) and least J (m,), and add their slopes to ``rows`` of out.
 
-    It ends at the first cell whose energy is infinite.
+    ``rows`` (m, n): of each node. It ends at the first cell whose energy is infinite.
     """
     n = nodes.shape[1]
     start = np.zeros((3, n, LANES))
@@ -369,20 +404,20 @@ def write_slopes(points, x, nodes, table, coupling, worst, epsilon, values, out,
                 _write_pulls(duals, columns, c, pull)
             _add_pulls(pull, corner, slope)
         values[first : first + count] = value[:count]
-        _write_nodes(slope, first, count, out)
+        _add_to_rows(slope, rows[first : first + count], out)
 
 
 @njit(inline="always")
-def _write_nodes(slope, first, count, out):  # type: ignore[no-untyped-def]
-    for c in range(count):
-        for j in range(out.shape[1]):
-            for axis in range(out.shape[2]):
-                out[first + c, j, axis] = slope[axis, j, c]
+def _add_to_rows(slope, rows, out):  # type: ignore[no-untyped-def]
+    for c in range(len(rows)):
+        for j in range(rows.shape[1]):
+            for axis in range(out.shape[1]):
+                out[rows[c, j], axis] += slope[axis, j, c]
 
 
 @njit
-def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ignore[no-untyped-def]
-    """Write the Hessians of cells times t (n, d), (m, n, d) by nodes."""
+def write_product(points, x, t, nodes, rows, table, coupling, worst, out):  # type: ignore[no-untyped-def]
+    """Add the Hessians of cells times t (n, d) to ``rows`` (m, n) of out, of each node."""
     n = nodes.shape[1]
     start = np.zeros((3, n, LANES))
     at = np.zeros((3, n, LANES))
@@ -456,7 +491,7 @@ def write_product(points, x, t, nodes, table, coupling, worst, out):  # type: ig
                 )
                 _write_pulls(duals, columns, c, pull)
             _add_pulls(pull, corner, slope)
-        _write_nodes(slope, first, count, out)
+        _add_to_rows(slope, rows[first : first + count], out)
 
 
 @njit
