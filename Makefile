@@ -27,7 +27,8 @@ setup: ## make .venv/bin/slideviz and all it needs (does nothing when it is ther
 upgrade: ## renew constraints.txt, the versions that setup installs (PYTHON=/path/to/python3.11)
 	@tools/upgrade.sh
 
-demo: setup ## deform a blade passage into demo/ and open it (WINDOW=no: do not open it)
+demo: ## deform a blade passage into demo/ and open it (WINDOW=no: do not open it)
+	@tools/setup.sh run
 	@tools/demo.sh
 
 test: setup ## fast tests (ARGS="-k name": only some)

@@ -32,6 +32,7 @@ for method in fixed sliding; do
     describe "passage_${method}_qual.txt" 'its quality, a number for each cell (GENERATE_QUALITY= YES)'
 done
 describe passage_sliding.json 'the report of the run, for other programs'
+printf '\nOther methods compile when they are first used, up to half a minute; the window does so by itself.\n'
 if [ "${WINDOW:-yes}" = no ]; then
     printf '\nthe window: %s %s\n' "$slideviz" "$case"
 elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then

@@ -1,23 +1,28 @@
 #!/usr/bin/env bash
 # Makes .venv/bin/slideviz, with everything to run and test it, in the versions of constraints.txt.
 # Does nothing where all is there. `tools/setup.sh docs` adds what builds the documentation.
+# `tools/setup.sh run` installs only what slideviz runs with, and leaves compilation to first use.
 #
 # PYTHON=/path/to/python chooses the interpreter; SYSTEM_PACKAGES=no leaves apt alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 VENV=.venv
-EXTRAS=test,dev${1:+,$1}
 STAMP=$VENV/.installed${1:+-$1}
-# What the Qt and VTK wheels expect of the system, a screen that is not there (Xvfb) for the
-# tests of the window, a font, and MPI, which mpi4py has not, for the tests of runs on several ranks.
+case "${1:-}" in
+run) EXTRAS= ;;
+*) EXTRAS=test,dev${1:+,$1} ;;
+esac
+# What the Qt and VTK wheels expect of the system, and a font.
 PACKAGES=(
-    xvfb xauth xdotool fonts-dejavu-core
+    fonts-dejavu-core
     libgl1 libegl1 libglx-mesa0 libopengl0 libglib2.0-0 libdbus-1-3 libfontconfig1 libxrender1
     libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
     libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xfixes0
-    openmpi-bin
 )
+# A screen that is not there (Xvfb) for the tests of the window, and MPI, which mpi4py has not, for
+# the tests of runs on several ranks.
+[ -z "$EXTRAS" ] || PACKAGES+=(xvfb xauth xdotool openmpi-bin)
 
 say() { printf 'setup: %s\n' "$*"; }
 fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
@@ -104,20 +109,33 @@ make_venv() {
 # All that decides what pip would install.
 fingerprint() { { $VENV/bin/python --version; cat pyproject.toml constraints.txt; } | sha256sum; }
 
+is_installed() {
+    local now stamp stamps=("$STAMP")
+    [ -x $VENV/bin/slideviz ] || return 1
+    [ -n "$EXTRAS" ] || stamps+=("$VENV/.installed") # which has more
+    now=$(fingerprint)
+    for stamp in "${stamps[@]}"; do
+        [ "$(cat "$stamp" 2>/dev/null)" != "$now" ] || return 0
+    done
+    return 1
+}
+
 install_slideviz() {
-    if [ -x $VENV/bin/slideviz ] && [ "$(cat "$STAMP" 2>/dev/null)" = "$(fingerprint)" ]; then
-        return 0
-    fi
-    say "installing slideviz [$EXTRAS] into $VENV (a few minutes the first time)"
+    if is_installed; then return 0; fi
+    say "installing slideviz${EXTRAS:+ [$EXTRAS]} into $VENV (up to some minutes the first time)"
     rm -f "$STAMP"
     $VENV/bin/python -m pip install --quiet --disable-pip-version-check \
-        --constraint constraints.txt --editable ".[$EXTRAS]" \
+        --constraint constraints.txt --editable ".${EXTRAS:+[$EXTRAS]}" \
         </dev/null || fail "pip could not install slideviz; its message is above"
-    # Else the first command, or each process of the tests, would do it.
+    # Else each process of the tests would do it.
+    [ -z "$EXTRAS" ] || compile_numerics
+    fingerprint >"$STAMP"
+}
+
+compile_numerics() {
     say "compiling the numerics (a minute)"
     $VENV/bin/python -c 'from slideviz.session.jit_warmup import warm_up
 warm_up(lambda: None, lambda: False)' </dev/null || say "not compiled; the first command does it"
-    fingerprint >"$STAMP"
 }
 
 install_system_packages
