@@ -51,6 +51,7 @@ def _lacking(name):
             "the window lacks libraries of the system",
             "sudo apt-get install libegl1",
         ),
+        ("FONTS", (), "finds no font", "sudo apt-get install fontconfig-config fonts-dejavu-core"),
         ("LEAST_MEMORY", float("inf"), "of memory are free", "close other programs"),
         ("LEAST_DISK", float("inf"), "are free for temporary files", "free some space in /"),
     ],

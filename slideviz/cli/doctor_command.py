@@ -27,6 +27,7 @@ Rows = Iterator[tuple[str, object] | Problem]
 
 LEAST_MEMORY = 2 << 30  # bytes below which a window with a small mesh may not start
 LEAST_DISK = 1 << 29  # bytes; compiled loops take a tenth of it
+FONTS = ("/usr/share/fonts", "/usr/local/share/fonts")
 EXTRAS = ("mpi4py", "openmdao", "distributed")
 """Packages of extras, without which all but their features works."""
 
@@ -143,6 +144,11 @@ def _drawing(report: Report) -> Iterator[tuple[str, object]]:
 
     if sys.platform.startswith("linux"):
         yield "display", display_fault() or os.environ.get("DISPLAY") or "Wayland"
+        has_fonts = any(any(Path(folder).rglob("*.[to]tf")) for folder in FONTS)
+        yield "fonts", "some" if has_fonts else "none"
+        if not has_fonts:
+            remedy = apt_install(("fontconfig-config", "fonts-dejavu-core"))
+            report.problems.append(("the window finds no font for its letters", remedy))
     if missing := missing_for_window():
         yield "window", "missing libraries"
         words = "the window lacks libraries of the system"

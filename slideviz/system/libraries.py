@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 
 WINDOW = {
     "libEGL.so.1": "libegl1",
@@ -37,8 +38,11 @@ def missing_for_window() -> list[str]:
 
 
 def is_loadable(names: Iterable[str]) -> bool:
-    """Return whether the system's loader finds one of these libraries."""
+    """Return whether the system's loader finds one of these libraries, or PyInstaller's folder."""
+    folder = getattr(sys, "_MEIPASS", None)
     for name in names:
+        if folder is not None and Path(folder, name).exists():
+            return True
         try:
             ctypes.CDLL(name)
         except OSError:

@@ -74,5 +74,8 @@ def test_libraries_of_the_window_are_named_by_their_packages(monkeypatch, tmp_pa
     monkeypatch.setattr(offscreen, "display_fault", lambda: "")
     assert run([]) == 1
     assert "use `sudo apt-get install libgl1 libxcb-cursor0`" in capsys.readouterr().err
+    monkeypatch.setattr(libraries.sys, "_MEIPASS", str(tmp_path), raising=False)
+    (tmp_path / "libxcb-cursor.so.0").touch()
+    assert libraries.missing_for_window() == ["libgl1"]
     monkeypatch.setattr(libraries.sys, "platform", "win32")
     assert libraries.missing_for_window() == []
