@@ -15,7 +15,7 @@ SEED := 0
 MINUTES := 10
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz shots study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz shots folder deb study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -81,6 +81,12 @@ fuzz: setup ## search for faults with damaged files and absurd cases (MINUTES=10
 
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/python -m tools.shots
+
+folder: ## a folder with slideviz that runs without Python, into build/folder/slideviz (PyInstaller)
+	@packaging/folder.sh
+
+deb: ## a package for Debian 12 and newer, of that folder, into dist/
+	@packaging/deb.sh
 
 study: setup ## the thesis's cases, and a contest, into study/ (ARGS=--quick: small ones; MESHES=SU2's)
 	$(BIN)/python -m tools.study $(ARGS)
