@@ -39,7 +39,7 @@ def test_a_wheel_has_the_pages(monkeypatch, tmp_path):
     """Each section of the index is copied to the place where an installed copy looks."""
     tables = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
     copied = tables["targets"]["wheel"]["force-include"]
-    assert "docs/**/*.md" in tables["targets"]["sdist"]["include"]
+    assert "/docs/**/*.md" in tables["targets"]["sdist"]["include"]
     sections = {path.parent.name for level, path in manual_pages(ROOT / "docs") if level == 0}
     assert {f"docs/{name}" for name in sections} | {"docs/index.md"} == set(copied)
     assert all(there == f"slideviz/manual/{here[5:]}" for here, there in copied.items())
