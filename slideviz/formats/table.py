@@ -79,7 +79,7 @@ class MeshFormat:
     sections: bool = False
     """Whether it keeps other sections of SU2 texts, such as FFD boxes and halos."""
     copies: bool = False
-    """Whether a file can be written only as a copy of the one that the mesh was read from."""
+    """Whether a mesh that was read from such a file is written as a copy of it."""
     require: str = ""  # raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``
     zones: bool = False  # whether it keeps several zones apart
     content: str = ""
@@ -148,12 +148,11 @@ _ROWS = (
     MeshFormat(".xdmf", "XDMF, with quality", quality=True, boundaries="numbers"),
     MeshFormat(
         ".cgns",
-        "CGNS (a copy of the file, with other coordinates)",
+        "CGNS (of a CGNS file a copy, with other coordinates)",
         "cgns.read:read_cgns",
         "cgns.read:write_cgns",
         solver=True,
         copies=True,
-        require="cgns.read:require_cgns",
     ),
     MeshFormat(
         ".foam",
@@ -167,11 +166,33 @@ _ROWS = (
         zones=True,
     ),
     MeshFormat(".med", "MED for Salome, with quality", quality=True),
-    MeshFormat(".msh", "Gmsh"),
+    MeshFormat(".msh", "Gmsh 4.1", writer="gmsh.write:write_gmsh"),
+    *(
+        MeshFormat(
+            f".{kind}.ugrid",
+            f"UGRID, {order}",
+            writer="ugrid.write:write_ugrid",
+            require="ugrid.write:require_ugrid",
+            solver=True,
+            boundaries="numbers",
+            dims=(3,),
+        )
+        for kind, order in (("b8", "big-endian"), ("lb8", "little-endian"))
+    ),
     MeshFormat(".inp", "Abaqus"),
     MeshFormat(".vol", "Netgen"),
     MeshFormat(".mesh", "Medit", boundaries="numbers"),
-    MeshFormat(".bdf", "Nastran", boundaries="numbers", dims=(3,)),
+    *(
+        MeshFormat(
+            ending,
+            "Nastran",
+            writer="nastran.write:write_nastran",
+            solver=True,
+            boundaries="numbers",
+            dims=(3,),
+        )
+        for ending in (".bdf", ".nas")
+    ),
 )
 FORMATS: dict[str, MeshFormat] = {row.ending: row for row in _ROWS}
 """Formats by ending; meshio writes more, but hardly any that stores boundaries besides cells."""
@@ -183,7 +204,10 @@ FILE_FORMATS: dict[FileFormat, Term] = {
 
 def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """Return the format of a file to write: ``file_format``, or that of its ending."""
-    return FORMATS.get(f".{file_format}" if file_format else ending_of(path), MESHIO)
+    if file_format:
+        return FORMATS[f".{file_format}"]
+    several = "".join(path.suffixes[-2:]).lower()
+    return FORMATS.get(several) or FORMATS.get(ending_of(path), MESHIO)
 
 
 def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
@@ -194,7 +218,7 @@ def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     try:
         require_regular_file(path, MeshError)
         ending = ending_of(path)
-        row = FORMATS.get(ending, MESHIO)
+        row = format_for(path)
         if not (file_format or row.detects or ending in _UNSURE):
             return row
         path.open("rb").close()
@@ -221,11 +245,12 @@ def own_endings(*fields: str) -> str:
 
 
 def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
-    """Return the formats that can store a mesh, by ending; CGNS only if it was read from CGNS."""
+    """Return the formats that can store a mesh, by ending; OpenFOAM only if it was read from it."""
     return {
         row.ending: row
         for row in _ROWS
-        if mesh.dim in row.dims and (not row.copies or mesh.origin.ending == row.ending)
+        if mesh.dim in row.dims
+        and (not (row.copies and row.require) or mesh.origin.ending == row.ending)
     }
 
 

@@ -121,10 +121,11 @@ def test_chunked_and_compressed_coordinates(passage, tmp_path):
     assert bits(read_cgns(tmp_path / "out.cgns").points) == bits(turned(mesh.points))
 
 
-def test_a_mesh_from_another_format_is_refused(tmp_path):
-    with pytest.raises(MeshError, match=r"out.cgns: a CGNS file is written as a copy of the one"):
-        write(tmp_path / "out.cgns", cube(4))
-    assert list(tmp_path.iterdir()) == []
+def test_a_mesh_from_another_format_becomes_a_new_file(tmp_path):
+    write(tmp_path / "out.cgns", cube(4))
+    again = read_cgns(tmp_path / "out.cgns")
+    assert bits(again.points) == bits(cube(4).points)
+    assert again.marker_names == cube(4).marker_names
 
 
 def test_cell_data_are_refused(passage, tmp_path):
@@ -204,20 +205,11 @@ def test_a_case_deforms_it_as_it_does_the_same_mesh_in_su2(passage, tmp_path, ca
     assert plain.splitlines()[1:] == text.splitlines()[1:]
 
 
-def test_cgns_for_a_mesh_of_su2_is_refused_before_the_work(passage, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path / "same.su2", read_cgns(passage))
-    (tmp_path / "same.cfg").write_text(CASE.format(mesh="same.su2", out="a.cgns"))
-    monkeypatch.setattr("slideviz.cli.run_command.deform", None)  # no work is begun
-    assert run(["run", "same.cfg"]) == 1
-    assert "same.su2 is from none; write .su2" in capsys.readouterr().err
-
-
-def test_the_window_offers_it_for_meshes_of_cgns(passage, tmp_path):
+def test_the_window_offers_it_and_says_what_other_files_lose(passage, tmp_path):
     mesh = read_cgns(passage)
     assert ".cgns" in formats_for(mesh)
     assert left_out(tmp_path / "a.cgns", mesh) == ""
     assert left_out(tmp_path / "a.su2", mesh) == (
         "a.su2 does not hold other contents of the CGNS file, such as zones and solutions."
     )
-    assert ".cgns" not in formats_for(cube(4))
+    assert ".cgns" in formats_for(cube(4))

@@ -2,7 +2,7 @@
 
 Read with h5py: VTK's reader returns neither one-to-one interfaces nor where each coordinate is in
 the file, which writing needs; and meshes need no VTK elsewhere. The standard is the SIDS (CGNS 4),
-mapped onto HDF5. A mesh is written as a copy of its file with other coordinates.
+mapped onto HDF5. A mesh of such a file is written as a copy of it with other coordinates.
 
 Nodes that two zones share by a one-to-one interface are merged. Periodic interfaces and those
 that are not one to one (mixing planes, overset grids) are left open: their faces are boundaries.
@@ -22,6 +22,7 @@ from scipy.spatial import KDTree
 
 from slideviz.errors import path_error, printable
 from slideviz.formats.cgns.tree import Node, cgns_file
+from slideviz.formats.cgns.write import write_tree
 from slideviz.formats.cgns.zone import (
     CgnsZone,
     conditions,
@@ -398,14 +399,19 @@ def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:
 
 
 def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
-    """Write a mesh that was read from a CGNS file as a copy of that file with its points.
+    """Write a mesh as a new file, or if it was read from CGNS as a copy of that with its points.
 
-    Coordinates that did not change keep the bits of the file; others are rounded to the file's
-    type, R4 or R8. Raises MeshError if the mesh was not read from a CGNS file, that file was
-    changed, or the new one cannot be written.
+    In a copy, coordinates that did not change keep the bits of the file; others are rounded to the
+    file's type, R4 or R8. Raises MeshError if that file was changed, or the new one cannot be
+    written.
     """
     check_mesh(mesh)
-    form, source = require_cgns(mesh, path)
+    form = mesh.origin
+    source = mesh.source
+    if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):
+        with hdf5_write(path, options.replaces) as draft:
+            write_tree(draft.tree, mesh)
+        return
     try:
         with hdf5_write(path, options.replaces, source) as draft:
             _replace(path, source, draft.tree, form, mesh.points)
@@ -415,23 +421,6 @@ def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
             f"cannot be written: {printable(source)}, of which it is a copy, cannot be read: "
             f"{problem.strerror or problem}; put that file back, or write .su2",
         ) from problem
-
-
-def require_cgns(mesh: Mesh, path: Path) -> tuple[CgnsForm, Path]:
-    """Return where the coordinates of a mesh are in the CGNS file it was read from, and that file.
-
-    ``path`` is the file to write, for messages. Raises MeshError if it was not read from a CGNS
-    file, so it cannot be written as one.
-    """
-    form = mesh.origin
-    source = mesh.source
-    if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):
-        raise path_error(
-            path,
-            "a CGNS file is written as a copy of the one that the mesh was read from, with other "
-            f"coordinates, but {mesh.name} is from none; write .su2, or .vtu for ParaView",
-        )
-    return form, source
 
 
 def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: FloatArray) -> None:

@@ -30,11 +30,11 @@ TETRA_35 PYRA_P4_29 PYRA_50 PYRA_55 PENTA_33 PENTA_66 PENTA_75 HEXA_44 HEXA_98 H
 """Names of ``ElementType_t`` by number."""
 _VTK = {"NODE": 1, "BAR_2": 3, "TRI_3": 5, "QUAD_4": 9, "TETRA_4": 10, "PYRA_5": 14, "PENTA_6": 13}
 _VTK["HEXA_8"] = 12
-_TYPES = {_NAMES.index(name): vtk for name, vtk in _VTK.items()}
+TYPES = {_NAMES.index(name): vtk for name, vtk in _VTK.items()}
 """VTK identifier by number of the ``ElementType_t``, of the types that slideviz reads."""
 _SIZES = np.zeros(256, np.int64)
 """Number of nodes by number of the ``ElementType_t``; 0 for those that slideviz does not read."""
-_SIZES[list(_TYPES)] = [ELEMENTS[vtk].n_nodes for vtk in _TYPES.values()]
+_SIZES[list(TYPES)] = [ELEMENTS[vtk].n_nodes for vtk in TYPES.values()]
 _MIXED = _NAMES.index("MIXED")
 
 
@@ -112,7 +112,7 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
     """Return a section's first element number, and its elements, of nodes below ``n_points``."""
     kind = int(node.integers(2)[0])
     name = _NAMES[kind] if 0 <= kind < len(_NAMES) else str(kind)
-    if kind not in _TYPES and kind != _MIXED:
+    if kind not in TYPES and kind != _MIXED:
         what = "polygons and polyhedra" if name.startswith("N") else "elements of high order"
         raise node.fault(
             f"has {what} ({name}), but slideviz needs linear elements ({', '.join(_VTK)}, MIXED); "
@@ -141,7 +141,7 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
             f"{n_points}; export the mesh again"
         )
     vtk = np.zeros(256, np.uint8)
-    vtk[list(_TYPES)] = list(_TYPES.values())
+    vtk[list(TYPES)] = list(TYPES.values())
     return start, Cells.from_types(vtk[types], flat - 1)
 
 

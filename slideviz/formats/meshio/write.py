@@ -28,16 +28,12 @@ _NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
 """meshio's name of an element type by VTK identifier."""
 # Name of the cell data with the numbers of the boundaries, by format; else "marker".
 _TAG = {
-    "gmsh": "gmsh:physical",
     "med": "cell_tags",
     "medit": "medit:ref",
     "nastran": "nastran:ref",
     "netgen": "netgen:index",
     "ugrid": "ugrid:ref",
 }
-_NAMED = ("gmsh", "netgen")  # the formats with a table of names for these numbers
-_WRITTEN_AS = {"gmsh": "gmsh22"}
-"""Name of the version that meshio is to write; Gmsh 2.2 has a group on each element."""
 _EXACT = 1e-12  # largest error of a coordinate in a written file, as a fraction of the extent
 
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
@@ -58,7 +54,7 @@ def write_vtu(path: Path, mesh: Mesh, options: WriteOptions) -> None:
 def write_with_meshio(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh in the format of meshio that the ending names, without values on its points.
 
-    Gmsh, MED and Abaqus files have the names of boundaries; other formats have their numbers at
+    Netgen, MED and Abaqus files have the names of boundaries; other formats have their numbers at
     most. What meshio wrote is read again and compared, for meshio leaves out what a format cannot
     hold. Raises MeshError if the file cannot be written, or the format cannot hold the mesh.
     """
@@ -106,7 +102,7 @@ def _write_by_meshio(path: Path, trial: Path, data: meshio.Mesh, name: str) -> N
     # Without this XDMF puts the numbers in a second file.
     options = {"data_format": "XML"} if name == "xdmf" else {}
     with meshio_errors(path, f"written as {name}"):
-        meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
+        meshio.write(trial, data, file_format=name, **options)
 
 
 def _not_written(path: Path, trial: Path, data: meshio.Mesh, name: str) -> list[str]:
@@ -182,7 +178,7 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
         tags.append(np.zeros(len(nodes), np.int32))
         for key, array in cell_data.items():
             values[key].append(array[ids].astype(float))
-    for vtk, nodes, numbers in _boundary_blocks(mesh):
+    for vtk, nodes, numbers in boundary_blocks(mesh):
         blocks.append((_NAMES[vtk], nodes))
         tags.append(numbers.astype(np.int32))
         for key, array in cell_data.items():
@@ -200,18 +196,16 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
         # Families of elements have negative numbers there.
         tags = [-t for t in tags]
         data.cell_tags = {-number: [marker] for number, marker in names.items()}
-    if name in _NAMED:
+    if name == "netgen":
         data.field_data = {
             marker: np.array([number, mesh.dim - 1]) for number, marker in names.items()
         }
-    if name == "gmsh":
-        data.cell_data["gmsh:geometrical"] = tags
     if names:
         data.cell_data[_TAG.get(name, "marker")] = tags
     return data
 
 
-def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
+def boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
     """Return for each type of boundary element: type, nodes (m, n), marker's number from 1 (m,)."""
     blocks: dict[int, list[tuple[NDArray, NDArray]]] = {}
     for number, marker in enumerate(mesh.markers, 1):
