@@ -22,7 +22,16 @@ from functools import cached_property, partial
 import numpy as np
 
 from slideviz.elastic.stiffness import by_node
-from slideviz.mesh.jacobians import CORNERS, LANES, add3, cross3, dot3, edge, gather
+from slideviz.mesh.jacobians import (
+    CORNERS,
+    LANES,
+    add3,
+    corner_edges,
+    corner_ends,
+    cross3,
+    dot3,
+    gather,
+)
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import PART, in_parts
@@ -258,24 +267,9 @@ def _crosses(a, b, c, d):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _ends(corner):  # type: ignore[no-untyped-def]
-    """Return the corner's node, those at the ends of its edges, and the third edge in a plane."""
-    flat = len(corner) == 3
-    return corner[0], corner[1], corner[2], corner[0 if flat else 3], 1.0 if flat else 0.0
-
-
-@njit(inline="always")
-def _edges(at, ends, up, c):  # type: ignore[no-untyped-def]
-    """Return the edges that leave a corner of cell ``c``; ``up`` is added to the third."""
-    o, i, j, k, _ = ends
-    last = edge(at, o, k, c)
-    return edge(at, o, i, c), edge(at, o, j, c), (last[0], last[1], last[2] + up)
-
-
-@njit(inline="always")
 def _duals(start, ends, scale, c):  # type: ignore[no-untyped-def]
     """Return the dual edges of an undeformed corner; ``scale`` is one over its Jacobian."""
-    a, b, last = _edges(start, ends, ends[4], c)
+    a, b, last = corner_edges(start, ends, ends[4], c)
     x = cross3(b, last)
     y = cross3(last, a)
     z = cross3(a, b)
@@ -301,7 +295,7 @@ def _map(duals, edges, flat):  # type: ignore[no-untyped-def]
 def _write_scales(start, ends, scale):  # type: ignore[no-untyped-def]
     """Write one over the Jacobian of an undeformed corner, (LANES,); 0 where it is flat."""
     for c in range(LANES):
-        a, b, last = _edges(start, ends, ends[4], c)
+        a, b, last = corner_edges(start, ends, ends[4], c)
         det = dot3(a, cross3(b, last))
         size = np.sqrt(dot3(a, a) * dot3(b, b) * dot3(last, last))
         scale[c] = 1.0 / det if abs(det) > FLAT * size else 0.0
@@ -311,7 +305,7 @@ def _write_scales(start, ends, scale):  # type: ignore[no-untyped-def]
 def _write_jacobians(at, ends, scale, jacobian):  # type: ignore[no-untyped-def]
     """Write J of a corner, (LANES,); 1 where it was flat."""
     for c in range(LANES):
-        a, b, last = _edges(at, ends, ends[4], c)
+        a, b, last = corner_edges(at, ends, ends[4], c)
         det = dot3(a, cross3(b, last)) * scale[c]
         jacobian[c] = det if scale[c] != 0.0 else 1.0
 
@@ -366,7 +360,7 @@ def write_slopes(  # type: ignore[no-untyped-def]
         slope[:] = 0.0
         value[:] = 0.0
         for corner in table:
-            ends = _ends(corner)
+            ends = corner_ends(corner)
             _write_scales(start, ends, scale)
             _write_jacobians(at, ends, scale, jacobian)
             for c in range(LANES):
@@ -382,7 +376,7 @@ def write_slopes(  # type: ignore[no-untyped-def]
             for c in range(LANES):
                 duals = _duals(start, ends, scale[c], c)
                 flat = 0.0 if scale[c] != 0.0 else 1.0
-                f, g, h = _map(duals, _edges(at, ends, ends[4], c), flat)
+                f, g, h = _map(duals, corner_edges(at, ends, ends[4], c), flat)
                 p = cross3(g, h)
                 q = cross3(h, f)
                 r = cross3(f, g)
@@ -438,7 +432,7 @@ def write_product(points, x, t, nodes, rows, table, coupling, worst, out):  # ty
             lam[c] = coupling[first + c]
         slope[:] = 0.0
         for corner in table:
-            ends = _ends(corner)
+            ends = corner_ends(corner)
             _write_scales(start, ends, scale)
             _write_jacobians(at, ends, scale, jacobian)
             for c in range(count):
@@ -446,8 +440,8 @@ def write_product(points, x, t, nodes, rows, table, coupling, worst, out):  # ty
             for c in range(LANES):
                 duals = _duals(start, ends, scale[c], c)
                 flat = 0.0 if scale[c] != 0.0 else 1.0
-                f, g, h = _map(duals, _edges(at, ends, ends[4], c), flat)
-                df, dg, dh = _map(duals, _edges(along, ends, 0.0, c), 0.0)
+                f, g, h = _map(duals, corner_edges(at, ends, ends[4], c), flat)
+                df, dg, dh = _map(duals, corner_edges(along, ends, 0.0, c), 0.0)
                 p = cross3(g, h)
                 q = cross3(h, f)
                 r = cross3(f, g)
@@ -513,7 +507,7 @@ def write_laplacians(points, nodes, table, weight, out):  # type: ignore[no-unty
                     w[a, b, c] = weight[first + c, a, b] / len(table)
         entries[:] = 0.0
         for corner in table:
-            ends = _ends(corner)
+            ends = corner_ends(corner)
             _write_scales(start, ends, scale)
             for c in range(LANES):
                 duals = _duals(start, ends, scale[c], c)

@@ -30,7 +30,7 @@ from scipy.sparse import csr_array
 from slideviz.elastic.distortion import Distortion, Part, write_laplacians
 from slideviz.elastic.multigrid import RIDGE
 from slideviz.elastic.stiffness import by_node
-from slideviz.mesh.jacobians import CORNERS
+from slideviz.mesh.jacobians import CORNERS, add3, row3
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
@@ -430,6 +430,36 @@ def diagonals(matrix, free, middle, inverse):  # type: ignore[no-untyped-def]
             inverse[row, g] = 1.0 / inverse[row, g] if used else 0.0
 
 
+@njit(inline="always")
+def _columns(group, data):  # type: ignore[no-untyped-def]
+    """Return the columns of data (k, w) that the components of three groups have."""
+    top = data.shape[1] - 1
+    return min(group[0], top), min(group[1], top), min(group[2], top)
+
+
+@njit(inline="always")
+def _plus(s, sign, data, k, columns, x, j):  # type: ignore[no-untyped-def]
+    """Return the triple s plus entry k of a matrix times row j of x (n, 3)."""
+    a, b, c = columns
+    return (
+        s[0] + sign * data[k, a] * x[j, 0],
+        s[1] + sign * data[k, b] * x[j, 1],
+        s[2] + sign * data[k, c] * x[j, 2],
+    )
+
+
+@njit(inline="always")
+def _scaled(s, inverse, row, group):  # type: ignore[no-untyped-def]
+    """Return the triple s times the inverse diagonal of a row."""
+    a, b, c = group
+    return s[0] * inverse[row, a], s[1] * inverse[row, b], s[2] * inverse[row, c]
+
+
+@njit(inline="always")
+def _write(s, out, row):  # type: ignore[no-untyped-def]
+    out[row, 0], out[row, 1], out[row, 2] = s
+
+
 @njit(parallel=True)
 def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-untyped-def]
     """Write what a Gauss-Seidel sweep from zero makes of ``right`` (k, 3) to x (k, 3).
@@ -438,29 +468,16 @@ def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-
     """
     indptr, indices, data = matrix
     rows = len(x)
-    top = data.shape[1] - 1
-    g0, g1, g2 = group
-    d0 = min(g0, top)
-    d1 = min(g1, top)
-    d2 = min(g2, top)
+    columns = _columns(group, data)
     for part in prange((rows + PART - 1) // PART):
         first = part * PART
         for row in range(first, min(rows, first + PART)):
-            s0 = right[row, 0]
-            s1 = right[row, 1]
-            s2 = right[row, 2]
+            s = row3(right, row)
             for k in range(indptr[row], middle[row]):
-                j = indices[k]
-                if j >= first:
-                    s0 -= data[k, d0] * x[j, 0]
-                    s1 -= data[k, d1] * x[j, 1]
-                    s2 -= data[k, d2] * x[j, 2]
-            left[row, 0] = s0
-            left[row, 1] = s1
-            left[row, 2] = s2
-            x[row, 0] = s0 * inverse[row, g0]
-            x[row, 1] = s1 * inverse[row, g1]
-            x[row, 2] = s2 * inverse[row, g2]
+                if indices[k] >= first:
+                    s = _plus(s, -1.0, data, k, columns, x, indices[k])
+            _write(s, left, row)
+            _write(_scaled(s, inverse, row, group), x, row)
 
 
 @njit(parallel=True)
@@ -468,26 +485,15 @@ def residual(matrix, middle, group, x, left):  # type: ignore[no-untyped-def]
     """Subtract from ``left`` (k, 3), as `forward` left it, what it did not yet."""
     indptr, indices, data = matrix
     rows = len(x)
-    top = data.shape[1] - 1
-    g0, g1, g2 = group
-    d0 = min(g0, top)
-    d1 = min(g1, top)
-    d2 = min(g2, top)
+    columns = _columns(group, data)
     for part in prange((rows + PART - 1) // PART):
         first = part * PART
         for row in range(first, min(rows, first + PART)):
-            s0 = left[row, 0]
-            s1 = left[row, 1]
-            s2 = left[row, 2]
+            s = row3(left, row)
             for k in range(indptr[row], indptr[row + 1]):
-                j = indices[k]
-                if j < first or k >= middle[row]:
-                    s0 -= data[k, d0] * x[j, 0]
-                    s1 -= data[k, d1] * x[j, 1]
-                    s2 -= data[k, d2] * x[j, 2]
-            left[row, 0] = s0
-            left[row, 1] = s1
-            left[row, 2] = s2
+                if indices[k] < first or k >= middle[row]:
+                    s = _plus(s, -1.0, data, k, columns, x, indices[k])
+            _write(s, left, row)
 
 
 @njit(parallel=True)
@@ -495,51 +501,28 @@ def backward(matrix, inverse, group, right, x, out):  # type: ignore[no-untyped-
     """Write what a backward sweep makes of x (k, 3) to out (k, 3): the transpose of `forward`."""
     indptr, indices, data = matrix
     rows = len(x)
-    top = data.shape[1] - 1
-    g0, g1, g2 = group
-    d0 = min(g0, top)
-    d1 = min(g1, top)
-    d2 = min(g2, top)
+    columns = _columns(group, data)
     for part in prange((rows + PART - 1) // PART):
         first = part * PART
         last = min(rows, (part + 1) * PART)
         for row in range(last - 1, first - 1, -1):
-            s0 = right[row, 0]
-            s1 = right[row, 1]
-            s2 = right[row, 2]
+            s = row3(right, row)
             for k in range(indptr[row], indptr[row + 1]):
                 j = indices[k]
                 if row < j < last:
-                    s0 -= data[k, d0] * out[j, 0]
-                    s1 -= data[k, d1] * out[j, 1]
-                    s2 -= data[k, d2] * out[j, 2]
+                    s = _plus(s, -1.0, data, k, columns, out, j)
                 else:
-                    s0 -= data[k, d0] * x[j, 0]
-                    s1 -= data[k, d1] * x[j, 1]
-                    s2 -= data[k, d2] * x[j, 2]
-            out[row, 0] = x[row, 0] + s0 * inverse[row, g0]
-            out[row, 1] = x[row, 1] + s1 * inverse[row, g1]
-            out[row, 2] = x[row, 2] + s2 * inverse[row, g2]
+                    s = _plus(s, -1.0, data, k, columns, x, j)
+            _write(add3(row3(x, row), _scaled(s, inverse, row, group)), out, row)
 
 
 @njit(parallel=True)
 def add_product(matrix, group, x, out):  # type: ignore[no-untyped-def]
     """Add the product of a sparse matrix with x (k, 3) to out (m, 3); sums keep their order."""
     indptr, indices, data = matrix
-    top = data.shape[1] - 1
-    g0, g1, g2 = group
-    d0 = min(g0, top)
-    d1 = min(g1, top)
-    d2 = min(g2, top)
+    columns = _columns(group, data)
     for row in prange(len(out)):
-        s0 = out[row, 0]
-        s1 = out[row, 1]
-        s2 = out[row, 2]
+        s = row3(out, row)
         for k in range(indptr[row], indptr[row + 1]):
-            j = indices[k]
-            s0 += data[k, d0] * x[j, 0]
-            s1 += data[k, d1] * x[j, 1]
-            s2 += data[k, d2] * x[j, 2]
-        out[row, 0] = s0
-        out[row, 1] = s1
-        out[row, 2] = s2
+            s = _plus(s, 1.0, data, k, columns, x, indices[k])
+        _write(s, out, row)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import add3, cross3, dot3, minus3
+from slideviz.mesh.jacobians import add3, cross3, dot3, minus3, row3
 from slideviz.system.jit_cache import njit
 
 
@@ -58,21 +58,15 @@ def write_middles(points, offsets, connectivity, begin, middles):  # type: ignor
 
 
 @njit(inline="always")
-def _point(points, k):  # type: ignore[no-untyped-def]
-    """Return a point, a triple."""
-    return points[k, 0], points[k, 1], points[k, 2]
-
-
-@njit(inline="always")
 def _middle_of(points, connectivity, begin, side_nodes, vtk, side):  # type: ignore[no-untyped-def]
     """Return the mean, a triple, of the nodes of a side of the cell that begins at ``begin``."""
-    a = _point(points, connectivity[begin + side_nodes[vtk, side, 0]])
-    b = _point(points, connectivity[begin + side_nodes[vtk, side, 1]])
-    c = _point(points, connectivity[begin + side_nodes[vtk, side, 2]])
+    a = row3(points, connectivity[begin + side_nodes[vtk, side, 0]])
+    b = row3(points, connectivity[begin + side_nodes[vtk, side, 1]])
+    c = row3(points, connectivity[begin + side_nodes[vtk, side, 2]])
     total = add3(add3(a, b), c)
     if side_nodes[vtk, side, 3] < 0:
         return total[0] / 3.0, total[1] / 3.0, total[2] / 3.0
-    total = add3(total, _point(points, connectivity[begin + side_nodes[vtk, side, 3]]))
+    total = add3(total, row3(points, connectivity[begin + side_nodes[vtk, side, 3]]))
     return 0.25 * total[0], 0.25 * total[1], 0.25 * total[2]
 
 
@@ -98,7 +92,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
     normals = np.empty((4 * most, 3))
     for i in range(found.shape[1]):
         k = begin + i
-        x = _point(points, k)
+        x = row3(points, k)
         count = 0
         small = np.inf
         large = 0.0
@@ -109,7 +103,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
             vtk = types[cell]
             flat = vtk < 10
             sign = float(signs[cell])
-            to_middle = minus3(_point(middles, cell), x)
+            to_middle = minus3(row3(middles, cell), x)
             start = x
             if not flat:
                 side = around[vtk, at, 0, 1]
@@ -121,7 +115,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
                     break
                 other = connectivity[first + around[vtk, at, ray, 0]]
                 turn = around[vtk, at, ray, 1]
-                half = minus3(_point(points, other), x)
+                half = minus3(row3(points, other), x)
                 half = 0.5 * half[0], 0.5 * half[1], 0.5 * half[2]
                 inward = minus3(to_middle, half)
                 if flat:
@@ -165,8 +159,8 @@ def _of_edges(points, x, others, normals, limits):  # type: ignore[no-untyped-de
     small = limits[0]
     large = limits[1]
     for place in range(len(others)):
-        normal = normals[place, 0], normals[place, 1], normals[place, 2]
-        along = minus3(_point(points, others[place]), x)
+        normal = row3(normals, place)
+        along = minus3(row3(points, others[place]), x)
         size = np.sqrt(dot3(normal, normal))
         scale = size * np.sqrt(dot3(along, along))
         cosine = min(max(dot3(normal, along) / scale, -1.0), 1.0) if scale > 0.0 else 0.0

@@ -12,10 +12,11 @@ import numpy as np
 from slideviz.mesh.jacobians import (
     LANES,
     NODE,
+    corner_edges,
+    corner_ends,
     corners,
     cross3,
     dot3,
-    edge,
     gather,
     half_sum,
     spreads,
@@ -33,7 +34,7 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
     none: then the derivative is that of ln f_skew.
     ``out`` (m, n, d): meaningless (possibly NaN) where a corner Jacobian is not positive.
     """
-    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.zeros((3, nodes.shape[1], LANES))
     slope = np.empty_like(coords)
     alpha = np.empty((len(table), LANES))
     spread = np.empty((len(table), LANES))
@@ -45,10 +46,7 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
         here = slice(first, first + count)
         _weights(alpha, spread, turn[here], powers, sums[here])
         slope[:] = 0.0
-        if points.shape[1] == 2:
-            _pull_plane(vtk, coords, table, count, alpha, spread, slope)
-        else:
-            _pull_solid(vtk, coords, table, count, alpha, spread, slope)
+        _pull_corners(vtk, coords, table, count, alpha, spread, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -85,53 +83,16 @@ def _power(base, exponent):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _pull_plane(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
+def _pull_corners(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives of ln f_ss by the nodes of cells to ``slope`` (3, n, ...).
 
     ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
     """
     for k in range(len(table)):
-        o = table[k, 0]
-        i = table[k, 1]
-        j = table[k, 2]
+        ends = corner_ends(table[k])
+        o, i, j, h, _ = ends
         for c in range(count):
-            ax = coords[0, i, c] - coords[0, o, c]
-            ay = coords[1, i, c] - coords[1, o, c]
-            bx = coords[0, j, c] - coords[0, o, c]
-            by = coords[1, j, c] - coords[1, o, c]
-            if vtk == 5:
-                aa = 2.0
-                ab = -1.0
-                bb = 2.0
-            else:
-                one = ax * ax + ay * ay
-                two = bx * bx + by * by
-                length = np.sqrt(one * two)
-                aa = length / one
-                ab = 0.0
-                bb = length / two
-            w = alpha[k, c]
-            s = spread[k, c]
-            by_a = w * by + s * (aa * ax + ab * bx), -w * bx + s * (aa * ay + ab * by)
-            by_b = -w * ay + s * (ab * ax + bb * bx), w * ax + s * (ab * ay + bb * by)
-            for axis in range(2):
-                slope[axis, i, c] += by_a[axis]
-                slope[axis, j, c] += by_b[axis]
-                slope[axis, o, c] -= by_a[axis] + by_b[axis]
-
-
-@njit
-def _pull_solid(vtk, coords, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
-    for k in range(len(table)):
-        o = table[k, 0]
-        i = table[k, 1]
-        j = table[k, 2]
-        h = table[k, 3]
-        for c in range(count):
-            x = edge(coords, o, i, c)
-            y = edge(coords, o, j, c)
-            z = edge(coords, o, h, c)
+            x, y, z = corner_edges(coords, ends, ends[4], c)
             yz = cross3(y, z)
             zx = cross3(z, x)
             xy = cross3(x, y)
@@ -154,6 +115,12 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
 
     Their formulas are those of `jacobians.spreads`, differentiated.
     """
+    if vtk == 5:
+        return (
+            (2 * x[0] - y[0], 2 * x[1] - y[1], 0.0),
+            (2 * y[0] - x[0], 2 * y[1] - x[1], 0.0),
+            (0.0, 0.0, 0.0),
+        )
     if vtk == 10:
         return (
             (3 * x[0] - y[0] - z[0], 3 * x[1] - y[1] - z[1], 3 * x[2] - y[2] - z[2]),
@@ -192,7 +159,7 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
     ``weights`` (k, m): factors of the coefficients, in the order of `jacobians.write_coefficients`.
     ``out`` (m, n, d): written.
     """
-    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.zeros((3, nodes.shape[1], LANES))
     slope = np.empty_like(coords)
     part = np.zeros((len(weights), LANES))
     none = np.zeros((len(weights), LANES))
@@ -210,7 +177,7 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
 
 @njit
 def pull_proof(vtk, coords, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
-    """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES).
+    """Add the slopes (3, n, LANES) of the coefficients times ``weights`` (k, LANES).
 
     ``none`` (k, LANES) are zeros.
     """
@@ -219,10 +186,8 @@ def pull_proof(vtk, coords, table, count, weights, none, slope):  # type: ignore
     elif vtk == 13:
         weights = weights.reshape(3, 3, LANES)
         _pull_heights(coords, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
-    elif coords.shape[0] == 2:
-        _pull_plane(5, coords, table, count, weights, none, slope)
     else:
-        _pull_solid(14, coords, table, count, weights, none, slope)
+        _pull_corners(14, coords, table, count, weights, none, slope)
 
 
 _U = NODE.transpose(1, 0, 2)

@@ -2,7 +2,8 @@
 
 Arrays here have the cells last, ``(..., m)``, so that every inner loop runs over contiguous memory
 and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are in use. ``coords``
-(d, n, m) are the coordinates of the n nodes of m cells of one type. ``table`` is ``CORNERS[vtk]``.
+(3, n, m) are the coordinates of the n nodes of m cells of one type; cells in a plane have third
+coordinates of zero, and (0, 0, 1) as the third edge at a corner. ``table`` is ``CORNERS[vtk]``.
 """
 
 from __future__ import annotations
@@ -154,6 +155,12 @@ def gather(points, nodes, first, count, coords):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
+def row3(points, k):  # type: ignore[no-untyped-def]
+    """Return row ``k`` of points (n, 3), a triple."""
+    return points[k, 0], points[k, 1], points[k, 2]
+
+
+@njit(inline="always")
 def edge(coords, start, stop, c):  # type: ignore[no-untyped-def]
     """Return the vector, a triple, from local node ``start`` to ``stop`` of cell ``c``."""
     return (
@@ -193,6 +200,24 @@ def minus3(a, b):  # type: ignore[no-untyped-def]
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
+@njit(inline="always")
+def corner_ends(corner):  # type: ignore[no-untyped-def]
+    """Return the corner's node, those at the ends of its edges, and the third edge in a plane.
+
+    Numbers of nodes are read before loops over cells, which are not vectorised else.
+    """
+    flat = len(corner) == 3
+    return corner[0], corner[1], corner[2], corner[0 if flat else 3], 1.0 if flat else 0.0
+
+
+@njit(inline="always")
+def corner_edges(coords, ends, up, c):  # type: ignore[no-untyped-def]
+    """Return the edges that leave a corner of cell ``c``; ``up`` is added to the third."""
+    o, i, j, k, _ = ends
+    last = edge(coords, o, k, c)
+    return edge(coords, o, i, c), edge(coords, o, j, c), (last[0], last[1], last[2] + up)
+
+
 @njit
 def corners(coords, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
@@ -201,21 +226,10 @@ def corners(coords, table, count, alpha):  # type: ignore[no-untyped-def]
     derivatives.
     """
     for k in range(len(table)):
-        o = table[k, 0]
-        i = table[k, 1]
-        j = table[k, 2]
-        if coords.shape[0] == 2:
-            for c in range(count):
-                ax = coords[0, i, c] - coords[0, o, c]
-                ay = coords[1, i, c] - coords[1, o, c]
-                bx = coords[0, j, c] - coords[0, o, c]
-                by = coords[1, j, c] - coords[1, o, c]
-                alpha[k, c] = ax * by - ay * bx
-        else:
-            h = table[k, 3]
-            for c in range(count):
-                normal = cross3(edge(coords, o, i, c), edge(coords, o, j, c))
-                alpha[k, c] = dot3(normal, edge(coords, o, h, c))
+        ends = corner_ends(table[k])
+        for c in range(count):
+            x, y, z = corner_edges(coords, ends, ends[4], c)
+            alpha[k, c] = dot3(cross3(x, y), z)
 
 
 @njit
@@ -226,28 +240,15 @@ def spreads(vtk, coords, table, count, spread):  # type: ignore[no-untyped-def]
     `jacobian_slopes` has its derivatives.
     """
     for k in range(len(table)):
-        o = table[k, 0]
-        i = table[k, 1]
-        j = table[k, 2]
-        if coords.shape[0] == 2:
-            for c in range(count):
-                ax = coords[0, i, c] - coords[0, o, c]
-                ay = coords[1, i, c] - coords[1, o, c]
-                bx = coords[0, j, c] - coords[0, o, c]
-                by = coords[1, j, c] - coords[1, o, c]
-                aa = ax * ax + ay * ay
-                bb = bx * bx + by * by
-                spread[k, c] = aa + bb - (ax * bx + ay * by) if vtk == 5 else np.sqrt(aa * bb)
-            continue
-        h = table[k, 3]
+        ends = corner_ends(table[k])
         for c in range(count):
-            x = edge(coords, o, i, c)
-            y = edge(coords, o, j, c)
-            z = edge(coords, o, h, c)
+            x, y, z = corner_edges(coords, ends, ends[4], c)
             xx = dot3(x, x)
             yy = dot3(y, y)
             zz = dot3(z, z)
-            if vtk == 10:
+            if vtk == 5:
+                spread[k, c] = xx + yy - dot3(x, y)
+            elif vtk == 10:
                 squares = 1.5 * (xx + yy + zz)
                 spread[k, c] = squares - dot3(x, y) - dot3(y, z) - dot3(z, x)
             elif vtk == 14:
@@ -320,7 +321,7 @@ def write_hexahedron(coords, count, out):  # type: ignore[no-untyped-def]
 @njit
 def add_corners(points, nodes, table, sums):  # type: ignore[no-untyped-def]
     """Write the sums of the corner Jacobians of cells, ``nodes`` (m, n), into ``sums`` (m,)."""
-    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.zeros((3, nodes.shape[1], LANES))
     alpha = np.empty((len(table), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
@@ -344,7 +345,7 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
     ``UNPROVEN`` where another coefficient of a prism or a hexahedron is not, which
     `slideviz.mesh.jacobians.decide_unproven` is still to decide; else ``VALID``.
     """
-    coords = np.empty((points.shape[1], nodes.shape[1], LANES))
+    coords = np.zeros((3, nodes.shape[1], LANES))
     coefficients = np.empty((3, 3, 3, LANES))
     jacobians = np.empty((len(table), LANES))
     products = np.empty((len(table), LANES))
@@ -399,8 +400,15 @@ def write_coefficients(vtk, coords, table, count, out):  # type: ignore[no-untyp
         corners(coords, table, count, out)
 
 
+def coords_of(at: FloatArray) -> FloatArray:
+    """Return the coordinates (3, n, m) of cells whose nodes are at (m, n, d)."""
+    coords = np.zeros((3, *at.shape[1::-1]))
+    coords[: at.shape[2]] = at.T
+    return coords
+
+
 def coefficients(vtk: int, coords: FloatArray) -> FloatArray:
-    """Return the coefficients (k, m) of the proof of validity of cells, ``coords`` (d, n, m)."""
+    """Return the coefficients (k, m) of the proof of validity of cells, ``coords`` (3, n, m)."""
     out = np.empty(({12: 27, 13: 9}.get(vtk, len(CORNERS[vtk])), coords.shape[2]))
     write_coefficients(vtk, np.ascontiguousarray(coords), CORNERS[vtk], coords.shape[2], out)
     return out

@@ -348,7 +348,8 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, fou
     """Write the margins of cells of one type, ``nodes`` (m, n), into ``found`` (m,)."""
     dim = points.shape[1]
     size = len(cuts[2])
-    start, motion, at = np.empty((3, dim, nodes.shape[1], LANES))
+    start, motion = np.empty((2, dim, nodes.shape[1], LANES))
+    at = np.zeros((3, nodes.shape[1], LANES))
     values = np.empty((4, size, LANES))
     errors = np.empty((4, LANES))
     scale = np.empty(LANES)

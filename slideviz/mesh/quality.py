@@ -23,6 +23,7 @@ from slideviz.mesh.jacobians import (
     UNPROVEN,
     VALID,
     check_cells,
+    coords_of,
     corners,
     decide_unproven,
     measure,
@@ -382,7 +383,7 @@ def cell_quality(
     measure(vtk, points, nodes, table, signs, alpha, spread, status)
     open_ = np.flatnonzero(status == UNPROVEN)
     if len(open_):
-        status[open_] = decide_unproven(vtk, points[nodes[open_]].T, signs[open_])
+        status[open_] = decide_unproven(vtk, coords_of(points[nodes[open_]]), signs[open_])
     good = status != INVERTED
     with np.errstate(all="ignore"):
         size = np.where(good, _ratio(ordered_sum(alpha), sums), 0.0)
@@ -402,8 +403,7 @@ def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
     begin, end = mesh.cells.offsets[cell : cell + 2]
     table = CORNERS[int(mesh.cells.types[cell])]
     alpha = np.empty((len(table), 1))
-    coords = mesh.points[mesh.cells.connectivity[begin:end], :, None].swapaxes(0, 1)
-    corners(np.ascontiguousarray(coords), table, 1, alpha)
+    corners(coords_of(mesh.points[mesh.cells.connectivity[None, begin:end]]), table, 1, alpha)
     return sign * alpha[:, 0]
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
-from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, corners
+from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, coords_of, corners
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, Signs, frozen_array, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
@@ -218,7 +218,7 @@ def _unfold(
                 scale *= len(CORNERS[vtk]) / sums[ids[some]]
             parts.append((vtk, nodes[some], scale))
     # ``scale`` times a cell's Jacobians, as its sign is in it, is positive where the cell is valid.
-    depths = [_depths(vtk, _at(mesh, nodes), scale) for vtk, nodes, scale in parts]
+    depths = [_depths(vtk, coords_of(mesh.points[nodes]), scale) for vtk, nodes, scale in parts]
     deepest = max(float(depth.max()) for depth in depths)
     if deepest > 0:
         shares = [np.where(depth > 0, depth / deepest, 0.0) for depth in depths]
@@ -231,11 +231,6 @@ def _unfold(
     for (vtk, nodes, scale), share in zip(parts, shares, strict=True):
         np.add.at(gradient, nodes, _by_nodes(mesh, vtk, nodes, share * scale))
     return -deepest * norm
-
-
-def _at(mesh: Mesh, nodes: IntArray) -> FloatArray:
-    """Return the coordinates (d, n, m) of the nodes (m, n) of cells."""
-    return np.ascontiguousarray(mesh.points[nodes].T)
 
 
 def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
@@ -366,10 +361,10 @@ def _ratios(
     The factor is the cell's sign over the coefficient's undeformed value.
     """
     vtk, ids, nodes = block
-    before = signs[ids] * coefficients(vtk, _at(reference, nodes))
+    before = signs[ids] * coefficients(vtk, coords_of(reference.points[nodes]))
     scale = np.maximum(before, LEAST_SCALE * before.mean(axis=0))
     flat = ~(scale > 0).all(axis=0)
     if flat.any():
         raise MeshError(_flat_sentence(int(ids[flat.argmax()]), mesh))
     factor = signs[ids] / scale
-    return factor, factor * coefficients(vtk, _at(mesh, nodes))
+    return factor, factor * coefficients(vtk, coords_of(mesh.points[nodes]))

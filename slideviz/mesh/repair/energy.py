@@ -23,6 +23,7 @@ from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
     coefficients,
+    coords_of,
     gather,
     write_coefficients,
 )
@@ -57,7 +58,7 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     """
     m, _, d = at.shape
     table = CORNERS[vtk]
-    found = coefficients(vtk, at.T) * signs
+    found = coefficients(vtk, coords_of(at)) * signs
     edges = at[:, table[:, 1:]] - at[:, table[:, :1]]
     gram = edges @ np.swapaxes(edges, 2, 3)
     length = np.sqrt(np.einsum("mcii->mci", gram))
@@ -120,7 +121,7 @@ def _write_pulls(at, corner, shape, count, pulls, total):  # type: ignore[no-unt
     ``shape`` (1 + d d, LANES): of the corner, as of `Targets`.
     ``pulls``, ``total`` (d, d, LANES), (LANES,): the slopes by each edge, and the values.
     """
-    d = at.shape[0]
+    d = len(pulls)
     pulls[:] = 0.0
     total[:] = 0.0
     # Numbers of nodes are read before loops over cells, which are not vectorised else.
@@ -152,8 +153,8 @@ def write_energy(  # type: ignore[no-untyped-def]
     parts = scale.shape[1]
     outer = len(table)
     power = 2.0 / d
-    at = np.empty((d, n, LANES))
-    slope = np.empty((d, n, LANES))
+    at = np.zeros((3, n, LANES))
+    slope = np.empty((3, n, LANES))
     found = np.empty((parts, LANES))
     pull = np.empty((parts, LANES))
     none = np.zeros((parts, LANES))
@@ -221,8 +222,8 @@ def write_curvatures(  # type: ignore[no-untyped-def]
     parts = scale.shape[1]
     outer = len(table)
     power = 2.0 / d
-    at = np.empty((d, n, LANES))
-    slope = np.empty((d, n, LANES))
+    at = np.zeros((3, n, LANES))
+    slope = np.empty((3, n, LANES))
     found = np.empty((parts, LANES))
     unit = np.zeros((parts, LANES))
     none = np.zeros((parts, LANES))
