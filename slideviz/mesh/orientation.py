@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.mesh.adjacency import sides_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNERS, add_corners
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from slideviz.mesh.model import Cells, FloatArray, Index, IntArray
+
+
+NAMING = np.array([1, 1_000_003, 998_244_353, 1_000_000_007])
+"""Factors of a facet's nodes, whose sum tells facets of two cells apart."""
 
 
 @weak_cache
@@ -92,26 +97,21 @@ def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, BoolArray]:
 
     Two cells agree if they traverse the facet in opposite directions.
     """
-    owners = []
-    facets = []
-    turns = []
-    for ids, nodes, turn in facets_of(cells):
-        padded = np.full((len(nodes), 4), -1, np.int64)
-        padded[:, : nodes.shape[1]] = nodes
-        owners.append(ids)
-        facets.append(padded)
-        turns.append(turn)
-    owner = np.concatenate(owners)
-    facet = np.concatenate(facets)
-    turn = np.concatenate(turns)
-    order = np.lexsort(facet.T)
-    owner = owner[order]
-    facet = facet[order]
-    turn = turn[order]
-    same = np.concatenate(([False], (facet[1:] == facet[:-1]).all(axis=1), [False]))
-    # Only facets of exactly two cells are used.
-    start = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
-    return owner[start], owner[start + 1], turn[start] != turn[start + 1]
+    sides = sides_of(cells)
+    owner = np.repeat(np.arange(len(cells)), np.diff(sides.first))
+    turn = np.empty(len(owner), bool)
+    name = np.empty(len(owner), np.int64)  # of the facet: two cells may share several
+    place = sides.first[:-1].copy()  # of the next side of each cell
+    for ids, facet, direction in facets_of(cells):
+        turn[place[ids]] = direction
+        name[place[ids]] = facet @ NAMING[: facet.shape[1]]
+        place[ids] += 1
+    # Only facets of exactly two cells are used: both of their sides, one after the other.
+    pairs = np.flatnonzero(sides.neighbour >= 0)
+    both = np.sort(np.stack([owner[pairs], sides.neighbour[pairs]]), axis=0)
+    pairs = pairs[np.lexsort((name[pairs], *both))]
+    one, two = pairs.reshape(-1, 2).T
+    return owner[one], owner[two], turn[one] != turn[two]
 
 
 def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, BoolArray]]:
