@@ -26,6 +26,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 
 SECTIONS = 24  # sections of a blade, of which centroids and edges are found
 TIED = 1e-6  # distances are equal up to this part of the largest one
+STEP = 1e-200  # of derivatives
 Complex = NDArray[np.complex128]
 
 TOTALS = 5
@@ -47,36 +48,10 @@ def curve_at(
     if count == 1:
         return np.full(len(at), y[0]), np.ones((len(at), 1))
     h = np.diff(x)
-    secant = np.diff(y) / h
-    by = np.diff(eye, axis=0) / h[:, None]
-    slope = np.zeros(count)
-    slope_by = np.zeros((count, count))
-    for k in range(1, count - 1):
-        one, two = secant[k - 1 : k + 1]
-        if one * two > 0.0:  # else the curve is level there
-            w1 = 2.0 * h[k] + h[k - 1]
-            w2 = h[k] + 2.0 * h[k - 1]
-            both = w1 * two + w2 * one
-            slope[k] = (w1 + w2) * one * (two / both)
-            parts = w1 * (two / both) ** 2, w2 * (one / both) ** 2
-            slope_by[k] = (w1 + w2) * (parts[0] * by[k - 1] + parts[1] * by[k])
-    for k, near, far in ((0, 0, 1), (count - 1, count - 2, count - 3)):
-        if count == 2:
-            slope[k] = secant[0]
-            slope_by[k] = by[0]
-            continue
-        h0 = h[near]
-        h1 = h[min(far, count - 2)]
-        w0 = (2.0 * h0 + h1) / (h0 + h1)
-        w1 = -h0 / (h0 + h1)
-        slope[k] = w0 * secant[near] + w1 * secant[far]
-        slope_by[k] = w0 * by[near] + w1 * by[far]
-        if slope[k] * secant[near] <= 0.0:
-            slope[k] = 0.0
-            slope_by[k] = 0.0
-        elif secant[near] * secant[far] < 0.0 and abs(slope[k]) > 3.0 * abs(secant[near]):
-            slope[k] = 3.0 * secant[near]
-            slope_by[k] = 3.0 * by[near]
+    # Derivatives by an imaginary step, in which nothing cancels.
+    slopes = np.stack([_node_slopes(h, row) for row in y + 1j * STEP * eye], axis=1)
+    slope = slopes[:, 0].real
+    slope_by = slopes.imag / STEP
     s = np.clip(at, x[0], x[-1])
     left = np.clip(np.searchsorted(x, s, "right") - 1, 0, count - 2)
     t = (s - x[left]) / h[left]
@@ -95,6 +70,36 @@ def curve_at(
         )
     )
     return value, sum(weights)
+
+
+def _node_slopes(h: FloatArray, y: Complex) -> Complex:
+    """Return the slopes (k,) of the monotone cubic at nodes ``h`` (k - 1,) apart, values y (k,).
+
+    Of values, only the real parts are compared.
+    """
+    count = len(y)
+    secant = np.diff(y) / h
+    slope = np.zeros(count, complex)
+    if count == 2:
+        return slope + secant
+    for k in range(1, count - 1):
+        one, two = secant[k - 1 : k + 1]
+        if one.real * two.real > 0.0:  # else the curve is level there
+            w1 = 2.0 * h[k] + h[k - 1]
+            w2 = h[k] + 2.0 * h[k - 1]
+            slope[k] = (w1 + w2) * one * (two / (w1 * two + w2 * one))
+    for k, near, far in ((0, 0, 1), (count - 1, count - 2, count - 3)):
+        first = secant[near]
+        second = secant[far]
+        w0 = (2.0 * h[near] + h[far]) / (h[near] + h[far])
+        w1 = -h[near] / (h[near] + h[far])
+        end = w0 * first + w1 * second
+        if end.real * first.real <= 0.0:
+            end = 0.0
+        elif first.real * second.real < 0.0 and abs(end.real) > 3.0 * abs(first.real):
+            end = 3.0 * first
+        slope[k] = end
+    return slope
 
 
 class BladeSections:
