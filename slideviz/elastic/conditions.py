@@ -88,19 +88,12 @@ def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> Floa
 
 def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
     """Return the rotations R_i (m, d, d) from the representatives' displacements to the nodes'."""
-    d = value(problem.coords).shape[1]
-    if not (frame.cylindrical and frame.period):
-        return np.tile(np.eye(d), (len(nodes), 1, 1))
-    apart = value(problem.coords)[nodes, 1] - value(problem.coords)[problem.same_as[nodes], 1]
-    angle = np.round(apart / frame.shift()[1]) * frame.period
-    turn = np.zeros((len(nodes), 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
-    turn[:, 1, 0] = np.sin(angle)
-    turn[:, 0, 1] = -turn[:, 1, 0]
-    turn[:, 2, 2] = 1.0
-    assert frame.axis is not None
-    basis = axis_basis(frame.axis)
-    return (basis.T @ turn @ basis)[:, :d, :d]
+    periods = np.zeros(len(nodes))
+    if frame.cylindrical and frame.period:
+        angle = value(problem.coords)[:, 1]
+        apart = angle[nodes] - angle[problem.same_as[nodes]]
+        periods = np.round(apart / frame.shift()[1])
+    return frame.turns(periods)
 
 
 @dataclass(frozen=True, eq=False)

@@ -293,6 +293,19 @@ class Frame:
         rows.extend(along(_perpendicular(self.direction), x).T)
         return np.stack(rows)
 
+    def turns(self, periods: IntArray | FloatArray) -> FloatArray:
+        """Return the rotations (m, d, d) of Cartesian vectors about the axis by periods (m,)."""
+        out = np.tile(np.eye(3), (len(periods), 1, 1))
+        some = np.flatnonzero(periods)
+        if self.axis is not None and len(some):
+            angle = periods[some] * self.period
+            out[some, 0, 0] = out[some, 1, 1] = np.cos(angle)
+            out[some, 1, 0] = np.sin(angle)
+            out[some, 0, 1] = -out[some, 1, 0]
+            basis = axis_basis(self.axis)
+            out[some] = basis.T @ out[some] @ basis
+        return out[:, : self.dim, : self.dim]
+
     def shift(self) -> FloatArray:
         """Return one period as a difference of coordinates, (d,); zero when not periodic."""
         if self.direction is not None:

@@ -30,7 +30,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import (
     BoolArray,
     FloatArray,
@@ -447,26 +446,11 @@ def wall_nodes(
         facets=np.concatenate([none, *facets]),
         walls=tuple(parts),
         origin=origin,
-        turn=_turns(frame, by) if frame.cylindrical and len(shifts) > 1 else None,
+        turn=frame.turns(by) if frame.cylindrical and len(shifts) > 1 else None,
         places=sources,
         normals=unit_rows(at_corners[order]),
         offsets=offsets_of(np.bincount(images.reshape(-1), minlength=len(sources))),
     )
-
-
-def _turns(frame: Frame, periods: IntArray) -> FloatArray:
-    """Return the rotations (s, d, d) about the axis of a frame by whole periods (s,)."""
-    assert frame.axis is not None
-    basis = axis_basis(frame.axis)
-    angle = periods * frame.period
-    local = np.zeros((len(periods), 3, 3))
-    local[:, 0, 0] = local[:, 1, 1] = np.cos(angle)
-    local[:, 1, 0] = np.sin(angle)
-    local[:, 0, 1] = -local[:, 1, 0]
-    local[:, 2, 2] = 1.0
-    turns = np.einsum("ka,skl,lb->sab", basis, local, basis)
-    turns[periods == 0] = np.eye(3)
-    return turns[:, : frame.dim, : frame.dim]
 
 
 @dataclass(frozen=True)
