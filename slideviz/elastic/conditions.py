@@ -172,23 +172,3 @@ def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> 
         local[:, 2] = normals[:, 2]
     out = (local @ axis_basis(frame.axis))[:, :d]
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
-
-
-def rigid_motions(points: FloatArray, conditions: Conditions) -> FloatArray:
-    """Return the rigid motions, projected on what the unknowns may do, (k d, 3) or (k d, 6).
-
-    ``points`` (n, d) are those of all nodes.
-    """
-    place = conditions.place
-    owner = np.zeros(len(conditions.free), np.int64)
-    owner[place[place >= 0][::-1]] = np.flatnonzero(place >= 0)[::-1]
-    d = points.shape[1]
-    x = points[owner]
-    x = (x - x.mean(axis=0)) / max(float(np.ptp(x)), 1e-300) if len(x) else x
-    pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
-    modes = np.zeros((len(x), d, d + len(pairs)))
-    modes[:, range(d), range(d)] = 1.0
-    for column, (i, j) in enumerate(pairs, start=d):
-        modes[:, i, column] = -x[:, j]
-        modes[:, j, column] = x[:, i]
-    return (conditions.free @ modes).reshape(-1, modes.shape[2])

@@ -71,6 +71,11 @@ class Distortion:
         """The number of cells."""
         return sum(len(part.nodes) for part in self.parts)
 
+    @property
+    def weights(self) -> FloatArray:
+        """Return the weights (m,) of the Laplacian like it: 1 + lam."""
+        return 1.0 + np.concatenate([part.coupling for part in self.parts])
+
     @classmethod
     def of(cls, points: FloatArray, cells: Cells) -> Distortion:
         """Return the energy of ``cells`` with undeformed ``points`` (n, d)."""

@@ -1,4 +1,4 @@
-"""The preconditioner of relaxation: one multigrid cycle of a Laplacian for each component.
+"""The preconditioner of elastic bodies: one multigrid cycle of a Laplacian for each component.
 
 With the gradient of each component weighted by the cell's stiffness, the Laplacian of a mesh is
 equivalent to its elasticity (Korn's inequality), does not care how cells are turned, and has one
@@ -16,10 +16,10 @@ the cycle is a symmetric matrix to rounding, as derivatives need it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numba import prange
@@ -27,8 +27,7 @@ from pyamg.aggregation import standard_aggregation
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
-from slideviz.elastic.distortion import Distortion, Part, write_laplacians
-from slideviz.elastic.multigrid import RIDGE
+from slideviz.elastic.distortion import write_laplacians
 from slideviz.elastic.stiffness import by_node
 from slideviz.mesh.jacobians import CORNERS, add3, row3
 from slideviz.mesh.model import FloatArray, IntArray
@@ -39,6 +38,10 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 COARSE = 300  # largest number of unknowns of the coarsest level, which has a dense factor
+
+RIDGE = 1e-12
+"""Added to the diagonal of the coarsest matrix, relative to it. A mesh that may slide as a whole
+makes the matrix singular; its right-hand side is consistent then."""
 
 HELD = 1e60  # on the diagonal of the coarsest matrix, in rows of nothing
 
@@ -57,6 +60,34 @@ OMEGA = 4.0 / 3.0  # damping of the Jacobi step that smooths prolongations, by r
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 """indptr, indices and data (k, w) of a sparse matrix; w = 1, or a number for each group of
 components."""
+
+
+class CellPart(Protocol):
+    """Cells of one type."""
+
+    @property
+    def vtk(self) -> int:
+        """Return the VTK identifier of the type."""
+
+    @property
+    def nodes(self) -> IntArray:
+        """Return the nodes (m, n) of the cells."""
+
+
+class ElasticBody(Protocol):
+    """What a Laplacian is made of."""
+
+    @property
+    def points(self) -> FloatArray:
+        """Return the undeformed points (n, d)."""
+
+    @property
+    def parts(self) -> Sequence[CellPart]:
+        """Return the cells of each type."""
+
+    @property
+    def weights(self) -> FloatArray:
+        """Return what the gradients in each cell are multiplied by, (m,), in the parts' order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,22 +118,22 @@ class LaplacianCycle:
     @classmethod
     def of(
         cls,
-        body: Distortion,
+        body: ElasticBody,
         place: IntArray,
         held: np.ndarray,
         axes: FloatArray,
-        at: FloatArray | None = None,
+        stiffness: FloatArray | None = None,
     ) -> LaplacianCycle:
-        """Return the cycle of an elastic body, or of its curvatures at positions ``at`` (n, d).
+        """Return the cycle of an elastic body, or of other curvatures of it.
 
         ``place`` (n,) is the number of each node's unknown, -1 for known nodes.
         ``held`` (k, d): which components of the unknowns stay zero. Rows of ``axes`` (k, d, d) or
         (d, d) are the axes of these components: orthonormal, (d, d) for Cartesian ones.
+        ``stiffness`` (m, d, d, d): curvatures of each component in each cell; written over.
         """
         names: list[object] = [column.tobytes() for column in held.T]
         weights: list[FloatArray | None] = [None]
-        if at is not None:
-            stiffness = body.stiffness(at)
+        if stiffness is not None:
             if axes.ndim == 3:
                 stiffness[:] = stiffness.mean(axis=1, keepdims=True)
             names = list(range(held.shape[1]))
@@ -246,12 +277,24 @@ def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:
     return indptr, indices, data
 
 
+def held_components(axes: FloatArray, free: FloatArray) -> np.ndarray:
+    """Return which components (k, d), along ``axes`` (d, d) or (k, d, d), stay zero.
+
+    ``free`` (k, d, d): the projections on the directions in which the unknowns may move. As many
+    stay zero as are not free, those along which an unknown moves least.
+    """
+    along = np.einsum("kii->ki", axes @ free @ np.swapaxes(axes, -1, -2))
+    count = np.rint(along.sum(axis=1)).astype(int)
+    rank = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1, kind="stable")
+    return np.asarray(rank >= count[:, None])
+
+
 def laplacian(
-    body: Distortion, place: IntArray, count: int, weight: FloatArray | None = None
+    body: ElasticBody, place: IntArray, count: int, weight: FloatArray | None = None
 ) -> Sparse:
     """Return the matrix (count, count) of the Laplacian; ``place`` as of `LaplacianCycle.of`.
 
-    ``weight`` (m, d, d): what the gradients in each cell are multiplied by; None: 1 + lam.
+    ``weight`` (m, d, d): what the gradients in each cell are multiplied by; None: the body's.
 
     Each row has its diagonal, which is less the sum of the others and of those of known nodes:
     entries are rounded to single precision, but constants still have no energy.
@@ -260,9 +303,10 @@ def laplacian(
     entries = np.empty(int((sizes[:, 0] * sizes[:, 1] ** 2).sum()), np.float32)
     first = 0
     cell = 0
+    given = body.weights if weight is None else weight
     for part in body.parts:
         m, a = part.nodes.shape
-        own = None if weight is None else weight[cell : cell + m]
+        own = given[cell : cell + m]
         cell += m
         mine = entries[first : first + m * a * a].reshape(m, a, a)
         first += m * a * a
@@ -281,10 +325,12 @@ def laplacian(
 
 
 def _write_part(
-    points: FloatArray, part: Part, weight: FloatArray | None, out: np.ndarray, rows: slice
+    points: FloatArray, part: CellPart, weight: FloatArray, out: np.ndarray, rows: slice
 ) -> None:
-    plain = (1.0 + part.coupling[rows])[:, None, None] * np.eye(points.shape[1])
-    own = plain if weight is None else np.ascontiguousarray(weight[rows])
+    own = weight[rows]
+    if own.ndim == 1:
+        own = own[:, None, None] * np.eye(points.shape[1])
+    own = np.ascontiguousarray(own)
     write_laplacians(points, part.nodes[rows], CORNERS[part.vtk], own, out[rows])
 
 

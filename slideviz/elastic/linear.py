@@ -10,13 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.elastic.conditions import (
-    Body,
-    conditions,
-    rigid_motions,
-)
+from slideviz.elastic.conditions import Body, conditions
+from slideviz.elastic.laplacian import LaplacianCycle, held_components
 from slideviz.elastic.multigrid import LIMIT, solve
-from slideviz.elastic.stiffness import ElasticMesh
+from slideviz.elastic.stiffness import Conditions, ElasticMesh
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import AGREE, merge
@@ -24,6 +21,7 @@ from slideviz.rbf.methods import within
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.tape import (
     Array,
+    Linear,
     join,
     put,
     take,
@@ -104,9 +102,8 @@ def _equilibrium(
 
         solved = solve(
             matrix,
-            lambda: matrix if mesh.lame[1] >= 0.0 else mesh.definite().matrix(prescribed),
+            lambda: preconditioner(mesh, prescribed),
             residual,
-            rigid_motions(at, prescribed),
             guess.ravel(),
             float(np.abs(prescribed.known).max(initial=0.0)),
             lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
@@ -119,3 +116,16 @@ def _equilibrium(
                 "DEFORM_STIFFNESS_TYPE= CONSTANT_STIFFNESS"
             )
         return body.frame.difference(at, shifted(solved.x))
+
+
+def preconditioner(mesh: ElasticMesh, conditions: Conditions) -> Linear:
+    """Return about the inverse of the matrix of a body, of unknowns (k d,) to (k d,)."""
+    free = conditions.free
+    axes = np.eye(free.shape[1])
+    held = held_components(axes, free)
+    cycle = LaplacianCycle.of(mesh, conditions.place, held, axes)
+
+    def within(unknown: FloatArray) -> FloatArray:
+        return np.einsum("kij,kj->ki", free, unknown)
+
+    return lambda right: within(cycle(within(right.reshape(-1, len(axes))))).ravel()

@@ -25,7 +25,7 @@ import numpy as np
 
 from slideviz.elastic.conditions import Body, HeldRows, held_rows, projections, unknowns
 from slideviz.elastic.distortion import WORST, Distortion
-from slideviz.elastic.laplacian import LaplacianCycle
+from slideviz.elastic.laplacian import LaplacianCycle, held_components
 from slideviz.elastic.multigrid import MAKING, while_ticking
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -306,7 +306,9 @@ class _Way:
         left = 1.0
         for _ in range(NEWTON):
             if left == 1.0:
-                self._cycle = LaplacianCycle.of(self._energy, *self._wanted, self.x)
+                self._cycle = LaplacianCycle.of(
+                    self._energy, *self._wanted, self._energy.stiffness(self.x)
+                )
             along = self._function(WORST, 0.0)
             nothing = np.zeros((len(self._unknowns.owner), self.x.shape[1]))
             now, gradient = along(nothing)
@@ -492,17 +494,10 @@ class _Way:
 
 
 def _held(axes: FloatArray, unknowns: Unknowns) -> np.ndarray:
-    """Return which components (k, d), along ``axes`` (d, d) or (k, d, d), stay zero.
-
-    As many as are not free, those along which an unknown moves least.
-    """
+    """Return which components (k, d), along ``axes`` (d, d) or (k, d, d), stay zero."""
     out = np.zeros((len(unknowns.owner), axes.shape[-1]), bool)
     axes = axes[unknowns.blocks] if axes.ndim == 3 else axes
-    free = axes @ unknowns.free @ np.swapaxes(axes, -1, -2)
-    along = np.einsum("kii->ki", free)
-    count = np.rint(along.sum(axis=1)).astype(int)
-    rank = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1, kind="stable")
-    out[unknowns.blocks] = rank >= count[:, None]
+    out[unknowns.blocks] = held_components(axes, unknowns.free)
     return out
 
 

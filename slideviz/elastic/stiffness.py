@@ -20,7 +20,7 @@ unknowns, only g_i. The matrix is symmetric with blocks d by d, as the multigrid
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -131,14 +131,19 @@ def _pyramid() -> ReferenceShape:
 class ShapeBlock:
     """The elements of a mesh that have one shape."""
 
-    shape: ReferenceShape
+    vtk: int
     nodes: IntArray  # (m, a)
     cell: IntArray  # (m,): the cell of the mesh that each element is
+
+    @property
+    def shape(self) -> ReferenceShape:
+        """Return the reference element."""
+        return shape(self.vtk)
 
 
 def blocks(cells: Cells) -> list[ShapeBlock]:
     """Return all cells as elements, a block for each type."""
-    return [ShapeBlock(shape(vtk), nodes, ids) for vtk, (ids, nodes) in cells.by_type.items()]
+    return [ShapeBlock(vtk, nodes, ids) for vtk, (ids, nodes) in cells.by_type.items()]
 
 
 CHUNK = 20_000  # elements between two calls of tick: some tens of milliseconds
@@ -246,10 +251,11 @@ class ElasticMesh:
         _fill_held_diagonal(indptr, indices, data, conditions.free)
         return bsr_array((data, indices, indptr), shape=(count * d, count * d))
 
-    def definite(self) -> ElasticMesh:
-        """Return a body like this one whose matrix is positive definite: lam is at least 0."""
-        mu, lam = self.lame
-        return replace(self, lame=(mu, max(lam, 0.0)))
+    @property
+    def weights(self) -> FloatArray:
+        """Return the weights (c,) of the Laplacian like it, in the order of the parts."""
+        size = self.lame[0] * self.moduli * cell_volumes(self.points, self.parts)
+        return np.concatenate([size[part.cell] for part in self.parts])
 
     def forces(self, moved: FloatArray) -> FloatArray:
         """Return the forces (n, d) of a displacement (n, d), by its differences in each element.

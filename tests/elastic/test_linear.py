@@ -16,7 +16,7 @@ import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.elastic import linear, multigrid
+from slideviz.elastic import laplacian, linear, multigrid
 from slideviz.elastic.stiffness import (
     _CORNERS,
     Conditions,
@@ -93,7 +93,7 @@ def displaced(mesh, field, **settings):
 def by_iterations(monkeypatch):
     """Small systems are solved by conjugate gradients, too, on several levels."""
     monkeypatch.setattr(multigrid, "DIRECT", {2: 0, 3: 0})
-    monkeypatch.setattr(multigrid, "COARSE", 20)
+    monkeypatch.setattr(laplacian, "COARSE", 20)
 
 
 # Shape functions and the matrix
@@ -581,16 +581,19 @@ def test_a_singular_matrix_is_left_to_iterations():
     def residual(x):
         return target - body.forces(x.reshape(mesh.points.shape)).ravel()
 
-    modes = linear.rigid_motions(mesh.points, free_body(mesh))
     matrix = body.matrix(free_body(mesh))
-    found = multigrid.solve(matrix, lambda: matrix, residual, modes, np.zeros(n), 0.0)
+
+    def preconditioner():
+        return linear.preconditioner(body, free_body(mesh))
+
+    found = multigrid.solve(matrix, preconditioner, residual, np.zeros(n), 0.0)
     assert np.abs(residual(found.x)).max() < 1e-6 * np.abs(target).max()
 
 
 @pytest.mark.parametrize("kind", STIFFNESS_TYPES)
 @pytest.mark.parametrize("poisson", RATIOS)
 def test_conjugate_gradients_have_not_solved_what_is_wrong(kind, poisson, monkeypatch):
-    monkeypatch.setattr(multigrid, "COARSE", 20)
+    monkeypatch.setattr(laplacian, "COARSE", 20)
     mesh = c_mesh(around=40, wake=8)
     known = np.unique(np.concatenate([m.nodes for m in mesh.markers]))
     n, free = len(mesh.points), np.setdiff1d(np.arange(len(mesh.points)), known)
@@ -598,14 +601,15 @@ def test_conjugate_gradients_have_not_solved_what_is_wrong(kind, poisson, monkey
     place[free] = np.arange(len(free))
     eye = np.tile(np.eye(2), (n, 1, 1))
     given_ = Conditions(place, eye, np.ones(n, bool), np.zeros((n, 2)), eye[: len(free)])
-    matrix = body_of(mesh, kind, poisson).matrix(given_)
+    body = body_of(mesh, kind, poisson)
+    matrix = body.matrix(given_)
     wanted = np.random.default_rng(0).standard_normal(matrix.shape[0])
-    levels = multigrid.hierarchy(matrix, linear.rigid_motions(mesh.points, given_))
+    precondition = linear.preconditioner(body, given_)
     right = multigrid._product(matrix, wanted)
     errors = []
     for most in (10, 30, 100, 300):
         monkeypatch.setattr(multigrid, "MAX_ITERATIONS", most)
-        found = multigrid.conjugate_gradients(matrix, levels, right)
+        found = multigrid.conjugate_gradients(matrix, precondition, right)
         errors.append((found.error, np.abs(found.x - wanted).max() / np.abs(found.x).max()))
     assert all(said > min(error, 0.01) for said, error in errors)
 
