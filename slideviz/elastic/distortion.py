@@ -31,6 +31,7 @@ from slideviz.mesh.jacobians import (
     cross3,
     dot3,
     gather,
+    scaled3,
 )
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.system.jit_cache import njit
@@ -278,11 +279,7 @@ def _duals(start, ends, scale, c):  # type: ignore[no-untyped-def]
     x = cross3(b, last)
     y = cross3(last, a)
     z = cross3(a, b)
-    return (
-        (scale * x[0], scale * x[1], scale * x[2]),
-        (scale * y[0], scale * y[1], scale * y[2]),
-        (scale * z[0], scale * z[1], scale * z[2]),
-    )
+    return scaled3(scale, x), scaled3(scale, y), scaled3(scale, z)
 
 
 @njit(inline="always")

@@ -28,6 +28,7 @@ from scipy.sparse import bsr_array, csr_array
 from scipy.spatial import KDTree
 
 from slideviz.errors import DeformError
+from slideviz.mesh.jacobians import cross3, dot3, row3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
 from slideviz.system.jit_cache import njit
@@ -336,33 +337,31 @@ def _fill_held_diagonal(
 
 
 @njit
-def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
-    """Return det J of an element with corners x (a, d) at integration point q.
+def _jacobian(corners, gradients, q, inverse):  # type: ignore[no-untyped-def]
+    """Return det J of an element with ``corners`` (a, d) at integration point q.
 
     Writes J^-1 to ``inverse`` (3, 3).
     """
-    d = x.shape[1]
+    d = corners.shape[1]
     J = np.zeros((3, 3))
     J[2, 2] = 1.0
     for i in range(d):
         for j in range(d):
             total = 0.0
-            for a in range(x.shape[0]):
-                total += gradients[q, a, i] * x[a, j]
+            for a in range(corners.shape[0]):
+                total += gradients[q, a, i] * corners[a, j]
             J[i, j] = total
-    c00 = J[1, 1] * J[2, 2] - J[1, 2] * J[2, 1]
-    c01 = J[1, 2] * J[2, 0] - J[1, 0] * J[2, 2]
-    c02 = J[1, 0] * J[2, 1] - J[1, 1] * J[2, 0]
-    det = J[0, 0] * c00 + J[0, 1] * c01 + J[0, 2] * c02
-    inverse[0, 0] = c00 / det
-    inverse[1, 0] = c01 / det
-    inverse[2, 0] = c02 / det
-    inverse[0, 1] = (J[0, 2] * J[2, 1] - J[0, 1] * J[2, 2]) / det
-    inverse[1, 1] = (J[0, 0] * J[2, 2] - J[0, 2] * J[2, 0]) / det
-    inverse[2, 1] = (J[0, 1] * J[2, 0] - J[0, 0] * J[2, 1]) / det
-    inverse[0, 2] = (J[0, 1] * J[1, 2] - J[0, 2] * J[1, 1]) / det
-    inverse[1, 2] = (J[0, 2] * J[1, 0] - J[0, 0] * J[1, 2]) / det
-    inverse[2, 2] = (J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]) / det
+    one = row3(J, 0)
+    two = row3(J, 1)
+    three = row3(J, 2)
+    x = cross3(two, three)
+    y = cross3(three, one)
+    z = cross3(one, two)
+    det = dot3(one, x)
+    for i in range(3):
+        inverse[i, 0] = x[i] / det
+        inverse[i, 1] = y[i] / det
+        inverse[i, 2] = z[i] / det
     return det
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import add3, cross3, dot3, minus3, row3
+from slideviz.mesh.jacobians import add3, cross3, dot3, minus3, row3, scaled3
 from slideviz.system.jit_cache import njit
 
 
@@ -67,7 +67,7 @@ def _middle_of(points, connectivity, begin, side_nodes, vtk, side):  # type: ign
     if side_nodes[vtk, side, 3] < 0:
         return total[0] / 3.0, total[1] / 3.0, total[2] / 3.0
     total = add3(total, row3(points, connectivity[begin + side_nodes[vtk, side, 3]]))
-    return 0.25 * total[0], 0.25 * total[1], 0.25 * total[2]
+    return scaled3(0.25, total)
 
 
 @njit
@@ -115,8 +115,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
                     break
                 other = connectivity[first + around[vtk, at, ray, 0]]
                 turn = around[vtk, at, ray, 1]
-                half = minus3(row3(points, other), x)
-                half = 0.5 * half[0], 0.5 * half[1], 0.5 * half[2]
+                half = scaled3(0.5, minus3(row3(points, other), x))
                 inward = minus3(to_middle, half)
                 if flat:
                     normal = turn * inward[1], -turn * inward[0], 0.0
@@ -129,8 +128,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
                     if side != around[vtk, at, 0, 1]:
                         after = _middle_of(points, connectivity, first, side_nodes, vtk, side)
                         after = minus3(after, x)
-                    normal = cross3(inward, minus3(face, after))
-                    normal = 0.5 * normal[0], 0.5 * normal[1], 0.5 * normal[2]
+                    normal = scaled3(0.5, cross3(inward, minus3(face, after)))
                     before = across
                     across = cross3(after, to_middle)
                     for one in (before, across):

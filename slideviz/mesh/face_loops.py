@@ -8,7 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather, half_sum, minus3
+from slideviz.mesh.jacobians import (
+    LANES,
+    add3,
+    column3,
+    cross3,
+    dot3,
+    edge,
+    gather,
+    half_sum,
+    minus3,
+    row3,
+    scaled3,
+)
 from slideviz.system.jit_cache import njit
 
 
@@ -53,11 +65,7 @@ def _face(at, row, count, area, centre):  # type: ignore[no-untyped-def]
                 total += size
                 sums = add3(sums, normal)
                 third = add3(add3(p, q), middle)
-                moment = (
-                    moment[0] + size * third[0],
-                    moment[1] + size * third[1],
-                    moment[2] + size * third[2],
-                )
+                moment = add3(moment, scaled3(size, third))
                 p = q
             for axis in range(3):
                 area[axis, c] = 0.5 * sums[axis]
@@ -82,18 +90,15 @@ def write_centres(points, nodes, signs, polygons, centres, volumes):  # type: ig
             total = 0.0
             moment = (0.0, 0.0, 0.0)
             for k in range(len(polygons)):
-                top = add3(top, (middles[k, 0, c], middles[k, 1, c], middles[k, 2, c]))
+                top = add3(top, column3(middles[k], c))
             top = top[0] / len(polygons), top[1] / len(polygons), top[2] / len(polygons)
             for k in range(len(polygons)):
-                middle = middles[k, 0, c], middles[k, 1, c], middles[k, 2, c]
-                area = areas[k, 0, c], areas[k, 1, c], areas[k, 2, c]
+                middle = column3(middles[k], c)
+                area = column3(areas[k], c)
                 volume = dot3(area, minus3(middle, top))
                 total += volume
-                moment = (
-                    moment[0] + volume * (0.75 * middle[0] + 0.25 * top[0]),
-                    moment[1] + volume * (0.75 * middle[1] + 0.25 * top[1]),
-                    moment[2] + volume * (0.75 * middle[2] + 0.25 * top[2]),
-                )
+                centre = add3(scaled3(0.75, middle), scaled3(0.25, top))
+                moment = add3(moment, scaled3(volume, centre))
             for axis in range(3):
                 centres[start + c, axis] = moment[axis] / total if total != 0.0 else top[axis]
             volumes[start + c] = total / 3.0 * signs[start + c]
@@ -129,8 +134,8 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
             _across(cells, k, adjacent, rated, area, middle, across, share, ratio)
             for c in range(count):
                 worst[2, c] = max(worst[2, c], ratio[c])
-                s = (area[0, c], area[1, c], area[2, c])
-                d = (across[0, c], across[1, c], across[2, c])
+                s = column3(area, c)
+                d = column3(across, c)
                 scale = np.sqrt(dot3(d, d) * dot3(s, s))
                 cosine = signs[start + c] * dot3(s, d) / scale if scale > 0.0 else 0.0
                 worst[0, c] = min(worst[0, c], cosine if share[c] < 0.3 else 1.0)
@@ -178,29 +183,21 @@ def _raise_skewness(at, row, cells, centres, area, middle, across, share, worst)
     """Raise ``worst`` (…) to the skewness of a face of ``cells`` (c,), local nodes ``row``."""
     v = np.empty((3, LANES))
     reach = np.zeros(LANES)
-    own = np.empty((3, LANES))
     for c in range(len(cells)):
-        for axis in range(3):
-            own[axis, c] = centres[cells[c], axis]
-    for c in range(len(cells)):
-        s = (area[0, c], area[1, c], area[2, c])
-        d = (across[0, c], across[1, c], across[2, c])
-        p = middle[0, c] - own[0, c], middle[1, c] - own[1, c], middle[2, c] - own[2, c]
+        s = column3(area, c)
+        d = column3(across, c)
+        p = minus3(column3(middle, c), row3(centres, cells[c]))
         part = dot3(s, p) / dot3(s, d)
-        v[0, c] = p[0] - part * d[0]
-        v[1, c] = p[1] - part * d[1]
-        v[2, c] = p[2] - part * d[2]
+        v[0, c], v[1, c], v[2, c] = minus3(p, scaled3(part, d))
     for k in row:
         if k >= 0:
             for c in range(len(cells)):
-                x = at[0, k, c] - middle[0, c]
-                y = at[1, k, c] - middle[1, c]
-                along = v[0, c] * x + v[1, c] * y + v[2, c] * (at[2, k, c] - middle[2, c])
+                along = dot3(column3(v, c), minus3(node(at, k, c), column3(middle, c)))
                 reach[c] = max(reach[c], abs(along))
     for c in range(len(cells)):
-        s = (area[0, c], area[1, c], area[2, c])
-        d = (across[0, c], across[1, c], across[2, c])
-        square = dot3((v[0, c], v[1, c], v[2, c]), (v[0, c], v[1, c], v[2, c]))
+        s = column3(area, c)
+        d = column3(across, c)
+        square = dot3(column3(v, c), column3(v, c))
         length = np.sqrt(square)
         skewness = square / max(share[c] * length * np.sqrt(dot3(d, d)), reach[c])
         skewness = skewness if length > 0.0 else 0.0

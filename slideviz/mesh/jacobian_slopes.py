@@ -19,6 +19,9 @@ from slideviz.mesh.jacobians import (
     dot3,
     gather,
     half_sum,
+    minus3,
+    scaled3,
+    scatter,
     spreads,
 )
 from slideviz.system.jit_cache import njit
@@ -47,10 +50,7 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
         _weights(alpha, spread, turn[here], powers, sums[here])
         slope[:] = 0.0
         _pull_corners(vtk, coords, table, count, alpha, spread, slope)
-        for c in range(count):
-            for j in range(nodes.shape[1]):
-                for axis in range(points.shape[1]):
-                    out[first + c, j, axis] = slope[axis, j, c]
+        scatter(slope, first, count, out)
 
 
 @njit
@@ -116,39 +116,21 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
     Their formulas are those of `jacobians.spreads`, differentiated.
     """
     if vtk == 5:
-        return (
-            (2 * x[0] - y[0], 2 * x[1] - y[1], 0.0),
-            (2 * y[0] - x[0], 2 * y[1] - x[1], 0.0),
-            (0.0, 0.0, 0.0),
-        )
+        return minus3(scaled3(2.0, x), y), minus3(scaled3(2.0, y), x), (0.0, 0.0, 0.0)
     if vtk == 10:
         return (
-            (3 * x[0] - y[0] - z[0], 3 * x[1] - y[1] - z[1], 3 * x[2] - y[2] - z[2]),
-            (3 * y[0] - x[0] - z[0], 3 * y[1] - x[1] - z[1], 3 * y[2] - x[2] - z[2]),
-            (3 * z[0] - x[0] - y[0], 3 * z[1] - x[1] - y[1], 3 * z[2] - x[2] - y[2]),
+            minus3(minus3(scaled3(3.0, x), y), z),
+            minus3(minus3(scaled3(3.0, y), x), z),
+            minus3(minus3(scaled3(3.0, z), x), y),
         )
     if vtk == 14:
-        half = half_sum(x, y)
-        u = z[0] - half[0]
-        v = z[1] - half[1]
-        w = z[2] - half[2]
-        return (
-            (2 * (x[0] - u), 2 * (x[1] - v), 2 * (x[2] - w)),
-            (2 * (y[0] - u), 2 * (y[1] - v), 2 * (y[2] - w)),
-            (4 * u, 4 * v, 4 * w),
-        )
+        axis = minus3(z, half_sum(x, y))
+        return scaled3(2.0, minus3(x, axis)), scaled3(2.0, minus3(y, axis)), scaled3(4.0, axis)
     xx = dot3(x, x)
     yy = dot3(y, y)
     zz = dot3(z, z)
     product = np.sqrt(xx * yy * zz)
-    a = product / xx
-    b = product / yy
-    c = product / zz
-    return (
-        (a * x[0], a * x[1], a * x[2]),
-        (b * y[0], b * y[1], b * y[2]),
-        (c * z[0], c * z[1], c * z[2]),
-    )
+    return scaled3(product / xx, x), scaled3(product / yy, y), scaled3(product / zz, z)
 
 
 @njit
@@ -169,10 +151,7 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
         part[:, :count] = weights[:, first : first + count]
         slope[:] = 0.0
         pull_proof(vtk, coords, table, count, part, none, slope)
-        for c in range(count):
-            for j in range(nodes.shape[1]):
-                for axis in range(points.shape[1]):
-                    out[first + c, j, axis] = slope[axis, j, c]
+        scatter(slope, first, count, out)
 
 
 @njit

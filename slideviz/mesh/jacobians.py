@@ -154,6 +154,15 @@ def gather(points, nodes, first, count, coords):  # type: ignore[no-untyped-def]
                 coords[axis, j, c] = points[node, axis]
 
 
+@njit
+def scatter(slope, first, count, out):  # type: ignore[no-untyped-def]
+    """Write values (3, n, ...) of ``count`` cells, from number ``first`` on, into out (m, n, d)."""
+    for c in range(count):
+        for j in range(out.shape[1]):
+            for axis in range(out.shape[2]):
+                out[first + c, j, axis] = slope[axis, j, c]
+
+
 @njit(inline="always")
 def row3(points, k):  # type: ignore[no-untyped-def]
     """Return row ``k`` of points (n, 3), a triple."""
@@ -198,6 +207,18 @@ def add3(a, b):  # type: ignore[no-untyped-def]
 def minus3(a, b):  # type: ignore[no-untyped-def]
     """Return the difference of two triples."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(inline="always")
+def scaled3(s, a):  # type: ignore[no-untyped-def]
+    """Return a number times a triple."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@njit(inline="always")
+def column3(x, c):  # type: ignore[no-untyped-def]
+    """Return the column of cell ``c`` of x (3, ...), a triple."""
+    return x[0, c], x[1, c], x[2, c]
 
 
 @njit(inline="always")
@@ -253,7 +274,7 @@ def spreads(vtk, coords, table, count, spread):  # type: ignore[no-untyped-def]
                 spread[k, c] = squares - dot3(x, y) - dot3(y, z) - dot3(z, x)
             elif vtk == 14:
                 half = half_sum(x, y)
-                axis = z[0] - half[0], z[1] - half[1], z[2] - half[2]
+                axis = minus3(z, half)
                 spread[k, c] = xx + yy + 2 * dot3(axis, axis)
             else:
                 spread[k, c] = np.sqrt(xx * yy * zz)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import LANES, add3, cross3, dot3, edge, gather
+from slideviz.mesh.jacobians import LANES, add3, column3, cross3, dot3, edge, gather
 from slideviz.mesh.model import IntArray
 from slideviz.system.jit_cache import njit
 from slideviz.terms import Metric
@@ -175,7 +175,7 @@ def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-de
                 cosine = dot3(x, y) / scale if scale > 0.0 else 1.0
                 angle = min(max(1.0 - cosine, 0.0), 2.0)
                 if n == 4:
-                    turn = dot3((normal[0, c], normal[1, c], normal[2, c]), cross3(x, y))
+                    turn = dot3(column3(normal, c), cross3(x, y))
                     angle = angle if turn >= 0.0 else 4.0 - angle
                 least[c] = min(least[c], angle)
                 largest[c] = max(largest[c], angle)

@@ -21,6 +21,7 @@ from slideviz.mesh.model import (
     IntArray,
     Mesh,
     frozen_array,
+    row_dots,
     sorted_nodes,
 )
 from slideviz.mesh.nearest import row_groups, sorted_in_rows
@@ -189,9 +190,12 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
 
     ``owner`` (f,) is the cell of each.
     """
-    inward = np.empty(len(facets), bool)
-    cells = mesh.cells
-    _face_inward(mesh.points, facets, owner, cells.offsets, cells.connectivity, inward)
+    cells = mesh.cells.take(owner)
+    sizes = np.diff(cells.offsets)
+    out = mesh.points[facets].mean(axis=1)
+    for axis, coords in enumerate(mesh.points.T):
+        out[:, axis] -= np.add.reduceat(coords[cells.connectivity], cells.offsets[:-1]) / sizes
+    inward = row_dots(facet_vectors(mesh.points, facets), out) < 0
     turned = facets.copy()
     if mesh.dim == 2:
         turned[inward] = facets[inward][:, ::-1]
@@ -200,41 +204,6 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
         turned[inward & ~triangle] = facets[inward & ~triangle][:, ::-1]
         turned[inward & triangle] = facets[inward & triangle][:, [1, 0, 2, 3]]
     return turned
-
-
-@njit
-def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type: ignore[no-untyped-def]
-    """Write into ``inward`` (f,) whether the normal of a facet, as ordered, points into its cell.
-
-    ``owner`` (f,) is the cell; ``offsets`` and ``connectivity`` are those of `Cells`.
-    """
-    dim = points.shape[1]
-    width = facets.shape[1]
-    out = np.zeros(3)
-    along = np.zeros(3)
-    across = np.zeros(3)
-    for f in range(len(facets)):
-        first = offsets[owner[f]]
-        last = offsets[owner[f] + 1]
-        for axis in range(dim):
-            centre = 0.0
-            middle = 0.0
-            for k in range(width):
-                centre += points[facets[f, k], axis]
-            for k in range(first, last):
-                middle += points[connectivity[k], axis]
-            out[axis] = centre / width - middle / (last - first)
-            along[axis] = points[facets[f, min(2, width - 1)], axis] - points[facets[f, 0], axis]
-            across[axis] = points[facets[f, width - 1], axis] - points[facets[f, 1], axis]
-        if dim == 2:
-            inward[f] = along[1] * out[0] - along[0] * out[1] < 0
-        else:
-            volume = 0.0
-            for axis in range(3):
-                i = (axis + 1) % 3
-                j = (axis + 2) % 3
-                volume += (along[i] * across[j] - along[j] * across[i]) * out[axis]
-            inward[f] = volume < 0
 
 
 def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:

@@ -25,6 +25,7 @@ from slideviz.mesh.jacobians import (
     coefficients,
     coords_of,
     gather,
+    scatter,
     write_coefficients,
 )
 from slideviz.mesh.model import FloatArray, IntArray
@@ -204,9 +205,7 @@ def write_energy(  # type: ignore[no-untyped-def]
         for c in range(count):
             values[first + c] = value[c]
             least[first + c] = lowest[c]
-            for j in range(n):
-                for axis in range(d):
-                    slopes[first + c, j, axis] = slope[axis, j, c]
+        scatter(slope, first, count, slopes)
 
 
 @njit
