@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from slideviz.mesh.jacobians import add3, dot3, minus3, row3, scaled3
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.mesh.planes import partition
 from slideviz.rbf.compiled import one_at_a_time
@@ -109,62 +110,42 @@ def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit
-def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
-    """Write the point of segment a, b closest to x to ``out``; return the squared distance."""
-    length = 0.0
-    along = 0.0
-    for i in range(3):
-        length += (b[i] - a[i]) * (b[i] - a[i])
-        along += (x[i] - a[i]) * (b[i] - a[i])
-    t = 0.0 if length <= 0.0 else min(max(along / length, 0.0), 1.0)
-    gap = 0.0
-    for i in range(3):
-        out[i] = a[i] + t * (b[i] - a[i])
-        gap += (x[i] - out[i]) ** 2
-    return gap
-
-
 @njit(inline="always")
-def _copy(point, out):  # type: ignore[no-untyped-def]
-    """Write a point to ``out``, number by number: whole rows take long to compile."""
-    for i in range(3):
-        out[i] = point[i]
+def _on_segment(x, a, b):  # type: ignore[no-untyped-def]
+    """Return the squared distance of x from segment a, b, and the closest point; all triples."""
+    along = minus3(b, a)
+    length = dot3(along, along)
+    t = 0.0 if length <= 0.0 else min(max(dot3(minus3(x, a), along) / length, 0.0), 1.0)
+    point = add3(a, scaled3(t, along))
+    away = minus3(x, point)
+    return dot3(away, away), point
 
 
 @njit
-def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
-    """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance."""
-    uu = 0.0
-    uv = 0.0
-    vv = 0.0
-    wu = 0.0
-    wv = 0.0
-    for i in range(3):
-        u = b[i] - a[i]
-        v = c[i] - a[i]
-        w = x[i] - a[i]
-        uu += u * u
-        uv += u * v
-        vv += v * v
-        wu += w * u
-        wv += w * v
+def _on_triangle(x, corners):  # type: ignore[no-untyped-def]
+    """Return the squared distance of x from a triangle of three triples, and the closest point."""
+    a, b, c = corners
+    u = minus3(b, a)
+    v = minus3(c, a)
+    w = minus3(x, a)
+    uu = dot3(u, u)
+    uv = dot3(u, v)
+    vv = dot3(v, v)
+    wu = dot3(w, u)
+    wv = dot3(w, v)
     area = uu * vv - uv * uv
     if area > 0.0:
         s = (vv * wu - uv * wv) / area
         t = (uu * wv - uv * wu) / area
         if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
-            gap = 0.0
-            for i in range(3):
-                out[i] = a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i])
-                gap += (x[i] - out[i]) ** 2
-            return gap
-    best = _on_segment(x, a, b, out)
-    for side in range(2):
-        gap = _on_segment(x, b, c, trial) if side == 0 else _on_segment(x, c, a, trial)
-        if gap < best:
-            best = gap
-            _copy(trial, out)
+            point = add3(add3(a, scaled3(s, u)), scaled3(t, v))
+            away = minus3(x, point)
+            return dot3(away, away), point
+    best = _on_segment(x, a, b)
+    for start, stop in ((b, c), (c, a)):
+        side = _on_segment(x, start, stop)
+        if side[0] < best[0]:
+            best = side
     return best
 
 
@@ -186,15 +167,19 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
-    """Write the corners of an item, numbered as for ``_build``, to ``out`` (3, 3)."""
+def _load(item, corners, shifts):  # type: ignore[no-untyped-def]
+    """Return the corners of an item, numbered as for ``_build``: three triples."""
     image = _image(item, len(corners))
-    one = item - image * len(corners)
-    for corner in range(3):
-        for axis in range(3):
-            out[corner, axis] = corners[one, corner, axis]
-            if image > 0:  # adding zero would turn -0.0 into 0.0
-                out[corner, axis] += shifts[image, axis]
+    triangle = corners[item - image * len(corners)]
+    a = row3(triangle, 0)
+    b = row3(triangle, 1)
+    c = row3(triangle, 2)
+    if image > 0:  # adding zero would turn -0.0 into 0.0
+        by = row3(shifts, image)
+        a = add3(a, by)
+        b = add3(b, by)
+        c = add3(c, by)
+    return a, b, c
 
 
 @njit(parallel=True)
@@ -212,9 +197,8 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
         stack = np.empty(64, np.int64)
         first = np.empty(64, np.int64)
         last = np.empty(64, np.int64)
-        point = np.empty(3)
-        trial = np.empty(3)
-        t = np.empty((3, 3))
+        here = row3(x, i)
+        chosen = here
         best = np.inf
         held = np.inf
         top = 1
@@ -222,40 +206,38 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
         first[0] = 0
         last[0] = len(order)
         if len(guess):
-            _load(guess[i], corners, shifts, t)
-            best = held = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
-            _copy(point, out[i])
+            best, chosen = _on_triangle(here, _load(guess[i], corners, shifts))
+            held = best
             which[i] = guess[i]
-            if best <= ON * (x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2):
-                continue
+            if best <= ON * dot3(here, here):
+                top = 0
         while top > 0:
             top -= 1
             k = stack[top]
             a = first[top]
             b = last[top]
-            if best == 0.0 or _box_gap(bounds, k, x[i]) > best * (1.0 + TIE):
+            if best == 0.0 or _box_gap(bounds, k, here) > best * (1.0 + TIE):
                 continue
             if k >= inner:
                 for j in range(a, b):
-                    _load(order[j], corners, shifts, t)
-                    gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
+                    gap, point = _on_triangle(here, _load(order[j], corners, shifts))
                     nearer = gap < best * (1.0 - TIE)
                     if not nearer and gap <= best * (1.0 + TIE):
-                        if gap != held and _is_beside(point, out[i], best):
+                        if gap != held and _is_beside(point, chosen, best):
                             nearer = gap < held
                         else:
-                            nearer = _before(point, out[i])
+                            nearer = _before(point, chosen)
                     if nearer:
                         held = gap
                         which[i] = order[j]
-                        _copy(point, out[i])
+                        chosen = point
                     best = min(best, gap)
                 continue
             half = a + (b - a + 1) // 2
             left = 2 * k + 1
             right = 2 * k + 2
             # The nearer child is put on top, to be looked at first.
-            if _box_gap(bounds, left, x[i]) < _box_gap(bounds, right, x[i]):
+            if _box_gap(bounds, left, here) < _box_gap(bounds, right, here):
                 stack[top] = right
                 first[top] = half
                 last[top] = b
@@ -270,6 +252,7 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
                 first[top + 1] = half
                 last[top + 1] = b
             top += 2
+        out[i, 0], out[i, 1], out[i, 2] = chosen
 
 
 class ClosestPoints:
