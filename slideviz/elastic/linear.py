@@ -12,7 +12,7 @@ import numpy as np
 
 from slideviz.elastic.conditions import Body, conditions
 from slideviz.elastic.laplacian import LaplacianCycle, held_components
-from slideviz.elastic.multigrid import LIMIT, solve
+from slideviz.elastic.linear_systems import LIMIT, solve
 from slideviz.elastic.stiffness import Conditions, ElasticMesh
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray

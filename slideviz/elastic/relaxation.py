@@ -26,7 +26,7 @@ import numpy as np
 from slideviz.elastic.conditions import Body, HeldRows, held_rows, projections, unknowns
 from slideviz.elastic.distortion import WORST, Distortion
 from slideviz.elastic.laplacian import LaplacianCycle, held_components
-from slideviz.elastic.multigrid import MAKING, while_ticking
+from slideviz.elastic.linear_systems import MAKING, while_ticking
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.repair.descent import Function, Memory, dot, line_search

@@ -16,7 +16,7 @@ import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.elastic import laplacian, linear, multigrid
+from slideviz.elastic import laplacian, linear, linear_systems
 from slideviz.elastic.stiffness import (
     _CORNERS,
     Conditions,
@@ -92,7 +92,7 @@ def displaced(mesh, field, **settings):
 @pytest.fixture
 def by_iterations(monkeypatch):
     """Small systems are solved by conjugate gradients, too, on several levels."""
-    monkeypatch.setattr(multigrid, "DIRECT", {2: 0, 3: 0})
+    monkeypatch.setattr(linear_systems, "DIRECT", {2: 0, 3: 0})
     monkeypatch.setattr(laplacian, "COARSE", 20)
 
 
@@ -550,12 +550,12 @@ def test_folded_cells_do_not_stop_it():
 def test_what_iterations_do_not_reach_is_factorised_or_refused(by_iterations, monkeypatch, dim):
     mesh = builders.square(10) if dim == 2 else builders.cube(6)
     iterated = last(box_case(dim), mesh).mesh.points
-    monkeypatch.setattr(multigrid, "MAX_ITERATIONS", 3)
+    monkeypatch.setattr(linear_systems, "MAX_ITERATIONS", 3)
     with pytest.raises(
         DeformError, match=r"were not solved: the error is about .* use METHOD= rbf"
     ):
         last(box_case(dim), mesh)
-    monkeypatch.setattr(multigrid, "DIRECT", {2: 100, 3: 500})
+    monkeypatch.setattr(linear_systems, "DIRECT", {2: 100, 3: 500})
     factorised = last(box_case(dim), mesh).mesh.points
     np.testing.assert_allclose(factorised, iterated, atol=1e-9)
 
@@ -586,7 +586,7 @@ def test_a_singular_matrix_is_left_to_iterations():
     def preconditioner():
         return linear.preconditioner(body, free_body(mesh))
 
-    found = multigrid.solve(matrix, preconditioner, residual, np.zeros(n), 0.0)
+    found = linear_systems.solve(matrix, preconditioner, residual, np.zeros(n), 0.0)
     assert np.abs(residual(found.x)).max() < 1e-6 * np.abs(target).max()
 
 
@@ -605,11 +605,11 @@ def test_conjugate_gradients_have_not_solved_what_is_wrong(kind, poisson, monkey
     matrix = body.matrix(given_)
     wanted = np.random.default_rng(0).standard_normal(matrix.shape[0])
     precondition = linear.preconditioner(body, given_)
-    right = multigrid._product(matrix, wanted)
+    right = linear_systems._product(matrix, wanted)
     errors = []
     for most in (10, 30, 100, 300):
-        monkeypatch.setattr(multigrid, "MAX_ITERATIONS", most)
-        found = multigrid.conjugate_gradients(matrix, precondition, right)
+        monkeypatch.setattr(linear_systems, "MAX_ITERATIONS", most)
+        found = linear_systems.conjugate_gradients(matrix, precondition, right)
         errors.append((found.error, np.abs(found.x - wanted).max() / np.abs(found.x).max()))
     assert all(said > min(error, 0.01) for said, error in errors)
 
@@ -648,10 +648,10 @@ def test_a_run_can_be_stopped_while_the_hierarchy_is_made(monkeypatch):
             raise Cancelled("enough")
 
     with pytest.raises(Cancelled, match="enough"):
-        multigrid.while_ticking(slow, tick)
+        linear_systems.while_ticking(slow, tick)
     end.set()
     with pytest.raises(ValueError, match="a failure in there comes out here"):
-        multigrid.while_ticking(
+        linear_systems.while_ticking(
             lambda: (_ for _ in ()).throw(ValueError("a failure in there comes out here")), tick
         )
 
@@ -706,8 +706,8 @@ def test_a_product_has_the_same_bits_from_the_cache_as_from_the_compiler():
     x = rng.random((10, 3))
     strict, compiled = np.empty((2, 10, 3))
     parts = matrix.indptr, matrix.indices, matrix.data, x
-    multigrid.product.py_func(*parts, strict)
-    multigrid.product(*parts, compiled)
+    linear_systems.product.py_func(*parts, strict)
+    linear_systems.product(*parts, compiled)
     assert strict.tobytes() == compiled.tobytes()
 
 

@@ -73,8 +73,9 @@ def told(problem: BaseException | None) -> str:
 
 ROUND = 500 * np.finfo(float).eps
 SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}
-"""Linear elasticity is solved to 1e-9 (``multigrid.TOLERANCE``) of the displacement, or at least to
-1e-7 (``multigrid.LIMIT``); where it was not, the run is refused and nothing is asked."""
+"""Linear elasticity is solved to 1e-9 (``linear_systems.TOLERANCE``) of the displacement, or at
+least to 1e-7 (``linear_systems.LIMIT``); where it was not, the run is refused and nothing is
+asked."""
 
 # The like of `slideviz.solver.growth`, written again so that each checks the other.
 TINY = 1e-13

@@ -135,8 +135,8 @@ def _part(change: FloatArray, x: FloatArray, scale: float) -> float:
 def while_ticking(work: Callable[[], Made], tick: Tick) -> Made:
     """Return what ``work`` returns; call ``tick`` while it runs in a thread. ``tick`` may raise.
 
-    pyamg's set-up of a large mesh takes seconds and has no callback. When ``tick`` raises, the
-    thread runs to its end, but nobody waits for it.
+    What makes a preconditioner of a large mesh takes seconds and has no callback. When ``tick``
+    raises, the thread runs to its end, but nobody waits for it.
     """
     future: Future[Made] = Future()
 
@@ -146,7 +146,7 @@ def while_ticking(work: Callable[[], Made], tick: Tick) -> Made:
         except BaseException as problem:  # handed to the thread that waits
             future.set_exception(problem)
 
-    Thread(target=run, daemon=True, name="multigrid").start()
+    Thread(target=run, daemon=True, name="preconditioner").start()
     done = 0.0
     while True:
         try:
