@@ -115,6 +115,16 @@ def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
     shape.GetPoints().Modified()
 
 
+def add_overlay(plotter: Any, actor: Any, name: str) -> None:
+    """Add an actor that lies in the plane of the view, over the scene."""
+    plotter.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)
+
+
+def remove_actor(plotter: Any, name: str) -> None:
+    """Remove an actor, if there is one of that name."""
+    plotter.remove_actor(name, reset_camera=False, render=False)
+
+
 def lookup_table() -> Any:
     """Return a table of colors for 0 to 1, clamped; inverted cells have the color of NaN."""
     table = pv.LookupTable(COLOR_MAP, n_values=256, scalar_range=(0.0, 1.0))

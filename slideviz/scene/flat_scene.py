@@ -14,7 +14,7 @@ from slideviz.plots.section_paint import shown_paint
 from slideviz.scene import pick
 from slideviz.scene.actors import draw_in_front
 from slideviz.scene.camera import Camera
-from slideviz.scene.sections import Instances, PolygonActor, plain_color
+from slideviz.scene.sections import Instances, PolygonActor
 from slideviz.scene.stage import Stage
 from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
@@ -51,16 +51,17 @@ class FlatScene:
         self._mark = PolygonActor(self.stage, "marked", pickable=False)
         self._undeformed = PolygonActor(self.stage, "undeformed", pickable=False)
         self._outlines = Instances(self.stage, self._undeformed)
-        self._undeformed_of: tuple[object, ...] = ()
+        self._undeformed_of: object = ()
         prop = self._mark.actor.prop
         prop.style = "wireframe"
         prop.color = SELECTED_COLOR
         prop.line_width = 4.0
         self._undeformed.actor.prop.line_width = 2.0
+        self._shown.actor.prop.line_width = 1.0
         for one in (self._mark, self._undeformed):
             draw_in_front(one.mapper)
-        self._made_of: tuple[object, ...] = ()
-        self._level: tuple[tuple[object, ...], float | None] = (), None
+        self._made_of: object = ()
+        self._level: tuple[object, float | None] = (), None
         self.session = Session()  # the state that is shown
         self.set_scheme(scheme)
 
@@ -87,13 +88,7 @@ class FlatScene:
             self._place(cut, only, section, session)
         cells = self._shown.polygons.cells
         self._shown.color(self.stage.values_of(session, cells, frame) if by_value else None)
-        prop = self._shown.actor.prop
-        prop.color = plain_color(self.stage.scheme)
-        prop.lighting = section.whole_cells
-        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole_cells else (1.0, 0.0)
-        prop.line_width = 1.0
-        view = self.session.view
-        self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
+        self._shown.style(self.stage, session, section.whole_cells)
         self._draw_undeformed(section)
         self._draw_neighbours(section)
         marked = None if session.lacks_cells else session.view.marked_cell

@@ -15,7 +15,7 @@ from slideviz.ffd.box import Box, points_at
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
 from slideviz.scene import actors
-from slideviz.scene.actors import draw_in_front
+from slideviz.scene.actors import Band, draw_in_front
 from slideviz.scene.legend import set_letters
 from slideviz.scene.stage import KeyedLayer, Layer
 from slideviz.session.motions import (
@@ -53,7 +53,7 @@ class BoxLayer(KeyedLayer):
 
     names = (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS, CHOSEN)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         if session.mesh is None or "ffd" not in session.view.drawn:
             return ()
         case = session.case
@@ -63,8 +63,7 @@ class BoxLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         mesh = session.mesh
-        if not self._key or mesh is None:
-            return
+        assert mesh is not None
         boxes, moved = lattices(session.case, mesh)
         lift = 4.0 * self.stage.lift(mesh)
         every = {
@@ -175,9 +174,8 @@ class GhostLayer(Layer):
         self.moved: dict[str, FloatArray] = {}
         """The points (u, d) of the nodes of each boundary that will move."""
         self._surfaces: dict[str, Surface] = {}
-        self._actors: dict[str, Any] = {}
-        # Kept here: a data set that only VTK holds may come back from a mapper without points.
-        self._shapes: dict[str, Any] = {}
+        # Shapes, too: a data set that only VTK holds may come back from a mapper without points.
+        self._bands: dict[str, Band] = {}
         self._session = Session()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -189,8 +187,7 @@ class GhostLayer(Layer):
         for name in set(self.moved) - set(moved):
             for part in ("", RIM, WIRE):
                 key = f"motion:{name}{part}"
-                self._actors.pop(key, None)
-                self._shapes.pop(key, None)
+                self._bands.pop(key, None)
                 self.stage.remove(key)
         self.moved = dict(moved)
         self._draw_moved(self._session)
@@ -213,13 +210,14 @@ class GhostLayer(Layer):
             # A ghost in the boundary's own place is not drawn.
             if not shown or name in view.hidden or not is_apart(points, surface, session):
                 for part in ("", RIM, WIRE):
-                    if f"{key}{part}" in self._actors:
-                        self._actors[f"{key}{part}"].visibility = False
+                    if f"{key}{part}" in self._bands:
+                        self._bands[f"{key}{part}"].actor.visibility = False
                 continue
             hits = bool(session.intersection or session.folding)
             color = INTERSECTION_COLOR if hits else ROLES["moving"].color
-            for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
-                actors.place(shape, points, 3 * self.stage.lift(session.mesh))
+            for band in self._parts(key, surface, 0.55, ON_TOP):
+                actors.place(band.shape, points, 3 * self.stage.lift(session.mesh))
+                actor = band.actor
                 actor.prop.color = self._rim_color(color) if actor.name.endswith(RIM) else color
                 actor.prop.line_width = 4.5 if hits else 2.5
                 actor.visibility = True
@@ -227,10 +225,10 @@ class GhostLayer(Layer):
                 self._draw_wire(key, color, not rim_moves(points, surface, session.mesh))
 
     def _draw_wire(self, key: str, color: str, wanted: bool) -> None:
-        shape = self._shapes[key]
+        shape = self._bands[key].shape
         wanted = wanted and shape.n_cells <= MOST_WIRE
-        if wanted or f"{key}{WIRE}" in self._actors:
-            wire, _ = self._part(f"{key}{WIRE}", lambda *_: shape)
+        if wanted or f"{key}{WIRE}" in self._bands:
+            wire = self._part(f"{key}{WIRE}", lambda *_: shape).actor
             wire.prop.style = "wireframe"
             wire.prop.color = color
             wire.prop.opacity = 0.5
@@ -251,45 +249,44 @@ class GhostLayer(Layer):
         shown = "undeformed" in view.drawn and session.mesh is not None and view.frame > 0
         for name, surface in self._surfaces.items():
             key = f"undeformed:{name}"
-            if not shown and key not in self._actors:
+            if not shown and key not in self._bands:
                 continue
             moves = session.role(name) != "fixed"
-            for actor, _ in self._parts(key, surface, 0.45):
-                actor.prop.color = self.stage.scheme.ghost
-                actor.visibility = shown and moves and name not in view.hidden
+            for band in self._parts(key, surface, 0.45):
+                band.actor.prop.color = self.stage.scheme.ghost
+                band.actor.visibility = shown and moves and name not in view.hidden
 
     def _parts(
         self, key: str, surface: Surface, opacity: float, nearer: float = DEEPER
-    ) -> list[tuple[Any, Any]]:
+    ) -> list[Band]:
         """Return actor and data set of each part of a ghost: lines in 2D; faces and rim in 3D.
 
         ``nearer`` is how much the rim is drawn before its place (see `DEEPER`).
         """
         faces = self._part(key, lambda at, lift: actors.surface_shape(surface, at, lift))
         if surface.flat:
-            faces[0].prop.opacity = opacity + 0.25
+            faces.actor.prop.opacity = opacity + 0.25
             return [faces]
-        faces[0].prop.opacity = opacity - 0.1
-        _shift_depth(faces[0], DEEPER)
+        faces.actor.prop.opacity = opacity - 0.1
+        _shift_depth(faces.actor, DEEPER)
         if not len(surface.rim):
             return [faces]
         rim = self._part(f"{key}{RIM}", lambda at, lift: actors.rim_shape(surface, at, lift))
-        rim[0].prop.opacity = min(opacity + 0.35, 1.0)
-        _shift_depth(rim[0], -nearer)
+        rim.actor.prop.opacity = min(opacity + 0.35, 1.0)
+        _shift_depth(rim.actor, -nearer)
         return [faces, rim]
 
-    def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> tuple[Any, Any]:
+    def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> Band:
         """Return the actor and the data set of a name, made by ``make`` at the first call."""
-        if key not in self._actors:
+        if key not in self._bands:
             mesh = self._session.mesh
             assert mesh is not None
             shape = make(mesh.points, 3 * self.stage.lift(mesh))
             lit = mesh.dim == 3 and not key.endswith((RIM, WIRE))
             actor = self.stage.add(shape, key, lighting=lit, pickable=False)
             actor.prop.line_width = 2.5
-            self._actors[key] = actor
-            self._shapes[key] = shape
-        return self._actors[key], self._shapes[key]
+            self._bands[key] = Band(shape, actor)
+        return self._bands[key]
 
 
 def _shift_depth(actor: Any, units: float) -> None:
@@ -359,15 +356,14 @@ class SupportLayer(KeyedLayer):
 
     names = (HALO, NAME)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         if session.mesh is None or "support" not in session.view.drawn:
             return ()
         style = self.stage.pixel_scale, self.stage.scheme
         return (*support_key(support_case(session), session.mesh), *style)
 
     def draw(self, session: Session) -> None:
-        if not self._key or session.mesh is None:
-            return
+        assert session.mesh is not None
         radius, boxes = support_of(support_case(session), session.mesh)
         if not radius:
             return

@@ -18,8 +18,9 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.ffd.box import Index
-from slideviz.mesh.model import FloatArray, row_dots, row_norms
-from slideviz.scene.pick import Projection
+from slideviz.mesh.model import FloatArray, row_norms
+from slideviz.scene.actors import add_overlay, remove_actor
+from slideviz.scene.pick import Projection, distances
 from slideviz.session.motions import chosen_control, lattices
 from slideviz.session.placed import Act, Grip, Number, Placed
 from slideviz.session.state import Session
@@ -368,11 +369,11 @@ def control_at(
         seen = projection.pixels(layers.reshape(-1, 3)).reshape(*layers.shape[:3], 2)
         for axis in range(mesh.dim):
             ends = np.moveaxis(seen, axis, 0)
-            last = ends[1:] if row else ends[:-1]
-            way = last - ends[:-1]
-            share = ((pixel - ends[:-1]) * way).sum(-1) / np.maximum((way * way).sum(-1), 1e-30)
-            near = ends[:-1] + np.clip(share, 0.0, 1.0)[..., None] * way if row else ends
-            far = np.linalg.norm(near - pixel, axis=-1)
+            far = (
+                distances(pixel, ends[:-1], ends[1:])
+                if row
+                else np.linalg.norm(ends - pixel, axis=-1)
+            )
             place = np.unravel_index(int(np.argmin(far)), far.shape)
             here = [int(one) for one in place[1:]]
             here.insert(axis, -1 if row else int(place[0]))
@@ -392,10 +393,7 @@ def _distance(line: FloatArray, at: FloatArray) -> float:
     """Return the distance of a point (2,) from a polyline (k, 2)."""
     if len(line) == 1:
         return float(np.linalg.norm(line[0] - at))
-    start = line[:-1]
-    way = np.diff(line, axis=0)
-    share = row_dots(at - start, way) / np.maximum(row_dots(way, way), 1e-30)
-    return float(row_norms(start + np.clip(share, 0.0, 1.0)[:, None] * way - at).min())
+    return float(distances(at, line[:-1], line[1:]).min())
 
 
 def _disc(radius: float) -> FloatArray:
@@ -456,11 +454,10 @@ class HandleActor:
         there = NAME in self.plotter.actors
         if not every:
             if there:
-                self.plotter.remove_actor(NAME, reset_camera=False, render=False)
+                remove_actor(self.plotter, NAME)
             return
         if not there:  # at first, and after the scene was cleared
-            options = {"reset_camera": False, "render": False, "pickable": False}
-            self.plotter.add_actor(self.actor, name=NAME, **options)
+            add_overlay(self.plotter, self.actor, NAME)
         flat = np.concatenate([polygon for polygon, _ in every])
         offsets = np.cumsum([0, *(len(polygon) for polygon, _ in every)])
         self._shape.points = np.column_stack([flat, np.zeros(len(flat))])

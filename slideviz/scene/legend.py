@@ -16,6 +16,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMa
 from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
+from slideviz.scene.actors import add_overlay, remove_actor
 from slideviz.scene.stage import STRIP, KeyedLayer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES, ColorByTerm, Role
@@ -43,7 +44,7 @@ class LegendPlate:
         actor.SetPickable(False)
         # A reference in Python: VTK alone would keep only the C++ object.
         self.actor = actor
-        plotter.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)
+        add_overlay(plotter, actor, name)
 
     def place(self, rect: Rect) -> None:
         """Set the rectangle that the plate covers, and its colors, for the view's present size."""
@@ -134,34 +135,43 @@ def _line(stage: Stage, sign: str, color: str, word: str, *, down: float) -> Non
     """
     # A role and the nodes of a type may have the same word.
     prefix, right, size = _SIGNS[sign]
-    corner = _corner(1.0, 1.0)
     signs = [(sign, color, STRIP - 8, 1.4 * size)] if color else []
     for what, shade, edge, letters in (*signs, (word, stage.scheme.text, right, size)):
-        text = pv.Text(what)
-        text.GetPositionCoordinate().SetReferenceCoordinate(corner)
-        text.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        scale = stage.pixel_scale
-        text.GetPositionCoordinate().SetValue(-edge * scale, -down * scale)
-        set_letters(text.prop, stage.scheme, letters * stage.font_scale)
+        text = _write(stage, what, f"{prefix}{word}:{what}", (1.0, 1.0), (-edge, -down), letters)
         text.prop.color = shade
-        text.prop.SetVerticalJustificationToCentered()
-        name = f"{prefix}{word}:{what}"
-        stage.plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
 
 
-def _corner(x: float, y: float) -> Any:
-    """Return a vtkCoordinate relative to the view (0 to 1), as reference of pixel positions."""
-    corner = vtkCoordinate()
-    corner.SetCoordinateSystemToNormalizedViewport()
-    corner.SetValue(x, y)
-    return corner
+def _write(
+    stage: Stage,
+    word: str,
+    name: str,
+    corner: tuple[float, float],
+    at: tuple[float, float],
+    size: float,
+) -> Any:
+    """Write a word over the view, centred vertically; return its actor.
+
+    It begins ``at`` pixels (at normal letter size) from a place relative to the view (0 to 1).
+    """
+    text = pv.Text(word)
+    reference = vtkCoordinate()
+    reference.SetCoordinateSystemToNormalizedViewport()
+    reference.SetValue(*corner)
+    place = text.GetPositionCoordinate()
+    place.SetReferenceCoordinate(reference)
+    place.SetCoordinateSystemToViewport()
+    place.SetValue(at[0] * stage.pixel_scale, at[1] * stage.pixel_scale)
+    set_letters(text.prop, stage.scheme, size * stage.font_scale)
+    text.prop.SetVerticalJustificationToCentered()
+    add_overlay(stage.plotter, text, name)
+    return text
 
 
 def clear_legend(plotter: Any) -> None:
     """Remove the lines of the legend, the color bar, and the plate."""
     for name in list(plotter.actors):
         if name.startswith(("legend:", "plate:")):
-            plotter.remove_actor(name, reset_camera=False, render=False)
+            remove_actor(plotter, name)
     for name in list(plotter.scalar_bars.keys()):
         plotter.remove_scalar_bar(name, render=False)
 
@@ -202,16 +212,8 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     bar.SetNanAnnotation("")
     bar.SetDrawAboveRangeSwatch(False)
     if inverted:  # VTK's own annotation would be to the bar's left, over the mesh
-        word = pv.Text("inverted")
-        right = STRIP - 14 - _BAR - _GAP - _INDENT
-        word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))
-        word.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        word.GetPositionCoordinate().SetValue(-right * scale, _NAN / 2.0 * scale)
-        set_letters(word.prop, scheme, 12 * font_scale)
-        word.prop.SetVerticalJustificationToCentered()
-        stage.plotter.add_actor(
-            word, name="legend:inverted:", reset_camera=False, render=False, pickable=False
-        )
+        at = _BAR + _GAP + _INDENT + 14 - STRIP, _NAN / 2.0
+        _write(stage, "inverted", "legend:inverted:", (1.0, _BOTTOM), at, 12)
 
 
 def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
@@ -265,8 +267,11 @@ class LegendLayer(KeyedLayer):
         self._placed: tuple[float, ...] = ()
 
     def clear(self) -> None:
+        super().clear()
+        self.wipe()
+
+    def wipe(self) -> None:
         clear_legend(self.stage.plotter)
-        self._key = ()
         self._bar: tuple[str, float] | None = None
         self._plate: LegendPlate | None = None
 
@@ -275,8 +280,6 @@ class LegendLayer(KeyedLayer):
         self._place()
 
     def draw(self, session: Session) -> None:
-        clear_legend(self.stage.plotter)
-        self._bar = self._plate = None
         stage = self.stage
         mesh = session.mesh
         what = session.view.color_by
@@ -317,7 +320,7 @@ class LegendLayer(KeyedLayer):
         if self._plate is not None:
             self._plate.place(rect)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         mesh = session.mesh
         view = session.view
         names = mesh.marker_names if mesh is not None and view.color_by == "role" else ()
@@ -326,7 +329,7 @@ class LegendLayer(KeyedLayer):
         points = self.stage.point_words, self.stage.ring_words
         style = self.stage.scheme, self.stage.font_scale, self.stage.pixel_scale
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
-        return (id(mesh), shown, colors, content, points, style)
+        return id(mesh), shown, colors, content, points, style
 
 
 def has_inverted(session: Session) -> bool:
@@ -339,24 +342,14 @@ class PreviewLayer(KeyedLayer):
 
     names = ("preview",)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         if session.preview is None:
             return ()
         return self.stage.scheme, self.stage.pixel_scale, self.stage.font_scale
 
     def draw(self, _session: Session) -> None:
-        if not self._key:
-            return
-        word = pv.Text("Preview")
-        scale = self.stage.pixel_scale
-        word.GetPositionCoordinate().SetReferenceCoordinate(_corner(0.0, 1.0))
-        word.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        word.GetPositionCoordinate().SetValue(14 * scale, -14 * scale)
-        set_letters(word.prop, self.stage.scheme, 15 * self.stage.font_scale)
+        word = _write(self.stage, "Preview", "preview", (0.0, 1.0), (14, -14), 15)
         word.prop.SetVerticalJustificationToTop()
-        self.stage.plotter.add_actor(
-            word, name="preview", reset_camera=False, render=False, pickable=False
-        )
 
 
 SIZE = 92  # width and height in pixels of the corner with the axes, at normal letter size
@@ -370,11 +363,14 @@ class TriadLayer(KeyedLayer):
     _axes: Any = None
 
     def clear(self) -> None:
-        if self._axes is not None:
-            self.stage.plotter.hide_axes()
-        self._key = ()
+        super().clear()
+        self.wipe()
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def wipe(self) -> None:
+        if self._axes is not None and not self._key:
+            self.stage.plotter.hide_axes()
+
+    def key(self, session: Session) -> object:
         if "triad" not in session.view.drawn or session.mesh is None:
             return ()
         style = (self.stage.scheme, self.stage.pixel_scale, self.stage.has_plate)
@@ -382,10 +378,7 @@ class TriadLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         plotter = self.stage.plotter
-        if not self._key or session.mesh is None:
-            if self._axes is not None:
-                plotter.hide_axes()
-            return
+        assert session.mesh is not None
         if self._axes is None:
             self._axes = self._make()
         # Of a 2D mesh, z points at the camera: its letter would lie on the others' origin.

@@ -39,7 +39,7 @@ class PointLayer(Layer):
     def clear(self) -> None:
         self._surfaces: tuple[Surface, ...] = ()
         self._drawn: TypedNodes = NOTHING
-        self._key: tuple[object, ...] = ()
+        self._key: object = ()
         self._shape: Any = None
         self.stage.point_words = ()
 
@@ -117,15 +117,15 @@ class MarkLayer(KeyedLayer):
 
     names = (OUTLINE, FACES, DOT)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         cell = session.view.marked_cell
         frame = session.frame
         return (frame, cell, session.view.color_by) if frame and frame.has(cell) else ()
 
     def draw(self, session: Session) -> None:
         cell = session.view.marked_cell
-        if not self._key or session.frame is None or cell is None:
-            return
+        assert session.frame is not None
+        assert cell is not None
         containing, at = session.frame.place_of(cell)
         mesh = containing.mesh
         lift = 3.0 * self.stage.lift(mesh)
@@ -172,7 +172,7 @@ class InvertedLayer(KeyedLayer):
         self._cut: list[IntArray] = []
         self.stage.ring_words = ()
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         self._cut = self._cut_cells(session)
         shown = session.frame, _wanted(session), session.limit_chosen
         return *shown, self.stage.pixel_scale, *map(id, self._cut)
@@ -247,7 +247,7 @@ class RepairLayer(KeyedLayer):
 
     names = (CELLS_BEFORE, MOVED_NODES)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         """Return the repaired step and the style, if it is shown."""
         step = session.frame.step if session.frame is not None else None
         if step is None or step.repaired is None or "repaired" not in session.view.drawn:
@@ -256,8 +256,6 @@ class RepairLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         """Draw the cells and the nodes."""
-        if not self._key:
-            return
         assert session.frame is not None
         assert session.frame.step is not None
         done = session.frame.step.repaired

@@ -368,7 +368,7 @@ class CoarseLayer(Layer):
     def clear(self) -> None:
         self.on = False  # whether they are drawn
         self.drawn: dict[str, DrawnBoundary] = {}
-        self._made_of: tuple[object, ...] = ()
+        self._made_of: object = ()
         self._session = Session()
         self._edged: list[Any] = []
 

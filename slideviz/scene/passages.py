@@ -57,18 +57,22 @@ class PassageLayer(KeyedLayer):
         self._boundaries = boundaries
         self._threshold = threshold
         self._table = pv.LookupTable()
-        self._table_key: tuple[object, ...] = ()
+        self._table_key: object = ()
         self._actors: dict[str, list[Any]] = {}
         super().__init__(stage)
 
     def clear(self) -> None:
-        self._key = ()
-        self._matrices: list[FloatArray] = []
-        for copy in chain.from_iterable(self._actors.values()):
-            self.stage.plotter.renderer.RemoveActor(copy)
+        super().clear()
+        self.wipe()
         self._mappers: dict[str, Any] = {}
         self._props: dict[str, Any] = {}
+
+    def wipe(self) -> None:
+        # Not through the plotter, which goes through all its actors for each one.
+        for copy in chain.from_iterable(self._actors.values()):
+            self.stage.plotter.renderer.RemoveActor(copy)
         self._actors = {}
+        self._matrices: list[FloatArray] = []
 
     def shapes(self) -> list[Any]:
         if not self._matrices:
@@ -92,7 +96,7 @@ class PassageLayer(KeyedLayer):
         zones = dict(zip(mesh.marker_names, marker_zones(mesh), strict=True))
         return zones[pair.first] == zones.get(name)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         # The threshold's actor is made when it first has cells.
         pairs = periods_of(session) if session.view.passages else ()
         return pairs, session.view.passages, self._threshold.actor
@@ -108,11 +112,6 @@ class PassageLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         wanted = [(pair, matrices(session, pair)) for pair in periods_of(session)]
-        # Not through the plotter, which goes through all its actors for each one.
-        renderer = self.stage.plotter.renderer
-        for copy in chain.from_iterable(self._actors.values()):
-            renderer.RemoveActor(copy)
-        self._actors = {}
         self._matrices = [matrix for _, turns in wanted for matrix in turns.values()]
         if not self._matrices:
             self._mappers = {}
@@ -129,7 +128,7 @@ class PassageLayer(KeyedLayer):
                 copy.user_matrix = matrix
                 copy.SetShaderProperty(actor.GetShaderProperty())
                 copy.SetPickable(False)
-                renderer.AddActor(copy)
+                self.stage.plotter.renderer.AddActor(copy)
                 made.append(copy)
             self._actors[name] = made
 

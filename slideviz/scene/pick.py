@@ -68,6 +68,15 @@ def to_display(plotter: Any, points: FloatArray) -> FloatArray:
     return Projection.of(plotter).pixels(points)
 
 
+def distances(at: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the distances (...) of a place (d,) from straight lines (..., d)."""
+    way = end - start
+    share = ((at - start) * way).sum(-1) / np.maximum((way * way).sum(-1), 1e-30)
+    return np.asarray(
+        np.linalg.norm(start + np.clip(share, 0.0, 1.0)[..., None] * way - at, axis=-1)
+    )
+
+
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the name of a 2D mesh's boundary nearest to a pixel; None if none is in `REACH`."""
     best = REACH
@@ -75,12 +84,8 @@ def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary
     at = np.array([x, y])
     for one in drawn:
         seen = to_display(plotter, np.asarray(one.shape.points))
-        a = seen[one.surface.facets[:, 0]]
-        b = seen[one.surface.facets[:, 1]]
-        along = b - a
-        length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
-        part = np.clip(np.einsum("ij,ij->i", at - a, along) / length2, 0.0, 1.0)
-        distance = float(np.linalg.norm(a + part[:, None] * along - at, axis=1).min())
+        a, b = seen[one.surface.facets].swapaxes(0, 1)
+        distance = float(distances(at, a, b).min())
         if distance < best:
             best = distance
             name = one.surface.name

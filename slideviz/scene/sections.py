@@ -40,7 +40,7 @@ class SectionDrawn:
     """A section in the scene: the actor of its polygons, and what they were made of."""
 
     shown: PolygonActor
-    made_of: tuple[object, ...] = ()  # everything that the polygons depend on, to be compared
+    made_of: object = ()  # everything that the polygons depend on, to be compared
     frame: StepFrame | None = None
     of: Mesh | None = None
     """`frame`, `of`: the frame with the cut cells (of a mesh in its file: those read); the shown
@@ -71,8 +71,8 @@ class SectionLayer(Layer):
         itself, ``section:0:1`` that through its next passage."""
         self._instances: dict[str, Instances] = {}
         self._lines.clear()
-        self._lines_of: tuple[object, ...] = ()
-        self._box: tuple[tuple[object, ...], Box] | None = None
+        self._lines_of: object = ()
+        self._box: tuple[object, Box] | None = None
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of sections through the mesh itself, with the cell of each polygon."""
@@ -196,13 +196,10 @@ class SectionLayer(Layer):
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
         prop = shown.actor.prop
-        scheme = self.stage.scheme
-        prop.color = scheme.text if kind == RIM else plain_color(scheme)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole_cells
-        # A cut has exactly the colors of the bar; whole cells need shading.
-        prop.lighting = solid
-        prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
-        self.stage.edges(prop, "edges" in session.view.drawn, session.view.color_by == "role")
+        shown.style(self.stage, session, solid)
+        if kind == RIM:
+            prop.color = self.stage.scheme.text
         if session.mesh is not None and session.mesh.dim == 2:
             prop.line_width = 1.0 if section.whole_cells else WIDTHS.get(kind, WIDTHS[BAND])
 
@@ -244,32 +241,20 @@ class CutLines:
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
-        self._actors: dict[str, Any] = {}
-        # Kept here: a data set that only VTK holds may come back from a mapper without points.
-        self._shapes: dict[str, Any] = {}
+        self._names: list[str] = []
 
     def show(self, sections: Mapping[int, Section], box: Box, lift: float) -> None:
         """Draw the lines of sections, by their index, within a box; ``lift`` is `Stage.lift`."""
-        wanted = {f"{LINE}{index}": section for index, section in sections.items()}
-        for name in [name for name in self._actors if name not in wanted]:
+        for name in self._names:
             self.stage.remove(name)
-            del self._actors[name], self._shapes[name]
-        for name, section in wanted.items():
-            side = ABOVE if section.whole_cells else BELOW
-            self._draw(name, section.in_plane.trace(box), lift * side)
-
-    def _draw(self, name: str, parts: list[FloatArray], lift: float) -> None:
-        actor = self._actors.get(name)
-        if parts:
-            shape = self._shapes[name] = polylines(parts, lift)
-            if actor is None:
-                actor = self.stage.add(shape, name, lighting=False, pickable=False)
-                actor.prop.line_width = WIDTH
-                self._actors[name] = actor
-            actor.mapper.dataset = shape
-        if actor is not None:
-            actor.visibility = bool(parts)
-            actor.prop.color = self.stage.scheme.text
+        self._names = []
+        for index, section in sections.items():
+            parts = section.in_plane.trace(box)
+            if parts:
+                name = f"{LINE}{index}"
+                shape = polylines(parts, lift * (ABOVE if section.whole_cells else BELOW))
+                self.stage.mark(shape, name, self.stage.scheme.text, WIDTH)
+                self._names.append(name)
 
 
 def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:
@@ -305,6 +290,16 @@ class PolygonActor:
         self.shape = polygon_shape(polygons, lift)
         self.mapper.dataset = self.shape
         self.actor.visibility = len(polygons) > 0
+
+    def style(self, stage: Stage, session: Session, shaded: bool) -> None:
+        """Set the look of the polygons without values; whole cells are ``shaded``."""
+        prop = self.actor.prop
+        prop.color = plain_color(stage.scheme)
+        # A cut has exactly the colors of the bar; whole cells need shading.
+        prop.lighting = shaded
+        prop.ambient, prop.diffuse = (0.6, 0.4) if shaded else (1.0, 0.0)
+        view = session.view
+        stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
 
     def color(self, values: FloatArray | None) -> None:
         """Color the polygons by values (q,), one per polygon; None: by the actor's own color."""

@@ -11,7 +11,7 @@ from slideviz.color_scheme import LIGHT, VALUE_EDGE, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.plots.section_paint import clipped
-from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
+from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table, remove_actor
 from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import WALL_VALUES
@@ -52,23 +52,28 @@ class KeyedLayer(Layer):
     names: tuple[str, ...] = ()  # the names of its actors, removed before each drawing
 
     def clear(self) -> None:
-        self._key: tuple[object, ...] = ()
+        self._key: object = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
         key = self.key(new)
         if key == self._key:
             return
         self._key = key
+        self.wipe()
+        if key:
+            self.draw(new)
+
+    def wipe(self) -> None:
+        """Remove what was drawn."""
         for name in self.names:
             self.stage.remove(name)
-        self.draw(new)
 
-    def key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> object:
         """Return everything that the drawing depends on; empty if there is nothing to draw."""
         raise NotImplementedError
 
     def draw(self, session: Session) -> None:
-        """Draw a state of the session; nothing if its key is empty."""
+        """Draw a state of the session whose key is not empty."""
         raise NotImplementedError
 
 
@@ -143,7 +148,7 @@ class Stage:
     def remove(self, name: str) -> None:
         """Remove an actor, if the plotter has it."""
         self.shapes.pop(name, None)
-        self.plotter.remove_actor(name, reset_camera=False, render=False)
+        remove_actor(self.plotter, name)
 
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
         """Switch the edges of an actor's cells on or off.
