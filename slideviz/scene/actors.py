@@ -32,7 +32,7 @@ class DrawnBoundary:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The lines that highlight a selected boundary: their data set and actor."""
+    """What is drawn of a boundary besides its facets: data set and actor."""
 
     shape: Any
     actor: Any
