@@ -1,6 +1,11 @@
 """Windows of tests on a screen."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 from qtpy.QtGui import QGuiApplication
+
+from slideviz.session.store import Store
 
 
 def come_to_rest() -> None:
@@ -10,3 +15,9 @@ def come_to_rest() -> None:
     """
     for _ in range(3):
         QGuiApplication.sync()
+
+
+def services(flown: list) -> SimpleNamespace:
+    """Return what a panel needs of a window; ``flown`` gets the cells that the view flies to."""
+    viewing = SimpleNamespace(fly_to=flown.append, fly_back=lambda: flown.append("back"))
+    return SimpleNamespace(store=Store(), viewing=viewing, files=SimpleNamespace(folder=Path.home))

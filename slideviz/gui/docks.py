@@ -195,27 +195,23 @@ class DockRow:
 
 
 DOCKS: tuple[DockRow, ...] = (
-    DockRow("boundaries", "Boundaries", LEFT, lambda w: BoundariesPanel(w.store)),
-    DockRow(
-        "motion", "Motion", LEFT, lambda w: MotionPanel(w.store), tabbed_with_if_low="boundaries"
-    ),
-    DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion"),
-    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), untitled=True),
-    DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store)),
+    DockRow("boundaries", "Boundaries", LEFT, BoundariesPanel),
+    DockRow("motion", "Motion", LEFT, MotionPanel, tabbed_with_if_low="boundaries"),
+    DockRow("method", "Method", LEFT, MethodPanel, "motion"),
+    DockRow("run", "Run", LEFT, RunPanel, untitled=True),
+    DockRow("histogram", "Histogram", RIGHT, HistogramPanel),
     DockRow(
         "worst",
         "Worst cells",
         RIGHT,
-        lambda w: WorstPanel(w.store, w.viewing.fly_to, w.viewing.fly_back),
+        WorstPanel,
         "histogram",
     ),
-    DockRow(
-        "limits", "Limits", RIGHT, lambda w: LimitsPanel(w.store, w.viewing.fly_to), "histogram"
-    ),
-    DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram"),
-    DockRow("runs", "Runs", RIGHT, lambda w: RunsPanel(w.store)),
+    DockRow("limits", "Limits", RIGHT, LimitsPanel, "histogram"),
+    DockRow("curves", "Curves", RIGHT, CurvesPanel, "histogram"),
+    DockRow("runs", "Runs", RIGHT, RunsPanel),
     DockRow("sections", "Sections", RIGHT, SectionsPanel, "runs"),
-    DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs"),
+    DockRow("display", "Display", RIGHT, DisplayPanel, "runs"),
     DockRow("designs", "Designs", BOTTOM, DesignsPanel, shown=False),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )

@@ -22,7 +22,7 @@ else:
     from slideviz.scene.pick import to_display
     from slideviz.session import changes, jobs
     from slideviz.session.state import Session, StepFrame
-    from slideviz.session.store import Store
+    from tests.windows import services
 
 PATIENCE_MS = 100_000
 
@@ -245,7 +245,7 @@ def plot_panel(qtbot, monkeypatch):
     monkeypatch.setattr(plot_canvas, "REST_MS", 0)
 
     def show(kind):
-        made = kind(Store())
+        made = kind(services([]))
         made.resize(300, 400)
         qtbot.addWidget(made)
         with qtbot.waitExposed(made):

@@ -10,8 +10,8 @@ from slideviz.case.limits import read_limits
 from slideviz.gui.panels.limits import LimitsPanel
 from slideviz.session import changes
 from slideviz.session.jobs import check_frame
-from slideviz.session.store import Store
 from tests.session.test_walls_table import sheared_session
+from tests.windows import services
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -23,7 +23,7 @@ def flown():
 
 @pytest.fixture
 def panel(qtbot, flown):
-    made = LimitsPanel(Store(), flown.append)
+    made = LimitsPanel(services(flown))
     made.resize(320, 420)
     qtbot.addWidget(made)
     with qtbot.waitExposed(made):

@@ -3,14 +3,13 @@
 from slideviz.gui.widgets.panel import Panel
 from slideviz.session import changes
 from slideviz.session.state import Session
-from slideviz.session.store import Store
+from tests.windows import services
 
 
 class Steps(Panel):
     """A panel that shows the number of steps."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self.every: list[int] = []
         self.selected: list[int] = []
         self.follow(
@@ -23,8 +22,9 @@ class Steps(Panel):
 
 
 def test_a_panel_follows_what_it_shows(qtbot):
-    store = Store()
-    panel = Steps(store)
+    window = services([])
+    store = window.store
+    panel = Steps(window)
     qtbot.addWidget(panel)
     for steps, width in ((3, True), (3, False), (4, True)):
         store.change(changes.set_case, steps=steps)

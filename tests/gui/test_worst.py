@@ -39,8 +39,8 @@ from slideviz.session.inspect import (
 )
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
-from slideviz.session.store import Store
 from tests.builders import stage
+from tests.windows import services
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
@@ -76,7 +76,7 @@ def flown():
 def panel(qtbot, monkeypatch, flown):
     for module in (panels, plot_canvas):
         monkeypatch.setattr(module, "REST_MS", 0)
-    made = WorstPanel(Store(), flown.append, lambda: flown.append("back"))
+    made = WorstPanel(services(flown))
     made.resize(300, 420)
     qtbot.addWidget(made)
     with qtbot.waitExposed(made):

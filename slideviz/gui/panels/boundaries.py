@@ -90,8 +90,7 @@ class BoundariesTable(QTableWidget):
 class BoundariesPanel(Panel):
     """The panel of the boundaries' visibility and roles; selected rows are changed together."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self._rows: tuple[tuple[str, int], ...] = ()  # name of each row and its zone; "" of a zone
         self._choices: list[Choice | None] = []
         self.table = self._make_table()

@@ -28,7 +28,6 @@ from slideviz.session import changes
 from slideviz.session.reach import can_scale, factor_of, reach_of, reach_run
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 
 KINDS = {
     "steps": "Quality by step",
@@ -100,8 +99,7 @@ class CurveCanvas(PlotCanvas):
 class CurvesPanel(Panel):
     """The panel with one of the plots of `KINDS`."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked

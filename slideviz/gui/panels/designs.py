@@ -50,7 +50,6 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.fields import TextField
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
-from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import Mesh
 from slideviz.plots.designs import (
@@ -412,9 +411,7 @@ class DesignsPanel(Panel):
     changed = Signal()
     """The table or its results have changed."""
 
-    def __init__(self, services: Services) -> None:
-        super().__init__(services.store)
-        self.services = services
+    def make(self) -> None:
         self.table = DesignTable()
         self.case: Case | None = None
         """`case`, `mesh`: the case and the mesh that the results were computed with; the session

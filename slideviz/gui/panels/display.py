@@ -26,13 +26,11 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.fields import NumberBox, VectorField, number_text
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.services import main_window
 from slideviz.mesh.periodic import Pair
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
 from slideviz.session.passages import periods_of
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 from slideviz.terms import (
     COLOR_BY,
     COLOR_MAPS,
@@ -126,8 +124,7 @@ def map_icon(name: str) -> QIcon:
 class DisplayPanel(Panel):
     """The panel of the view's colors, threshold, points, passages and toggles."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         content = QWidget()
         in_column(PanelScroll(content), on=self)
         self.form = QFormLayout(content)
@@ -174,7 +171,7 @@ class DisplayPanel(Panel):
         for index, (name, term) in enumerate(SHOWN.items()):
             box = QCheckBox(term.label)
             box.setObjectName(f"show_{name}")
-            box.clicked.connect(lambda _=False, name=name: COMMANDS[name].do(main_window(self)))
+            box.clicked.connect(lambda _=False, name=name: COMMANDS[name].do(self.services))
             grid.addWidget(box, index // 2, index % 2)
             self.shown[name] = box
         self.form.addRow("Show", grid)
@@ -185,7 +182,7 @@ class DisplayPanel(Panel):
         return choice
 
     def _button(self, name: str, text: str, command: str) -> QPushButton:
-        button = push_button(text, "", lambda: COMMANDS[command].do(main_window(self)), name)
+        button = push_button(text, "", lambda: COMMANDS[command].do(self.services), name)
         button.setFixedWidth(button.fontMetrics().horizontalAdvance(text) + 16)
         return button
 

@@ -25,7 +25,6 @@ from slideviz.plots.session_plots import (
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 from slideviz.terms import RATED, SIZE_SKEW, WALL_VALUES
 
 END_PX = 6  # distance in pixels up to which a press moves an end of the range
@@ -123,8 +122,7 @@ class BrushCanvas(PlotCanvas):
 class HistogramPanel(Panel):
     """The panel with the histogram of the shown step, the undeformed mesh and other runs."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self._pending_range: Range | None = None
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from qtpy.QtCore import QSignalBlocker, QSize, Qt
@@ -27,13 +27,10 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.fields import TextField
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import ask_and_write, words_label
-from slideviz.gui.widgets.services import folder_of
+from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes, walls_table
 from slideviz.session.state import Session
-from slideviz.session.store import Store
-from slideviz.system.csv_table import write_csv
 
 NAME = Qt.ItemDataRole.UserRole
 """Item data role of the boundary, or the place of the limit, of a row."""
@@ -121,9 +118,7 @@ class LimitsPanel(Panel):
     ``fly_to``: moves the camera to a cell.
     """
 
-    def __init__(self, store: Store, fly_to: Callable[[int], None]) -> None:
-        super().__init__(store)
-        self._fly_to = fly_to
+    def make(self) -> None:
         self.field = TextField()
         self.field.setObjectName("limits_text")
         self.field.setPlaceholderText(EXAMPLE)
@@ -249,18 +244,12 @@ class LimitsPanel(Panel):
         if chosen is not None and len(chosen.cells):
             cell = int(chosen.cells[0])
             self.change(changes.mark_cell, cell)
-            self._fly_to(cell)
+            self.services.viewing.fly_to(cell)
 
     def _wall_chosen(self) -> None:
         names = {item.data(0, NAME) for item in self.walls.selectedItems()}
         self.change(changes.select, tuple(names))
 
     def _export(self) -> None:
-        session = self.session
-        ask_and_write(
-            self,
-            "Export the table of walls",
-            folder_of(self) / "walls.csv",
-            "Comma-separated values (*.csv)",
-            lambda path: write_csv(path, walls_table.table_rows(session)),
-        )
+        rows = walls_table.table_rows(self.session)
+        self.export_csv("Export the table of walls", "walls.csv", rows)

@@ -53,7 +53,6 @@ from slideviz.session.motions import (
 from slideviz.session.opening import suggested_reduction
 from slideviz.session.run_messages import Requirement, tolerance_warning, with_field_labels
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
 
 
@@ -224,8 +223,7 @@ class MethodPanel(Panel):
     Each field is also an attribute, by the name of its setting in the case: ``panel.sliding``.
     """
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self._extent = 0.0
         self._reduction: Reduction | None = None
         self.area = PanelScroll(QWidget())
@@ -262,7 +260,7 @@ class MethodPanel(Panel):
             # In the next turn of the event loop the form is laid out.
             lambda on: on and QTimer.singleShot(0, self, self._show_more)
         )
-        self.watch = FieldWatch(self, store, "method")
+        self.watch = FieldWatch(self, self.store, "method")
         self.follow(lambda session: session.mesh, self._set_mesh)
         self.follow()
 

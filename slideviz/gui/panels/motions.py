@@ -44,7 +44,6 @@ from slideviz.gui.widgets.build import (
     wrapped,
 )
 from slideviz.gui.widgets.panel import FieldWatch, Panel
-from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
@@ -63,7 +62,6 @@ from slideviz.session.motions import (
 from slideviz.session.reach import TYPED_TIP, typed_words
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 
 FILTERS = "Displacements (*.txt)"
 ABOUT = (
@@ -160,8 +158,7 @@ HEIGHT = 300  # preferred height of the panel, in pixels
 class MotionPanel(Panel):
     """The panel of the case's motions: their list, and the editor of the selected one."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self._mesh: Mesh | None = None
         self._extent = 0.0
         buttons = self._make_buttons()
@@ -174,7 +171,7 @@ class MotionPanel(Panel):
         self.list.currentRowChanged.connect(self._row_changed)
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
-        self.editor = MotionEditor(SpanWalls(store))
+        self.editor = MotionEditor(SpanWalls(self.services))
         self.editor.centroid_of = self._centroid
         self.editor.chord_of = self._chord
         self.editor.changed.connect(self._edited)
@@ -190,7 +187,7 @@ class MotionPanel(Panel):
         layout.setStretchFactor(self.list, 4)
         self.follow(lambda session: session.mesh, self._set_mesh)
         self.follow()
-        self.watch = FieldWatch(self, store, "motion")
+        self.watch = FieldWatch(self, self.store, "motion")
 
     def _make_buttons(self) -> QHBoxLayout:
         menu = QMenu()
@@ -348,7 +345,7 @@ class MotionPanel(Panel):
         try:
             QApplication.clipboard().setText(write_motions((motion,)))
         except SlidevizError as error:
-            main_window(self).banner.show_error(error)
+            self.services.banner.show_error(error)
 
     def _paste(self) -> None:
         """Add the motions in the clipboard, as written in a case file, below the selected one."""
@@ -358,7 +355,7 @@ class MotionPanel(Panel):
             motions = read_motions(QApplication.clipboard().text().replace("\\\n", " "))
         except SlidevizError as error:
             said = SlidevizError(f"The clipboard has no motion: {error}")
-            main_window(self).banner.show_error(said)
+            self.services.banner.show_error(said)
             return
         for motion in motions:
             fits = set(named(motion.marker)) <= set(moving)
@@ -389,14 +386,14 @@ class MotionPanel(Panel):
         mesh = session.mesh
         assert mesh is not None
         beside = case.source or session.path
-        folder = beside.parent if beside is not None else folder_of(self)
+        folder = beside.parent if beside is not None else self.services.files.folder()
         names = named(marker)
         default = folder / f"displacement_{names[0] if len(names) == 1 else 'moving'}.txt"
         try:
             rows = TableRows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
         except SlidevizError as error:
-            main_window(self).banner.show_error(error)
+            self.services.banner.show_error(error)
             return None
 
     def _edited(self, motion: object) -> None:

@@ -20,7 +20,6 @@ from slideviz.gui.widgets.build import (
     wrapped,
 )
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.theme import icon
 from slideviz.mesh.margin import reach_words
 from slideviz.session import changes
@@ -39,7 +38,6 @@ from slideviz.session.run_messages import (
     with_field_labels,
 )
 from slideviz.session.state import Preview, Run, Session
-from slideviz.session.store import Store
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
 SETTINGS = "settings"
@@ -54,8 +52,7 @@ class RunPanel(Panel):
 
     requirement_clicked = Signal(object)  # a missing `Requirement`, to be led to where it is met
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self._busy = self._progress_text = ""
         self._compiling = False
         self._missing: tuple[Requirement, ...] = ()
@@ -87,7 +84,7 @@ class RunPanel(Panel):
     def _button(self, command: Command, color: str) -> QPushButton:
         words = command.title.replace("&", "")
         button = push_button(
-            words, command.button_tip, lambda: command.do(main_window(self)), command.name
+            words, command.button_tip, lambda: command.do(self.services), command.name
         )
         button.setIcon(icon(command.image, color))
         button.setShortcut(command.button_key)
@@ -184,7 +181,7 @@ class RunPanel(Panel):
             run = self.session.run_shown
             if run is not None:
                 text = "\n".join(f"Note: {note}" for note in remarks_of(run, "note"))
-                main_window(self).banner.show_message(text)
+                self.services.banner.show_message(text)
         elif target == REACH:
             self.requirement_clicked.emit(Requirement("", "curves"))
         elif target == SETTINGS:

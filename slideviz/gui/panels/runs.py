@@ -35,7 +35,6 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
-from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.theme import icon
 from slideviz.session import changes
 from slideviz.session.runs_words import (
@@ -47,7 +46,6 @@ from slideviz.session.runs_words import (
     table_rows,
 )
 from slideviz.session.state import Run, Session
-from slideviz.session.store import Store
 from slideviz.system.csv_table import csv_text, write_csv
 
 RUN, MIN, MEAN, INVERTED = range(4)  # the columns of the list
@@ -258,12 +256,11 @@ EMPTY = "Nothing was computed yet. Each run will be listed here with its setting
 class RunsPanel(Panel):
     """The panel with the list of the runs: a click shows a run, Ctrl+click shows it beside."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
         menu = QMenu()
-        menu.aboutToShow.connect(lambda: fill_compare(menu, store))
+        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
         tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
         self.buttons = {"compare": tool_button(tip, image="beside", text="Compare", menu=menu)}
         for command in filter(None, RUN_COMMANDS):
@@ -443,19 +440,19 @@ class RunsPanel(Panel):
 
     def save_mesh(self, number: int | None = None) -> None:
         self.change(changes.show_run, number or self.tree.number)
-        main_window(self).files.save_mesh()
+        self.services.files.save_mesh()
 
     def remove(self, number: int | None = None) -> None:
         number = number or self.tree.number
         if number is None:
             return
         self.change(changes.remove_run, number)
-        main_window(self).show_status(f"Run {number} removed (Ctrl+Z brings it back)")
+        self.services.show_status(f"Run {number} removed (Ctrl+Z brings it back)")
 
     def copy_table(self, _number: int | None = None) -> None:
         """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
         QApplication.clipboard().setText(csv_text(table_rows(self.session.runs), "\t"))
-        main_window(self).show_status("Copied the table of runs")
+        self.services.show_status("Copied the table of runs")
 
     def export_table(self, _number: int | None = None) -> None:
         """Ask for a file name and write the table of all runs as CSV."""

@@ -40,7 +40,6 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.gui.widgets.theme import set_icon
 from slideviz.mesh.model import FloatArray, Mesh
@@ -290,10 +289,8 @@ SIZES = {
 class SectionsPanel(Panel):
     """The panel of the sections: their list, and the editor of the selected one."""
 
-    def __init__(self, services: Services) -> None:
-        super().__init__(services.store)
+    def make(self) -> None:
         self.setObjectName("sections")
-        self.services = services
         self._size = 8.5, 12.0  # cm
         self._make_list()
         self._make_tools()
@@ -323,7 +320,7 @@ class SectionsPanel(Panel):
         self.editor = SectionEditor()
         self.editor.changed.connect(self._replace)
         self.editor.dragging.connect(self.store.set_dragging)
-        self.walls = SpanWalls(self.store)
+        self.walls = SpanWalls(self.services)
 
     def _make_tools(self) -> None:
         self.handle = check_box("Handle", "")

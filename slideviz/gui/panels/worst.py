@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import NamedTuple
 
@@ -23,8 +23,7 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import ModelIndex, in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import ask_and_write, words_label
-from slideviz.gui.widgets.services import folder_of, main_window
+from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
@@ -42,8 +41,6 @@ from slideviz.session.inspect import (
 from slideviz.session.motions import machine_pair
 from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Session
-from slideviz.session.store import Store
-from slideviz.system.csv_table import write_csv
 from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
@@ -347,11 +344,7 @@ class WorstPanel(Panel):
     ``fly_to`` and ``fly_back``: move the camera to a cell; move it back to where it was.
     """
 
-    def __init__(
-        self, store: Store, fly_to: Callable[[int], None], fly_back: Callable[[], None]
-    ) -> None:
-        super().__init__(store)
-        self._fly_to = fly_to
+    def make(self) -> None:
         self._marked: int | None = None
         self._info_key: tuple[object, ...] = ()
         self.model = WorstModel()
@@ -374,7 +367,7 @@ class WorstPanel(Panel):
             "Whole mesh",
             "Return to the view before the flight to a cell.",
             # The mark stays: that is how the cell is found in the whole mesh.
-            fly_back,
+            self.services.viewing.fly_back,
         )
         self.export = push_button(
             "Export CSV…",
@@ -382,7 +375,7 @@ class WorstPanel(Panel):
             self._export,
         )
         mend = COMMANDS["repair"]
-        self.repair = push_button("Repair", mend.tip, lambda: mend.do(main_window(self)), "repair")
+        self.repair = push_button("Repair", mend.tip, lambda: mend.do(self.services), "repair")
         parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
         for keys, function in (
@@ -450,7 +443,7 @@ class WorstPanel(Panel):
     def _fly_to_row(self, row: int) -> None:
         cell = self.model.cell(row)
         self.change(changes.mark_cell, cell)
-        self._fly_to(cell)
+        self.services.viewing.fly_to(cell)
 
     def show_worst(self) -> None:
         self.change(changes.show_frame, len(self.session.frames) - 1)
@@ -483,13 +476,7 @@ class WorstPanel(Panel):
         worst = self.model.worst
         if worst is None:
             return
-        ask_and_write(
-            self,
-            "Export worst cells",
-            folder_of(self) / "worst_cells.csv",
-            "Comma-separated values (*.csv)",
-            lambda path: write_csv(path, table_rows(worst)),
-        )
+        self.export_csv("Export worst cells", "worst_cells.csv", table_rows(worst))
 
 
 def _listed(session: Session) -> tuple[object, ...]:

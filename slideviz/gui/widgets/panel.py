@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtGui import QPaintEvent
@@ -13,11 +13,13 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.fields import CheckedField, NumberBox
-from slideviz.gui.widgets.plot_canvas import PlotCanvas, is_seen
+from slideviz.gui.widgets.plot_canvas import PlotCanvas, ask_and_write, is_seen
+from slideviz.gui.widgets.services import Services
 from slideviz.session import changes
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import PanelPlace, Session
 from slideviz.session.store import Store
+from slideviz.system.csv_table import write_csv
 
 
 class FieldWatch(QObject):
@@ -79,14 +81,20 @@ def _title(field: QWidget, panel: QWidget) -> str:
 class Panel(QWidget):
     """The base of the widgets in the docks, which show the session and change it.
 
-    A subclass makes its widgets, then calls `follow`; only functions given to it fill them.
+    Only functions given to `follow` fill its widgets.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, services: Services) -> None:
         super().__init__()
-        self.store = store
-        self.change = store.change
+        self.services = services
+        self.store = services.store
+        self.change = self.store.change
         self._unseen: list[QTimer] = []
+        self.make()
+
+    def make(self) -> None:
+        """Make the widgets, then call `follow`."""
+        raise NotImplementedError
 
     @property
     def session(self) -> Session:
@@ -150,6 +158,12 @@ class Panel(QWidget):
         # A scroll area takes this as the least height: lists in the panel shrink before it scrolls.
         layout = self.layout()
         return -1 if layout is None else layout.totalMinimumHeightForWidth(width)
+
+    def export_csv(self, title: str, name: str, rows: Iterable[Sequence[object]]) -> None:
+        """Ask for a CSV file, and write rows to it."""
+        default = self.services.files.folder() / name
+        filters = "Comma-separated values (*.csv)"
+        ask_and_write(self, title, default, filters, lambda path: write_csv(path, rows))
 
     def take_theme(self, scheme: ColorScheme) -> None:
         """Draw plots again in another theme's colors; subclasses: all else without a palette."""

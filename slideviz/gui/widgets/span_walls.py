@@ -14,7 +14,6 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.zones import names_from
 from slideviz.session import changes
 from slideviz.session.state import Session
-from slideviz.session.store import Store
 
 WALLS = {"Hub": "0, the hub or root", "Shroud": "1, the shroud or tip"}
 """Each with the span there, in words."""
@@ -23,8 +22,7 @@ WALLS = {"Hub": "0, the hub or root", "Shroud": "1, the shroud or tip"}
 class SpanWalls(Panel):
     """Drop-down lists for hub and shroud (SPAN), set once both are chosen, and for SPAN_AXIS."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
+    def make(self) -> None:
         self.ends = tuple(
             Choice(
                 {},
