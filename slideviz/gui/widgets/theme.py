@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,48 +17,16 @@ from slideviz.color_scheme import DARK, LIGHT, ColorScheme
 from slideviz.terms import ROLES, Role
 
 THEMES = ("system", "light", "dark")  # the themes that can be chosen
-_PALETTE = {
-    "Window": ("#f4f6f8", "#262b31"),
-    "WindowText": ("#20262e", "#e6eaf0"),
-    "Base": ("#ffffff", "#1d2126"),
-    "AlternateBase": ("#f2f5f8", "#23282e"),
-    "Text": ("#20262e", "#e6eaf0"),
-    "Button": ("#eef1f4", "#333a42"),
-    "ButtonText": ("#20262e", "#e6eaf0"),
-    "Highlight": ("#2f6fb5", "#3d7fc4"),
-    "HighlightedText": ("#ffffff", "#ffffff"),
-    "ToolTipBase": ("#ffffff", "#3a424b"),
-    "ToolTipText": ("#20262e", "#f2f5f8"),
-    "PlaceholderText": ("#7b8591", "#8a95a2"),
-    "Link": ("#1f5f9f", "#77b0ea"),
-    "Mid": ("#c3cad2", "#47505a"),
-    "disabled": ("#7f8994", "#7d8894"),
-    "Light": ("", "#4d5763"),
-}
-"""Colors of Qt's palette, by role, in the light and the dark theme; empty: Qt's own.
+_COLORS: dict[str, list[str]] = json.loads(
+    Path(__file__).with_name("theme.json").read_text(encoding="utf-8")
+)
+"""Colors in the light and the dark theme: of Qt's palette, by role, in capitals (empty: Qt's own),
+and the others of the style sheet ``theme.qss``.
 
-``disabled`` is the text color of all disabled widgets."""
-
-_STYLE = {
-    "title": ("#e4e9ee", "#30363e"),
-    "hover": ("#e0e6ec", "#3a424b"),
-    "checked": ("#d3e2f2", "#34516f"),
-    "line": ("#ccd3da", "#3e464f"),
-    "soft": ("#5d6874", "#a3adb8"),
-    "bad": ("#b3261e", "#ff9186"),
-    "accent": ("#2f6fb5", "#3d7fc4"),
-    "accent_hover": ("#265c98", "#4c8fd6"),
-    "mid": ("#d9dfe5", "#3a424b"),
-    "banner": ("#fdeceb", "#45282a"),
-    "note": ("#eaf2fb", "#24364a"),
-    "noted": ("#8fb3dc", "#4f76a3"),
-    "frame": ("#87919c", "#818c98"),
-}
-"""The other colors of the style sheet ``theme.qss``, in the light and the dark theme.
-
-``bad`` is for invalid fields, warning labels and the alarm banner's border; ``banner`` is that
-banner's background; ``note`` and ``noted`` are background and border of the calm banner; ``soft``
-is for hints; ``frame`` for outlines of fields, menus and tooltips."""
+``disabled`` is the text color of all disabled widgets; ``bad`` is for invalid fields, warning
+labels and the alarm banner's border; ``banner`` is that banner's background; ``note`` and ``noted``
+are background and border of the calm banner; ``soft`` is for hints; ``frame`` for outlines of
+fields, menus and tooltips."""
 
 FRAMED = (
     "QCheckBox",
@@ -93,7 +62,7 @@ def apply(theme: str) -> ColorScheme:
     name = resolved(theme)
     dark = name == "dark"
     scheme = DARK if dark else LIGHT
-    colors = {role: pair[dark] for role, pair in (_PALETTE | _STYLE).items()}
+    colors = {role: pair[dark] for role, pair in _COLORS.items()}
     here = Path(__file__)
     template = Template(here.with_name("theme.qss").read_text(encoding="utf-8"))
     signs = here.with_name("dock_signs").as_posix()
@@ -102,9 +71,9 @@ def apply(theme: str) -> ColorScheme:
     if app.styleSheet() == sheet:  # to polish all widgets anew takes 0.2 s
         return scheme
     palette = QPalette()
-    for role in _PALETTE:
-        if role != "disabled" and colors[role]:
-            palette.setColor(getattr(QPalette.ColorRole, role), QColor(colors[role]))
+    for role, color in colors.items():
+        if role[0].isupper() and color:
+            palette.setColor(getattr(QPalette.ColorRole, role), QColor(color))
     for role in ("WindowText", "Text", "ButtonText"):
         group = QPalette.ColorGroup.Disabled
         palette.setColor(group, getattr(QPalette.ColorRole, role), QColor(colors["disabled"]))
@@ -133,7 +102,7 @@ def icon_color() -> str:
 
 def alarm() -> str:
     """Return the color of texts about inverted cells in the present theme."""
-    return _STYLE["bad"][is_dark()]
+    return _COLORS["bad"][is_dark()]
 
 
 FOLDER = files("slideviz.gui") / "icons"  # SVG files; ``currentColor`` in them is replaced
