@@ -35,14 +35,17 @@ READING = "Reading the cells of the section"  # begin of the progress messages o
 class BackgroundJob(QObject):
     """The base of a job that follows the session: `_start` begins it, soon after a change."""
 
-    def __init__(self, store: Store, parent: QObject | None = None, wait_ms: int = 0) -> None:
+    wait_ms = 0
+
+    def __init__(self, store: Store, parent: QObject) -> None:
         super().__init__(parent)
         self.store = store
         self._runner = JobRunner(self)
-        self._timer = single_shot(self, self._begin, wait_ms)
+        self._timer = single_shot(self, self._begin, self.wait_ms)
         self._runner.finished.connect(self._finished)
         self._runner.cancelled.connect(self._schedule)
         self._runner.failed.connect(self._failed)
+        store.listen(self._changed)
 
     @property
     def busy(self) -> bool:
@@ -51,6 +54,10 @@ class BackgroundJob(QObject):
     def close(self) -> None:
         self._timer.stop()
         self._runner.close()
+
+    def _changed(self, _old: Session, _new: Session) -> None:
+        """Follow a change of the session."""
+        self._schedule()
 
     def _schedule(self) -> None:
         """Start the timer, if there is something to do."""
@@ -77,11 +84,9 @@ class BackgroundJob(QObject):
 class IntersectionCheck(BackgroundJob):
     """Keeps ``Session.intersection`` up to date by a background job."""
 
-    def __init__(self, store: Store, parent: QObject | None = None) -> None:
-        super().__init__(store, parent, INTERSECTION_MS)
-        self._running_key: tuple[object, ...] = ()
-        self._checked_key: tuple[object, ...] = ()
-        store.listen(self._changed)
+    wait_ms = INTERSECTION_MS
+    _running_key: tuple[object, ...] = ()
+    _checked_key: tuple[object, ...] = ()
 
     def _changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh or old.case is not new.case:
@@ -112,9 +117,7 @@ class IntersectionCheck(BackgroundJob):
 class LimitCheck(BackgroundJob):
     """Keeps ``Session.checked`` up to date: the limits of the case on the frame that is shown."""
 
-    def __init__(self, store: Store, parent: QObject | None = None) -> None:
-        super().__init__(store, parent, INTERSECTION_MS)
-        store.listen(lambda _old, _new: self._schedule())
+    wait_ms = INTERSECTION_MS
 
     def _schedule(self) -> None:
         session = self.store.session
@@ -141,7 +144,7 @@ class LivePreview(BackgroundJob):
     Live fields are made when the case has come to rest, and dropped where memory is short.
     """
 
-    def __init__(self, store: Store, running: Running, parent: QObject | None = None) -> None:
+    def __init__(self, store: Store, running: Running, parent: QObject) -> None:
         super().__init__(store, parent)
         self.is_on = False
         self.fields: LiveFields | None = None
@@ -151,7 +154,6 @@ class LivePreview(BackgroundJob):
         self._at_rest = single_shot(self, self._make_fields, FIELDS_MS)
         self._hand = single_shot(self, self._run, HAND_MS)
         running.began.connect(self._spare_memory)
-        store.listen(self._changed)
 
     def switch(self, on: bool) -> None:
         """Begin or end to follow the hand."""
@@ -249,12 +251,15 @@ class SectionReader(BackgroundJob):
     progressed = Signal(str)
     """A message for the status bar."""
 
-    def __init__(self, store: Store, parent: QObject | None = None) -> None:
+    def __init__(self, store: Store, parent: QObject) -> None:
         super().__init__(store, parent)
         self._runner.progressed.connect(lambda doing: self.progressed.emit(doing.text))
         self._running: tuple[Mesh, Section] | None = None
         self._unreadable: set[tuple[Mesh, Section]] = set()
-        store.listen(lambda _old, new: self._timer.start() if new.lacks_cells else None)
+
+    def _changed(self, _old: Session, new: Session) -> None:
+        if new.lacks_cells:
+            self._timer.start()
 
     def _awaited(self) -> list[tuple[StepFrame, Section]]:
         """Return the sections whose cells are still to be read, each with the frame it cuts."""

@@ -55,7 +55,7 @@ class Running(QObject):
     limits_wanted = Signal()
     """The user wants to see the limits."""
 
-    def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
+    def __init__(self, store: Store, banner: Banner, parent: QObject) -> None:
         super().__init__(parent)
         self.store = store
         self.banner = banner

@@ -63,7 +63,7 @@ class WarmupThread(QObject):
     """True when the first compilation begins, False when all are done; not emitted if everything
     was compiled before."""
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self._stop = Event()
         self._compiles = False
