@@ -143,8 +143,8 @@ class Autosave(QObject):
         self._camera = camera
         self._designs = designs
         self._lock: QLockFile | None = None
-        self._written_key: tuple[object, ...] = ()
-        self._pending_key: tuple[object, ...] = ()
+        self._written_key: object = ()
+        self._pending_key: object = ()
         self._replaces: list[OrphanedSession] = []
         self._runner = JobRunner(self)
         self._runner.finished.connect(self._done)
@@ -189,7 +189,7 @@ class Autosave(QObject):
         ):
             self._timer.start()
 
-    def _key(self, session: Session) -> tuple[object, ...]:
+    def _key(self, session: Session) -> object:
         return session.mesh, session.case, session.view.style, self._designs()
 
     def _write(

@@ -23,6 +23,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
+    ALIGN_LEFT,
     ElidedLabel,
     QuietBar,
     WrappingRow,
@@ -227,7 +228,7 @@ class RecentButton(QPushButton):
         time = QLabel(when or "missing")
         folder = str(path.parent).replace(str(Path.home()), "~", 1)
         self.folder = ElidedLabel(folder, Qt.TextElideMode.ElideMiddle)
-        self.folder.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self.folder.setAlignment(ALIGN_LEFT)
         for label in (name, self.folder, time):
             label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
             label.setProperty("hint", label is not name)

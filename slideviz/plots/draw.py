@@ -125,8 +125,7 @@ def convergence(axes: Axes, runs: Sequence[GreedyRun], style: Style = PRINT) -> 
                 textcoords="offset points",
                 ha="left",
                 va="top",
-                fontsize=style.size,
-                color=style.scheme.text,
+                **style.letters,
             )
     axes.set_xlim(left=0)
     if tolerances:  # room for the words below the lowest line

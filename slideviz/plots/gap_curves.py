@@ -49,7 +49,7 @@ def draw_gaps(figure: Figure, measured: Sequence[Measured], style: Style = PRINT
                 *[[at] for at in (place if by_span else place[::-1])], "o", ms=4, color=look.color
             )
         if not any(gap.distance for _, _, gap in shown):
-            axes.set_title(TOUCHING, y=0.9, fontsize=style.size, color=style.scheme.text)
+            axes.set_title(TOUCHING, y=0.9, **style.letters)
         axes.locator_params(axis="x", nbins=4)
         above = {"loc": "lower center", "bbox_to_anchor": (0.45, 1.0), "ncols": 2}
         add_legend(axes, style, **above, handlelength=2.2, columnspacing=1.0)

@@ -135,12 +135,12 @@ def draw_meridional(
                 name, at, xytext=tuple(4.0 * outwards), textcoords="offset points",
                 ha=("right", "center", "left")[1 + int(np.sign(outwards[0].round(1)))],
                 va=("top", "center", "bottom")[1 + int(np.sign(outwards[1].round(1)))],
-                fontsize=style.size, color=style.scheme.text,
+                **style.letters,
             )  # fmt: skip
     axes.locator_params(axis="x", nbins=4)
     axes.set_aspect("equal", adjustable="datalim")
     bar = figure.colorbar(mesh, ax=axes)
     label = f"mean {QUANTITIES[paint.label].axis}"
-    bar.set_label(label, fontsize=style.size, color=style.scheme.text)
+    bar.set_label(label, **style.letters)
     bar.ax.tick_params(colors=style.scheme.text, labelsize=style.size)
     bar.outline.set_edgecolor(style.scheme.edge)

@@ -73,6 +73,11 @@ class Style:
         )
 
     @property
+    def letters(self) -> dict[str, Any]:
+        """Return size and color of letters, as arguments of matplotlib."""
+        return {"fontsize": self.size, "color": self.scheme.text}
+
+    @property
     def alarm(self) -> str:
         """Return the color of inverted cells."""
         return "#ff5d6c" if self.dark else INVERTED_COLOR

@@ -261,7 +261,7 @@ def test_a_wing_is_twisted_between_its_root_and_tip(driver, tmp_path):
 @pytest.fixture
 def dialog(blade, qtbot):
     session = blade.session
-    made = TableDialog(blade.window, TableRows.on(session.mesh, session.case, "airfoil"))
+    made = TableDialog(blade.window, TableRows.on(session.mesh, session.case, "airfoil"), "")
     qtbot.addWidget(made)
     return made
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from qtpy.QtCore import QItemSelectionModel, QPoint, QSignalBlocker, Qt, Signal
-from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent, QResizeEvent
+from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -16,7 +16,17 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.widgets.build import Choice, hint_label, in_column, in_row, push_button, wrapped
+from slideviz.gui.widgets.build import (
+    ALIGN_LEFT,
+    ALIGN_RIGHT,
+    Choice,
+    Fitted,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+    wrapped,
+)
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.theme import role_icon
 from slideviz.mesh.zones import marker_zones
@@ -34,7 +44,7 @@ ROLE_WIDTH = 136  # of the roles, in pixels
 LEAST_ROLE_WIDTH = 112  # in a narrow table
 
 
-class BoundariesTable(QTableWidget):
+class BoundariesTable(Fitted, QTableWidget):
     """The table of the boundaries; the tab key leaves it instead of going through the cells."""
 
     menu_wanted = Signal(int, QPoint)
@@ -51,11 +61,7 @@ class BoundariesTable(QTableWidget):
         rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
         return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self.distribute_width()
-
-    def distribute_width(self) -> None:
+    def fit(self) -> None:
         """Show names whole: they take the width of the numbers where there is no more room."""
         room = self.viewport().width()
         names = self.sizeHintForColumn(NAME)
@@ -123,7 +129,7 @@ class BoundariesPanel(Panel):
         header.setSectionResizeMode(ROLE, QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
         name = table.horizontalHeaderItem(NAME)
-        name.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        name.setTextAlignment(ALIGN_LEFT)
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -184,7 +190,7 @@ class BoundariesPanel(Panel):
                 self._choices.append(None)
                 continue
             count = QTableWidgetItem()
-            count.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            count.setTextAlignment(ALIGN_RIGHT)
             self.table.setItem(row, COUNT, count)
             choice = Choice(labels(ROLES))
             choice.setFrame(False)
@@ -199,7 +205,7 @@ class BoundariesPanel(Panel):
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)
         self._count(session)
-        self.table.distribute_width()
+        self.table.fit()
 
     def _count(self, session: Session) -> None:
         for row, (name, _) in enumerate(self._rows):

@@ -16,7 +16,7 @@ from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import Choice, as_widget, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
@@ -126,7 +126,7 @@ class CurvesPanel(Panel):
             choice.chosen.connect(lambda _: self._other_plot())
         self.span_row = as_widget(in_row(*both, wide=both))
         parts = (head, self.area, self.span_row)
-        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
+        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=4)
         self.follow(lambda session: session.mesh, self._offer_coordinates)
         self.follow(_shown)
 
@@ -220,8 +220,7 @@ class CurvesPanel(Panel):
             self.change(changes.scale_motions, part=round(value) / 100)
 
     def _save(self) -> None:
-        name = self.kind.currentText().lower().replace(" ", "_")
-        ask_and_write_plot(self, "Save plot", name, self.drawing())
+        self.canvas.save(self.kind.currentText().lower().replace(" ", "_"))
 
 
 def _shown(session: Session) -> object:
@@ -271,7 +270,7 @@ def draw_reach(session: Session, whole: bool, figure: Figure, style: Style) -> N
     end = 100 * found.safe.fraction
     axes.set_xlim(0.0, 100 * found.fractions[-1])
     axes.set_ylim((0.0, 1.0) if whole else (0.0, 1.1 * max(found.lowest.max(), 0.1)))
-    axes.set_title(run.label, fontsize=style.size, color=style.scheme.text)
+    axes.set_title(run.label, **style.letters)
     if end <= 100 * found.fractions[-1]:
         axes.axvline(end, color=INVERTED_COLOR, linewidth=2.0, gid="proved")
         words = f"proved up to {floor(10 * end) / 10:g} %"
@@ -296,7 +295,7 @@ def say(text: str, figure: Figure, style: Style) -> None:
     figure.add_subplot().set_axis_off()
     figure.text(
         0.5, 0.5, text, ha="center", va="center", wrap=True,
-        fontsize=style.size, color=style.scheme.text,
+        **style.letters,
     )  # fmt: skip
 
 
@@ -318,7 +317,7 @@ def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
     run = curves.greedy_run(session)
     assert run is not None
     convergence(axes, [run], style=style)
-    axes.set_title(run.label, fontsize=style.size, color=style.scheme.text)
+    axes.set_title(run.label, **style.letters)
 
 
 def draw_span(

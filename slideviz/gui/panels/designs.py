@@ -36,6 +36,7 @@ from slideviz.gui.responsiveness.timers import ROWS_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
+    ALIGN_RIGHT,
     Choice,
     QuietBar,
     Slot,
@@ -49,7 +50,7 @@ from slideviz.gui.widgets.build import (
 )
 from slideviz.gui.widgets.fields import TextField
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import Mesh
 from slideviz.plots.designs import (
@@ -144,7 +145,7 @@ class DesignsModel(QAbstractTableModel):
         column = index.column() - len(self.table.columns)
         row = self.table.results.get(at + 1)
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            return ALIGN_RIGHT
         if role == Qt.ItemDataRole.ToolTipRole and row is not None:
             missed = f"Not met: {row.limits}" if row.limits.removesuffix(MET) else ""
             return wrapped("\n".join(filter(None, [row.problem, missed, *row.warnings]))) or None
@@ -286,7 +287,10 @@ class DesignPlot(QWidget):
         words = {name: text.partition(" [")[0].capitalize() for name, text in RESULTS.items()}
         self.what = Choice(words, "The result that the plot shows.", "what")
         self.save = push_button(
-            "Save plot…", "Save the plot as PNG, SVG or PDF.", self._save, "save_design_plot"
+            "Save plot…",
+            "Save the plot as PNG, SVG or PDF.",
+            lambda: self.canvas.save("designs"),
+            "save_design_plot",
         )
         self.canvas = DesignCanvas(self.drawing)
         self.canvas.picked = self._picked
@@ -330,9 +334,6 @@ class DesignPlot(QWidget):
         nearest = nearest_design(self.canvas.figure.axes[0], curves, x, y, failed)
         if nearest is not None:
             self.picked(nearest)
-
-    def _save(self) -> None:
-        ask_and_write_plot(self, "Save plot", "designs", self.drawing())
 
 
 def _draw(
@@ -397,7 +398,7 @@ class DesignsJob(QObject):
         self._ended(text, wrong)
 
 
-def _end_shown(session: Session) -> tuple[object, ...]:
+def _end_shown(session: Session) -> object:
     run = session.run_shown
     return () if run is None else (run.number, run.end)
 

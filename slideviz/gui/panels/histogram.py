@@ -14,7 +14,7 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.gui.responsiveness.timers import SELECTING_MS, single_shot
 from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_plots import (
     draw_histogram,
@@ -134,7 +134,7 @@ class HistogramPanel(Panel):
         self.range_text = QLabel()
         self.range_text.setWordWrap(True)
         parts = (self.area, self.numbers, self.range_text, self._make_buttons())
-        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
+        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=4)
         self._timer = single_shot(self, self._apply_range, SELECTING_MS)
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
@@ -157,7 +157,8 @@ class HistogramPanel(Panel):
             self.clear_range,
             "show_all_cells",
         )
-        self.save = push_button("Save…", "Save the histogram as PNG, SVG or PDF.", self._save)
+        tip = "Save the histogram as PNG, SVG or PDF."
+        self.save = push_button("Save…", tip, lambda: self.canvas.save("histogram"))
         return WrappingRow((self.log, self.whole), (self.show_all, self.save))
 
     # State to widgets ------------------------------------------------------------------
@@ -251,9 +252,6 @@ class HistogramPanel(Panel):
         if self.session.view.threshold is not None:
             self.change(changes.set_view, threshold=None)
         self.canvas.show_band(None)
-
-    def _save(self) -> None:
-        ask_and_write_plot(self, "Save plot", "histogram", self.drawing())
 
 
 def _shown(session: Session) -> object:

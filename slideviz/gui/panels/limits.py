@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from qtpy.QtCore import QSignalBlocker, QSize, Qt
-from qtpy.QtGui import QBrush, QColor, QResizeEvent
+from qtpy.QtGui import QBrush, QColor
 from qtpy.QtWidgets import (
     QHeaderView,
     QLabel,
@@ -18,6 +18,8 @@ from qtpy.QtWidgets import (
 from slideviz.case.limits import LimitResult, read_limits, write_limits
 from slideviz.errors import CaseError
 from slideviz.gui.widgets.build import (
+    ALIGN_RIGHT,
+    Fitted,
     hint_label,
     in_column,
     in_row,
@@ -45,21 +47,16 @@ LIMIT_TIPS = (
     "How many cells fail.",
 )
 """What each column of the list of limits has."""
-RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 ROW_HEIGHT = 20  # height of a row in pixels
 NAME_MARGINS = 8  # space beside a name in pixels
 WALLS = "Walls: worst number of each boundary, at the step that is shown."
 NO_WALLS = "No boundary is a wall: all are periodic or internal."
 
 
-class NamesTree(QTreeWidget):
+class NamesTree(Fitted, QTreeWidget):
     """A table whose first column, of names, has the rest of its width, but never cuts a name."""
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self.fit_names()
-
-    def fit_names(self) -> None:
+    def fit(self) -> None:
         """Set the width of the first column; where a name needs more, the table scrolls."""
         others = sum(self.columnWidth(column) for column in range(1, self.columnCount()))
         names = QTreeWidgetItemIterator(self)
@@ -92,12 +89,12 @@ def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: boo
     header.setStretchLastSection(False)
     header.setMinimumSectionSize(32)
     header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
-    header.sectionResized.connect(lambda column, *_: tree.fit_names() if column else None)
+    header.sectionResized.connect(lambda column, *_: tree.fit() if column else None)
     for column, tip in enumerate(tips):
         tree.headerItem().setToolTip(column, wrapped(tip))
         if column:
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-            tree.headerItem().setTextAlignment(column, RIGHT)
+            tree.headerItem().setTextAlignment(column, ALIGN_RIGHT)
     return tree
 
 
@@ -108,7 +105,7 @@ def _row(texts: Sequence[str], tip: str, key: object) -> QTreeWidgetItem:
     for column in range(len(texts)):
         item.setToolTip(column, wrapped(tip))
         if column:
-            item.setTextAlignment(column, RIGHT)
+            item.setTextAlignment(column, ALIGN_RIGHT)
     return item
 
 
@@ -142,7 +139,7 @@ class LimitsPanel(Panel):
         parts = (field, self.problem, self.limits, self.hint, self.walls, self.words)
         buttons = in_row(None, self.export)
         wide = [self.walls, self.words]
-        in_column(*parts, buttons, wide=wide, spacing=3, on=self, margins=(4, 4, 4, 4))
+        in_column(*parts, buttons, wide=wide, spacing=3, on=self, margins=4)
         self.follow(lambda one: one.case.limits, self._show_text)
         self.follow(lambda one: (one.limit_results, one.checked, one.limit), self._show_limits)
         self.follow(lambda one: (one.frame, one.case.roles, one.mesh), self._show_walls, seen=True)
@@ -170,7 +167,7 @@ class LimitsPanel(Panel):
             height = self.limits.header().sizeHint().height() + 4
             height += min(rows, 6) * ROW_HEIGHT
             self.limits.setFixedHeight(height)
-        self.limits.fit_names()
+        self.limits.fit()
         if session.checked is not None and limits and session.checked.problem:
             self.problem.setText(session.checked.problem)
             self.problem.show()
@@ -217,7 +214,7 @@ class LimitsPanel(Panel):
                     item.addChild(_row(("before", *row.before), row.tip, row.name))
                     item.addChild(_row(("change", *row.change), row.tip, row.name))
                     item.setExpanded(row.layered)
-        self.walls.fit_names()
+        self.walls.fit()
         self.hint.setText(WALLS if self.walls.topLevelItemCount() else NO_WALLS)
 
     def take_theme(self, _scheme: object) -> None:

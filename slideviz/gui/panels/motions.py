@@ -77,7 +77,7 @@ class TableDialog(QDialog):
     ``rows``: the nodes it may list; checks the text. ``text``: the initial table.
     """
 
-    def __init__(self, parent: QWidget | None, rows: TableRows, text: str = "") -> None:
+    def __init__(self, parent: QWidget | None, rows: TableRows, text: str) -> None:
         super().__init__(parent)
         self.rows = rows
         self.setWindowTitle(f"Displacements of {rows.of}")

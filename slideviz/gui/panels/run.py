@@ -76,7 +76,7 @@ class RunPanel(Panel):
         # The panel is the lowest one, and grows upwards: so a line more does not move the button.
         for widget in (self.run, self.cancel, self.text):
             row.setAlignment(widget, Qt.AlignmentFlag.AlignBottom)
-        in_column(row, self.bar, spacing=5, on=self, margins=(6, 6, 6, 6))
+        in_column(row, self.bar, spacing=5, on=self, margins=6)
         # Some checks go through the mesh: they are not repeated if only the view changed.
         self.follow(_checked, self._check)
         self.follow()

@@ -26,6 +26,7 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.formats.openfoam_paths import stem_of
 from slideviz.gui.commands import COMPARE, Command, fill_compare
 from slideviz.gui.widgets.build import (
+    ALIGN_LEFT,
     ModelIndex,
     WrappingRow,
     hint_label,
@@ -242,7 +243,7 @@ class RunTree(QTreeWidget):
         painter.setPen(text_color(row, QPalette.ColorRole.PlaceholderText))
         text = str(index.siblingAtColumn(RUN).data(WORDS))
         shown = option.fontMetrics.elidedText(text, Qt.TextElideMode.ElideRight, rect.width())
-        painter.drawText(rect, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, shown)
+        painter.drawText(rect, ALIGN_LEFT, shown)
         painter.restore()
 
 

@@ -357,7 +357,7 @@ class SectionsPanel(Panel):
         self.rest = QWidget()
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         parts = (*add, self.hint, self.list, self.editor, self.walls, self.tools, self.rest)
-        in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
+        in_column(*parts, wide=[self.list], spacing=5, on=self, margins=6)
 
     # What is shown ---------------------------------------------------------------------
     def sync(self, session: Session) -> None:

@@ -14,14 +14,21 @@ from qtpy.QtGui import (
     QGuiApplication,
     QKeyEvent,
     QKeySequence,
-    QResizeEvent,
     QShortcut,
 )
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QStackedWidget, QTableView
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import ModelIndex, in_column, in_row, push_button
+from slideviz.gui.widgets.build import (
+    ALIGN_LEFT,
+    ALIGN_RIGHT,
+    Fitted,
+    ModelIndex,
+    in_column,
+    in_row,
+    push_button,
+)
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
@@ -54,9 +61,6 @@ ARROW = 20
 GAP = "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
 
-_RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-_MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
 FEWEST = 4  # decimals shown of a quality
 MOST = 5
 MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
@@ -119,7 +123,7 @@ class Column(NamedTuple):
 
     title: str
     tip: str
-    alignment: int
+    alignment: Qt.AlignmentFlag
     texts: list[str]
     """`texts` (n,), `keys` (n,): of each cell, the worst first; and what it is sorted by."""
     keys: np.ndarray
@@ -147,27 +151,29 @@ def columns_of(worst: WorstCells, around: Pair | None) -> list[Column]:
     since = [str(step) for step in worst.steps]
     cell, quality, step = TIPS
     columns = [
-        Column(COLUMNS[CELL], cell, _RIGHT, numbers, known_as),
-        Column(measure_title(worst.measure), quality, _RIGHT, values, np.arange(len(worst))),
-        Column(COLUMNS[SINCE], step, _MIDDLE, since, worst.steps),
+        Column(COLUMNS[CELL], cell, ALIGN_RIGHT, numbers, known_as),
+        Column(measure_title(worst.measure), quality, ALIGN_RIGHT, values, np.arange(len(worst))),
+        Column(COLUMNS[SINCE], step, Qt.AlignmentFlag.AlignCenter, since, worst.steps),
     ]
     if worst.zones:
         zones = [str(zone) for zone in worst.zones]
         tip = "Zone of the mesh, from 1"
-        columns.append(Column("Zone", tip, _MIDDLE, zones, np.array(worst.zones)))
+        columns.append(
+            Column("Zone", tip, Qt.AlignmentFlag.AlignCenter, zones, np.array(worst.zones))
+        )
     names, places = coordinates(worst.positions, around)
     for name, place, texts in zip(names, places.T, place_texts(names, places), strict=True):
         tip = f"{name} of the mean of its nodes, in mesh units or degrees"
-        columns.append(Column(name, tip, _RIGHT, texts, place))
+        columns.append(Column(name, tip, ALIGN_RIGHT, texts, place))
     kinds, keys = np.unique(np.array(worst.kinds), return_inverse=True)
     if len(kinds) > 1:
         short = [SHORT.get(kind, kind) for kind in worst.kinds]
-        columns.append(Column("Type", "Element type", _LEFT, short, keys))
+        columns.append(Column("Type", "Element type", ALIGN_LEFT, short, keys))
     return columns
 
 
 NONE = np.empty(0, np.int64)
-EMPTY = [Column(title, "", _RIGHT, [], NONE) for title in COLUMNS]
+EMPTY = [Column(title, "", ALIGN_RIGHT, [], NONE) for title in COLUMNS]
 """The columns without a mesh: the header has its height from them."""
 
 
@@ -254,7 +260,7 @@ class WorstModel(QAbstractTableModel):
         self.order = np.argsort(-key if self._down else key, kind="stable")
 
 
-class WorstTable(QTableView):
+class WorstTable(Fitted, QTableView):
     """The view of the worst cells."""
 
     row_activated = Signal(int)
@@ -312,9 +318,9 @@ class WorstTable(QTableView):
             room += 8 + (ARROW if place == QUALITY else 0)
             self._needed.append(max(room, before[place]))
         if self._needed != before:
-            self._distribute_width()
+            self.fit()
 
-    def _distribute_width(self) -> None:
+    def fit(self) -> None:
         """Spread the spare width over the columns, unless the user has resized one."""
         now = [self.columnWidth(column) for column in range(len(self._needed))]
         # The last column stretches: its width says nothing about the user.
@@ -324,10 +330,6 @@ class WorstTable(QTableView):
         self._given = [needed + spare for needed in self._needed]
         for column, width in enumerate(self._given):
             self.setColumnWidth(column, width)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._distribute_width()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         before = self.currentIndex().row()
@@ -346,7 +348,7 @@ class WorstPanel(Panel):
 
     def make(self) -> None:
         self._marked: int | None = None
-        self._info_key: tuple[object, ...] = ()
+        self._info_key: object = ()
         self.model = WorstModel()
         # The model's signals keep the panel alive: as its child, the model is deleted with it.
         self.model.setParent(self)
@@ -377,7 +379,7 @@ class WorstPanel(Panel):
         mend = COMMANDS["repair"]
         self.repair = push_button("Repair", mend.tip, lambda: mend.do(self.services), "repair")
         parts = (self.stack, self.info, in_row(self.back, self.repair, None, self.export))
-        in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
+        in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=4)
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
@@ -479,7 +481,7 @@ class WorstPanel(Panel):
         self.export_csv("Export worst cells", "worst_cells.csv", table_rows(worst))
 
 
-def _listed(session: Session) -> tuple[object, ...]:
+def _listed(session: Session) -> object:
     """Return what the list of worst cells depends on."""
     what = measure(session.view.color_by)
     return session.frame, len(session.frames), what, machine_pair(session)

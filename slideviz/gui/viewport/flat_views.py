@@ -16,8 +16,8 @@ from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.viewing import CellMouse, TitleBar, Viewing
-from slideviz.gui.widgets.build import ElidedLabel, in_column
-from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, ask_and_write_plot
+from slideviz.gui.widgets.build import ALIGN_RIGHT, ElidedLabel, in_column
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea
 from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of
 from slideviz.plots.section_paint import Paint, shown_paint
 from slideviz.plots.session_plots import CurveRows, facts_of
@@ -89,12 +89,11 @@ class Ruler(QWidget):
     def _draw_tick(self, painter: QPainter, share: float, text: str) -> None:
         wide = self.width()
         high = self.height()
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         if self.upright:
             y = high * (1.0 - share)
             painter.drawLine(wide - 4, round(y), wide - 1, round(y))
             top = min(max(y - 8.0, 0.0), high - 16.0)
-            painter.drawText(QRectF(14, top, wide - 20, 16), right, text)
+            painter.drawText(QRectF(14, top, wide - 20, 16), ALIGN_RIGHT, text)
         else:
             x = wide * share
             painter.drawLine(round(x), 0, round(x), 3)
@@ -293,10 +292,12 @@ class CurveView(_SectionView):
     def __init__(self, store: Store, scheme: ColorScheme) -> None:
         super().__init__("curve", "Close the curve")
         self.store = store
-        self.save_button = self.title.add_button(
-            "picture", "Save the curve as PNG, SVG or PDF…", self._save
-        )
         canvas = CurveCanvas(self.drawing)
+        self.save_button = self.title.add_button(
+            "picture",
+            "Save the curve as PNG, SVG or PDF…",
+            lambda: canvas.save("along_section", "Save curve"),
+        )
         self.area = PlotArea(canvas)
         canvas.picked = self._picked
         canvas.setToolTip("Click to mark the cell at a place.")
@@ -332,9 +333,6 @@ class CurveView(_SectionView):
         if self.rows and not self.area.shows_text:
             self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
 
-    def _save(self) -> None:
-        ask_and_write_plot(self, "Save curve", "along_section", self.drawing())
-
 
 def _draw(
     rows: Sequence[CurveRow], labels: tuple[str, str], paint: Paint, figure: Figure, style: Style
@@ -350,9 +348,7 @@ class FlatView(_SectionView):
     antialiasing; 0 for none.
     """
 
-    def __init__(
-        self, store: Store, cuts: Cuts, scheme: ColorScheme, multi_samples: int = 4
-    ) -> None:
+    def __init__(self, store: Store, cuts: Cuts, scheme: ColorScheme, multi_samples: int) -> None:
         super().__init__("flat", "Close the flat view")
         self.fit_button = self.title.add_button("fit", "Make the section fill this view", self.fit)
         self.view = View3D(self, multi_samples=multi_samples)
@@ -363,8 +359,8 @@ class FlatView(_SectionView):
         self.across = Ruler(False)
         self.upright = Ruler(True)
         self._partner: FlatView | None = None
-        self._fitted: tuple[object, ...] = ()
-        self._ranges: tuple[object, ...] = ()
+        self._fitted: object = ()
+        self._ranges: object = ()
         grid = QGridLayout()
         grid.setSpacing(0)
         grid.addWidget(self.upright, 0, 0)

@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QTo
 
 from slideviz.gui.commands import STEPS
 from slideviz.gui.responsiveness.timers import TICK_MS
-from slideviz.gui.widgets.build import tool_button
+from slideviz.gui.widgets.build import ALIGN_RIGHT, Fitted, tool_button
 from slideviz.gui.widgets.theme import alarm, set_icon
 from slideviz.session import changes
 from slideviz.session.run_messages import stopped_words
@@ -39,8 +39,8 @@ def step_ms(steps: int, speed: float = 1.0) -> float:
 class Player(QWidget):
     """The player of the steps: buttons, a slider, and the numbers of the shown step."""
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, store: Store) -> None:
+        super().__init__()
         self.store = store
         self._narrow = False
         row = QHBoxLayout(self)
@@ -216,7 +216,7 @@ class Player(QWidget):
 SEPARATOR = "&nbsp;· "  # between the numbers of a step
 
 
-class ResultsLabel(QLabel):
+class ResultsLabel(Fitted, QLabel):
     """The label with the numbers of the shown step, the most important first.
 
     It shows the longest form that fits; where none does, it drops numbers from the end of the
@@ -228,7 +228,7 @@ class ResultsLabel(QLabel):
         self._forms: list[list[str]] = []
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setAlignment(ALIGN_RIGHT)
         # Numbers that come and go may not take room from the view or the panels.
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
@@ -236,18 +236,14 @@ class ResultsLabel(QLabel):
         """Show numbers as rich text, given as a list of forms: each a list, the longest first."""
         if forms != self._forms:
             self._forms = forms
-            self._fit()
+            self.fit()
 
     @property
     def least(self) -> int:
         """Return the width of the most important number in its shortest form, in pixels."""
         return math.ceil(self._width_of(self._forms[-1][:1])) + 2 if self._forms else 0
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
+    def fit(self) -> None:
         if not self._forms:
             self.setText("")
             self.setToolTip("")

@@ -27,7 +27,7 @@ _LONG = 1.5
 class SectionViews(QSplitter):
     """The 3D views, and beside or below them the flat views of the selected section."""
 
-    def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:
+    def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget) -> None:
         super().__init__(Qt.Orientation.Vertical, parent)
         self.setChildrenCollapsible(False)
         self.viewing = viewing
@@ -36,7 +36,7 @@ class SectionViews(QSplitter):
         self._multi_samples = multi_samples
         self.flats: FlatViews | None = None
         """The flat views; None while no section is laid flat."""
-        self._kind: tuple[object, ...] = ()
+        self._kind: object = ()
         self.scheme = viewing.scene.scheme
         """The colors of the flat views."""
         self.store.listen(self._session_changed)

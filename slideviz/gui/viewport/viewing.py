@@ -24,7 +24,7 @@ from slideviz.gui.panels.worst import info_text
 from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.handle_mouse import HandleMouse
-from slideviz.gui.widgets.build import ElidedLabel, tool_button
+from slideviz.gui.widgets.build import ElidedLabel, Fitted, tool_button
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.scene.stage import STRIP
@@ -146,7 +146,7 @@ class BoundaryMouse(QObject):
             menu.popup(self.view.mapToGlobal(where))
 
 
-class TitleBar(QFrame):
+class TitleBar(Fitted, QFrame):
     """The title above a view, cut short where there is no room, with a button to close the view.
 
     ``name``: the widget's object name. ``closing``: the tooltip of the button that closes the view.
@@ -196,9 +196,9 @@ class TitleBar(QFrame):
 
     def set_text(self, text: str) -> None:
         self._text = text
-        self._fit()
+        self.fit()
 
-    def _fit(self) -> None:
+    def fit(self) -> None:
         if isinstance(self.label, ElidedLabel):
             self.label.setText(self._text)
             self.setToolTip(self._text)
@@ -208,13 +208,9 @@ class TitleBar(QFrame):
         self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, width))
         self.setToolTip(f"{self._text}\nClick to show something else here")
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._fit()
+        self.fit()
 
 
 class CameraLink:
@@ -267,7 +263,7 @@ class Viewing(QWidget):
 
     status_changed = Signal(str)  # what the handle does, in words
 
-    def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
+    def __init__(self, store: Store, multi_samples: int, parent: QWidget) -> None:
         super().__init__(parent)
         self.store = store
         self._multi_samples = multi_samples

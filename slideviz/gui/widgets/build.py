@@ -122,6 +122,9 @@ def wrapped(text: str) -> str:
     return f"<table width='{width}'><tr><td>{lines}</td></tr></table>"
 
 
+ALIGN_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+ALIGN_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+
 ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
 """An index into an item model, as Qt passes it to a delegate."""
 
@@ -161,7 +164,19 @@ class ElidedLabel(QLabel):
         )
 
 
-class WideLabel(QScrollArea):
+class Fitted:
+    """Mixed into a class of widgets, before that of Qt: fits its content to each new size."""
+
+    def fit(self) -> None:
+        """Fit the content to the present size."""
+        raise NotImplementedError
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)  # type: ignore[misc]  # of the widget's class
+        self.fit()
+
+
+class WideLabel(Fitted, QScrollArea):
     """A word-wrapped label as wide as its container, which scrolls a text of too many lines.
 
     ``lines``: most lines that are visible at once.
@@ -186,13 +201,9 @@ class WideLabel(QScrollArea):
         self.label.setText(text)
         self.setVisible(bool(text))
         self.verticalScrollBar().setValue(0)
-        self._fit()
+        self.fit()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
+    def fit(self) -> None:
         high = self.label.heightForWidth(self.viewport().width())
         self.setFixedHeight(max(min(high, self._most), 0))
 
@@ -228,7 +239,7 @@ def in_column(
     wide: Sequence[Part] = (),
     spacing: int = -1,
     on: QWidget | None = None,
-    margins: tuple[int, int, int, int] = (0, 0, 0, 0),
+    margins: int | tuple[int, int, int, int] = 0,
 ) -> QVBoxLayout:
     """Return a vertical layout of parts; those in ``wide`` share the spare height.
 
@@ -237,7 +248,8 @@ def in_column(
     layout = QVBoxLayout()
     if on is not None:
         on.setLayout(layout)
-        layout.setContentsMargins(*margins)
+        edges = (margins,) * 4 if isinstance(margins, int) else margins
+        layout.setContentsMargins(*edges)
     return _filled(layout, parts, wide, spacing)
 
 
@@ -271,7 +283,7 @@ def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
 
-class WrappingRow(QWidget):
+class WrappingRow(Fitted, QWidget):
     """A row with some parts at the left and some at the right, which are below where it is narrow.
 
     ``spacing``: space between the parts in pixels; negative: the style's. ``apart``: whether the
@@ -295,7 +307,7 @@ class WrappingRow(QWidget):
             self._row.addLayout(half)
         self._row.setStretch(1, 1)
 
-    def _fold(self) -> None:
+    def fit(self) -> None:
         widths = [half.minimumSize().width() for half in self._halves]
         wide = sum(widths) + self._row.spacing() <= self.width()
         kind = QBoxLayout.Direction
@@ -305,13 +317,9 @@ class WrappingRow(QWidget):
         widths = [half.minimumSize().width() for half in self._halves]
         return QSize(max(widths), super().minimumSizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fold()
-
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:
-            self._fold()
+            self.fit()
         return super().event(event)
 
 

@@ -411,8 +411,8 @@ class NumberBox(QSpinBox):
 
     marked = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._tip = ""
         self.fault = ""
         self._before = self.value()

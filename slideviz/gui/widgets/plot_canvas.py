@@ -232,6 +232,12 @@ class PlotCanvas(QWidget):
         self.scheme = scheme
         self.request_draw()
 
+    def save(self, name: str, title: str = "Save plot") -> None:
+        """Ask for a file, by default of a name, and draw the plot into it."""
+        draw_on = self.drawing()
+        default = folder_of(self) / f"{name}.png"
+        ask_and_write(self, title, default, PLOT_FILTERS, lambda path: write_plot(path, draw_on))
+
     # Places ----------------------------------------------------------------------------
     @property
     def _scale(self) -> tuple[float, float]:
@@ -353,9 +359,3 @@ def ask_and_write(
     if window is not None:
         window.settings.setValue("folder", str(path.parent))
         window.show_status(f"Saved {path}")
-
-
-def ask_and_write_plot(parent: QWidget, title: str, name: str, draw_on: Draw) -> None:
-    """Ask for a file, by default ``name`` as PNG, and write a plot to it."""
-    default = folder_of(parent) / f"{name}.png"
-    ask_and_write(parent, title, default, PLOT_FILTERS, lambda path: write_plot(path, draw_on))
