@@ -27,7 +27,8 @@ _MOST = 400
 class UnrolledPolygons(NamedTuple):
     """Polygons around an axis, cut open at the seam: a point on it is there once for each side."""
 
-    local: FloatArray  # (p, 3): the points in the section's frame
+    radius: FloatArray
+    height: FloatArray  # `radius`, `height` (p,): of the points, about and along the axis
     angle: FloatArray
     """(p,): their angles around the axis in radians, within one turn but for polygons on the seam,
     which stay whole."""
@@ -41,8 +42,7 @@ def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unroll
     The seam lies in the middle of the largest range of angles without points. Whole turns are
     added so that the middle of all angles is nearest to ``near``, in radians; None: to 0.
     """
-    local = section.frame(polygons.points)
-    angle = np.arctan2(local[:, 1], local[:, 0])
+    angle, radius, height = polar(section.frame(polygons.points))
     # Corners within half a turn of the first corner of their polygon, seam or not.
     corner = angle[polygons.connectivity]
     first = np.repeat(corner[polygons.offsets[:-1]], polygons.sizes)
@@ -58,7 +58,13 @@ def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unroll
     keys, corners = np.unique(polygons.connectivity * span + turn - turn.min(), return_inverse=True)
     node, extra = np.divmod(keys, span)
     opened = angle[node] + TURN * (extra + turn.min())
-    return UnrolledPolygons(local[node], opened, corners, float(centre + shift))
+    middle_angle = float(centre + shift)
+    return UnrolledPolygons(radius[node], height[node], opened, corners, middle_angle)
+
+
+def polar(local: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return angle, radius and height (n,) of points (n, 3) in the frame of a section."""
+    return np.arctan2(local[:, 1], local[:, 0]), np.hypot(local[:, 0], local[:, 1]), local[:, 2]
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
@@ -128,6 +134,10 @@ class AboutAxis(Section):
     def first(self, points: FloatArray) -> Self:
         """Return the section of a round size, about through the middle of points (n, 3)."""
         return self.sized(round_middle(self.positions(points)) or self.size_terms.usual)
+
+    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
+        """Return how far the point of the axis moves; infinity where the axis is turned round."""
+        return float(np.linalg.norm(step)) if turned @ self.basis[2] > 0 else np.inf
 
     def flatten(self, polygons: Polygons, near: float | None, ahead: float | None) -> Polygons:
         """Return the polygons laid flat, in the same order and each of them whole.
@@ -233,9 +243,3 @@ class Quadric(AboutAxis):
                 stable, -constant / (slope + sign * root), (sign * root - slope) / square
             )
         return np.clip(np.nan_to_num(roots), 0.0, 1.0)
-
-
-def axis_section(section: Section) -> AboutAxis:
-    """Return a section, which must be one about an axis, as that."""
-    assert isinstance(section, AboutAxis)
-    return section

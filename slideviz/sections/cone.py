@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import Quadric, UnrolledPolygons
+from slideviz.sections.around_axis import Quadric, UnrolledPolygons, polar
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -71,9 +71,7 @@ class Cone(Quadric):
         Its half angle is the usual one, or smaller if the cone would otherwise leave the range from
         inner to outer radius within the length of the mesh.
         """
-        local = self.frame(points)
-        radius = np.hypot(local[:, 0], local[:, 1])
-        height = local[:, 2]
+        _, radius, height = polar(self.frame(points))
         length = float(np.ptp(height))
         # Between the inner and the outer radius over the whole length, where possible.
         steep = np.degrees(np.arctan2(np.ptp(radius) / 2.0, length)) if length > 0 else 45.0
@@ -84,10 +82,6 @@ class Cone(Quadric):
         at = roundest(at - room, at + room, at)
         apex = self.point + at * self.basis[2]
         return replace(self, origin=triple(apex), half_angle_deg=angle)
-
-    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far the apex moves; infinity where the cone opens the other way after it."""
-        return float(np.linalg.norm(step)) if turned @ self.basis[2] > 0 else np.inf
 
     def words(self) -> str:
         return self._words(DIGITS, "from apex")
@@ -116,11 +110,9 @@ class Cone(Quadric):
         angle) around the apex, counted from the line at ``ahead``, which goes to the right.
         """
         sin, cos = self._lines
-        local = opened.local
-        radius = np.hypot(local[:, 0], local[:, 1])
-        length = local[:, 2] * cos + radius * sin
+        length = opened.height * cos + opened.radius * sin
         angle = (opened.angle - (opened.middle if ahead is None else ahead)) * sin
-        outwards = radius * cos - local[:, 2] * sin
+        outwards = opened.radius * cos - opened.height * sin
         return np.stack([length * np.cos(angle), length * np.sin(angle), outwards], axis=1)
 
     def ahead(self, points: FloatArray) -> float | None:
@@ -144,9 +136,8 @@ class Cone(Quadric):
     def places(self, points: FloatArray) -> FloatArray:
         """Return angles in radians, and lengths from the apex along the cone."""
         sin, cos = self._lines
-        local = self.frame(points)
-        length = local[:, 2] * cos + np.hypot(local[:, 0], local[:, 1]) * sin
-        return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), length])
+        angle, radius, height = polar(self.frame(points))
+        return np.column_stack([angle, height * cos + radius * sin])
 
     def surface(self, places: FloatArray, size: float) -> FloatArray:
         turn = places[:, 0]

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import Quadric, UnrolledPolygons
+from slideviz.sections.around_axis import Quadric, UnrolledPolygons, polar
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -109,9 +109,8 @@ class Cylinder(Circle, Quadric):
 
     def laid(self, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return position along the axis, radius times angle, and distance outwards."""
-        local = opened.local
-        along = local[:, 2] + self.point @ self.basis[2]
-        outwards = np.hypot(local[:, 0], local[:, 1]) - self.radius
+        along = opened.height + self.point @ self.basis[2]
+        outwards = opened.radius - self.radius
         return np.stack([along, self.radius * opened.angle, outwards], axis=1)
 
     def flat_labels(self) -> tuple[Label, Label]:
@@ -129,8 +128,8 @@ class Cylinder(Circle, Quadric):
 
     def places(self, points: FloatArray) -> FloatArray:
         """Return angles in radians, and positions along the axis from the section's point."""
-        local = self.frame(points)
-        return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), local[:, 2]])
+        angle, _, height = polar(self.frame(points))
+        return np.column_stack([angle, height])
 
     def surface(self, places: FloatArray, size: float) -> FloatArray:
         """Return points at places of the cylinder with the radius ``size``."""

@@ -232,10 +232,6 @@ class ConstantSpan(AboutAxis):
         """Return the section at mid-span."""
         return self.sized(self.size_terms.usual)
 
-    def keeps(self, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far the point of the axis moves; infinity where the axis is turned round."""
-        return float(np.linalg.norm(step)) if turned @ self.basis[2] > 0 else np.inf
-
     def words(self) -> str:
         walls = self.walls
         between = "hub to shroud" if walls is None else walls.words
@@ -250,8 +246,7 @@ class ConstantSpan(AboutAxis):
 
     def laid(self, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return m', theta, and the span above that of the section."""
-        local = opened.local
-        coords = np.stack([local[:, 2], np.hypot(local[:, 0], local[:, 1]), opened.angle], axis=1)
+        coords = np.stack([opened.height, opened.radius, opened.angle], axis=1)
         plane = self.known_walls.plane(coords)
         return np.stack([plane[:, 0], opened.angle, plane[:, 2] - self.span], axis=1)
 
