@@ -61,11 +61,9 @@ class Impeller(Stack):
 
     def points(self, nodes: IntArray) -> FloatArray:
         """Return the coordinates (k, 3) of nodes (k,), which are numbered from hub to shroud."""
-        layer, column = np.divmod(nodes, self.planes.shape[1])
-        part = np.linspace(0.0, 1.0, self.layers + 1)
-        span = (part - np.sin(2 * np.pi * part) / (4 * np.pi))[layer]
+        layer, column, span = self.places(nodes)
         place, theta = self.planes[0, column].T
-        z, r = _meridional(place, span).T
+        z, r = _meridional(place, span[layer]).T
         return np.stack([r * np.cos(theta), r * np.sin(theta), z], axis=1)
 
 

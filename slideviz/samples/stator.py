@@ -190,14 +190,18 @@ class Stack:
 
         Layers at hub and shroud have about a third of the height of those in the middle.
         """
-        layer, column = np.divmod(nodes, self.planes.shape[1])
-        part = np.linspace(0.0, 1.0, self.layers + 1)
-        part = part - np.sin(2 * np.pi * part) / (4 * np.pi)
+        layer, column, part = self.places(nodes)
         radius = (RADII[0] + (RADII[-1] - RADII[0]) * part)[layer]
         shares = (2 * (part - 0.5) * (part - 1), 4 * part * (1 - part), 2 * part * (part - 0.5))
         each = zip(shares, self.planes, strict=True)
         z, theta = np.sum([share[layer] * plane[column].T for share, plane in each], axis=0)
         return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
+
+    def places(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return layer and place in its plane (k,) of nodes (k,), and the spans of all layers."""
+        layer, column = np.divmod(nodes, self.planes.shape[1])
+        part = np.linspace(0.0, 1.0, self.layers + 1)
+        return layer, column, part - np.sin(2 * np.pi * part) / (4 * np.pi)
 
     def cells(self, ids: IntArray) -> IntArray:
         """Return the nodes (k, 8) of cells (k,)."""
