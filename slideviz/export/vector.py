@@ -27,7 +27,7 @@ from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
 from slideviz.scene.stage import STRIP
 from slideviz.sections.cut import Cutter
-from slideviz.sections.line import box_around
+from slideviz.sections.plane import box_around
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES, WALL_VALUES

@@ -18,8 +18,8 @@ from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
 from slideviz.sections.cut import Cutter, transformed
-from slideviz.sections.line import Box
 from slideviz.sections.model import Section
+from slideviz.sections.plane import Box
 from slideviz.sections.polygons import Polygons, joined
 
 MANY = 200_000

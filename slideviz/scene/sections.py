@@ -16,8 +16,8 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.mesh import recolored
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.sections.line import Box, box_around
 from slideviz.sections.model import Section
+from slideviz.sections.plane import Box, box_around
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, matrices, period_of
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited

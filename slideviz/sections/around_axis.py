@@ -207,39 +207,3 @@ class AboutAxis(Section):
         straight = np.cos(lean) * straight - np.sin(lean) * axis
         up = np.eye(3)[1 if abs(straight[2]) > 0.9 else 2]
         return np.stack([np.cross(up, straight), up, straight])
-
-
-class Quadric(AboutAxis):
-    """A shape about an axis with a straight line as its profile."""
-
-    @abstractmethod
-    def quadric(self) -> tuple[FloatArray, float]:
-        """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
-
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
-        """Return where edges cross the surface, as parts of the edge (k,), exactly.
-
-        Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
-        one at which the distance changes its sign as it does from end to end of the edge.
-        """
-        weights, total = self.quadric()
-        used = weights != 0.0
-        rows = self.basis[used]
-        weight = weights[used]
-        p = (edges[0] - self.point) @ rows.T
-        d = edges[1] @ rows.T
-        square = np.sum(weight * d * d, axis=1)
-        slope = np.sum(weight * p * d, axis=1)
-        constant = np.sum(weight * p * p, axis=1) - total
-        root = np.sqrt(np.maximum(slope**2 - square * constant, 0.0))
-        before, after = level
-        sign = np.where(after > before, 1.0, -1.0)
-        # Of the two formulas of a root, the one without cancellation.
-        stable = sign * slope > 0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            roots = np.where(
-                stable, -constant / (slope + sign * root), (sign * root - slope) / square
-            )
-        return np.clip(np.nan_to_num(roots), 0.0, 1.0)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from slideviz.sections.cone import Cone
-from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
+from slideviz.sections.quadrics import Cone, Cylinder
 from slideviz.sections.shape import ON_SECTION, Section, Triple
 from slideviz.sections.span import ConstantSpan
 

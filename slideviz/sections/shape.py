@@ -26,7 +26,7 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
-    from slideviz.sections.line import Box
+    from slideviz.sections.plane import Box
     from slideviz.sections.span import SpanWalls
 
 Triple = tuple[float, float, float]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.sections.line import box_around
+from slideviz.sections.plane import box_around
 from slideviz.sections.model import Section
 
 BOX = np.array([0.0, 0.0]), np.array([4.0, 2.0])
