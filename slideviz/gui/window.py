@@ -47,8 +47,8 @@ from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.threads import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
+from slideviz.gui.viewport.flat_views import SectionViews
 from slideviz.gui.viewport.player import Player
-from slideviz.gui.viewport.section_views import SectionViews
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner

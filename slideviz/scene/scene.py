@@ -21,9 +21,8 @@ from slideviz.scene.camera import Camera
 from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, PreviewLayer, TriadLayer
 from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, PointLayer, RepairLayer
-from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
+from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, PassageLayer, ThresholdLayer
 from slideviz.scene.overview import Overview
-from slideviz.scene.passages import PassageLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.colors import with_drawable_colors

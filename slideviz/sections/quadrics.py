@@ -9,13 +9,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons, polar
+from slideviz.sections.plane import Box
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -28,10 +29,6 @@ from slideviz.sections.shape import (
     triple,
     triple_words,
 )
-
-if TYPE_CHECKING:
-    from slideviz.sections.plane import Box
-
 
 _CHORDS = 720  # number of chords that a circle is drawn with
 

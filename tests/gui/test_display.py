@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.panels.display import MOST_PASSAGES, NOT_PERIODIC, ROLES_ONLY, SHOWN, PassagesBox
 from slideviz.samples.table import write_sample
-from slideviz.scene.passages import PassageLayer
+from slideviz.scene.mesh import PassageLayer
 from slideviz.scene.pick import to_display
 from slideviz.session import changes, jobs
 from tests.builders import stage

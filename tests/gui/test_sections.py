@@ -11,8 +11,13 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QPushButton
 
 from slideviz.case.motions.span import SpanMotion
-from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
-from slideviz.gui.viewport.section_views import arrangement_for
+from slideviz.gui.viewport.flat_views import (
+    Ruler,
+    arrangement_for,
+    is_larger_stacked,
+    nice_ticks,
+    tick_text,
+)
 from slideviz.gui.widgets import questions
 from slideviz.samples.table import write_sample
 from slideviz.scene import handle

@@ -15,8 +15,7 @@ from slideviz.samples.table import sample
 from slideviz.scene.actors import VALUES
 from slideviz.scene.ghosts import circles
 from slideviz.scene.legend import COLORS, SIZE
-from slideviz.scene.mesh import ThresholdLayer
-from slideviz.scene.passages import PALER, THRESHOLD, PassageLayer, outermost
+from slideviz.scene.mesh import PALER, THRESHOLD, PassageLayer, ThresholdLayer, outermost
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.inspect import cell_centers

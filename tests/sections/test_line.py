@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from slideviz.sections.plane import box_around
 from slideviz.sections.model import Section
+from slideviz.sections.plane import box_around
 
 BOX = np.array([0.0, 0.0]), np.array([4.0, 2.0])
 LINE = Section("plane", (1.0, 0.5, 0.0), (1.0, 0.0, 0.0), whole_cells=True)

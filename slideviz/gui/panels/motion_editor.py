@@ -33,8 +33,8 @@ from slideviz.gui.widgets.fields import (
     control_point_problem,
     unless,
 )
+from slideviz.gui.widgets.panel import SpanWalls
 from slideviz.gui.widgets.span_curve import SpanCurveField
-from slideviz.gui.widgets.span_walls import SpanWalls
 from slideviz.session.motions import radial
 from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem
 

@@ -43,8 +43,7 @@ from slideviz.gui.widgets.build import (
     tool_button,
     wrapped,
 )
-from slideviz.gui.widgets.panel import FieldWatch, Panel
-from slideviz.gui.widgets.span_walls import SpanWalls
+from slideviz.gui.widgets.panel import FieldWatch, Panel, SpanWalls
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motions import (

@@ -39,8 +39,7 @@ from slideviz.gui.widgets.build import (
     wrapped,
 )
 from slideviz.gui.widgets.fields import NumberField, VectorField
-from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.span_walls import SpanWalls
+from slideviz.gui.widgets.panel import Panel, SpanWalls
 from slideviz.gui.widgets.theme import set_icon
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.section_picture import SectionStyle

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from slideviz.gui.docks import Docks
     from slideviz.gui.files import Files
     from slideviz.gui.running import Running
-    from slideviz.gui.viewport.section_views import SectionViews
+    from slideviz.gui.viewport.flat_views import SectionViews
     from slideviz.gui.viewport.viewing import Viewing
 
 
