@@ -24,8 +24,8 @@ from qtpy.QtCore import QLockFile, QObject
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
-from slideviz.gui.responsiveness.timers import AUTOSAVE_MS, single_shot
-from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.gui.background import BackgroundJob
+from slideviz.gui.responsiveness.timers import AUTOSAVE_MS
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.error_reporter import old_crashes
 from slideviz.session import jobs
@@ -121,13 +121,15 @@ _numbers = count(1)
 log = logging.getLogger("slideviz")
 
 
-class Autosave(QObject):
+class Autosave(BackgroundJob):
     """The file with the session of a window: written after changes, removed at a clean end.
 
     ``folder``: the folder of all windows' session files; made when needed. ``camera``: returns the
     camera of the first view. ``designs``: returns the table of designs, and the case of its
     results.
     """
+
+    wait_ms = AUTOSAVE_MS
 
     def __init__(
         self,
@@ -137,8 +139,7 @@ class Autosave(QObject):
         designs: Callable[[], tuple[DesignTable, Case | None]],
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(parent)
-        self.store = store
+        super().__init__(store, parent)
         self.path = folder / f"session-{os.getpid()}-{next(_numbers)}{ENDING}"
         self._camera = camera
         self._designs = designs
@@ -146,18 +147,10 @@ class Autosave(QObject):
         self._written_key: object = ()
         self._pending_key: object = ()
         self._replaces: list[OrphanedSession] = []
-        self._runner = JobRunner(self)
-        self._runner.finished.connect(self._done)
-        self._runner.failed.connect(self._failed)
-        self._timer = single_shot(self, self.save, AUTOSAVE_MS)
-        store.listen(self._changed)
 
-    def save(self) -> None:
-        """Write the session in the background, if it has changed since it was written."""
+    def _start(self) -> None:
         session = self.store.session
-        if self._runner.busy:
-            self._timer.start()
-        elif session.mesh is not None and self._key(session) != self._written_key:
+        if session.mesh is not None and self._key(session) != self._written_key:
             self._pending_key = self._key(session)
             self._runner.start(self._write, session, self._camera(), *self._designs())
 
@@ -165,28 +158,22 @@ class Autosave(QObject):
         """Save this session, restored from an earlier one, then remove the earlier one's file."""
         self._replaces.append(found)
         self._written_key = ()
-        self.save()
+        self.begin()
 
     def close(self) -> None:
         """Stop writing the session, and remove its file."""
-        self._timer.stop()
-        self._runner.close()
+        super().close()
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
         if self._lock is not None:
             self._lock.unlock()
 
     def schedule(self) -> None:
-        """Schedule `save` after `AUTOSAVE_MS`, if the session differs from what was written."""
-        self._changed(self.store.session, self.store.session)
-
-    def _changed(self, _old: Session, new: Session) -> None:
+        """Write the session soon, if it differs from what was written."""
+        session = self.store.session
         # The timer is not restarted by each change: also saved during constant changes.
-        if (
-            new.mesh is not None
-            and self._key(new) != self._written_key
-            and not self._timer.isActive()
-        ):
+        differs = session.mesh is not None and self._key(session) != self._written_key
+        if differs and not self._timer.isActive():
             self._timer.start()
 
     def _key(self, session: Session) -> object:
@@ -209,7 +196,7 @@ class Autosave(QObject):
         write_session(self.path, session, stored_session(session, designs, of), camera)
         private_file(self.path)
 
-    def _done(self, _: object) -> None:
+    def _finished(self, _: object) -> None:
         self._written_key = self._pending_key
         for found in self._replaces:
             found.remove()

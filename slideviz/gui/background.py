@@ -37,13 +37,13 @@ class BackgroundJob(QObject):
 
     wait_ms = 0
 
-    def __init__(self, store: Store, parent: QObject) -> None:
+    def __init__(self, store: Store, parent: QObject | None) -> None:
         super().__init__(parent)
         self.store = store
         self._runner = JobRunner(self)
-        self._timer = single_shot(self, self._begin, self.wait_ms)
+        self._timer = single_shot(self, self.begin, self.wait_ms)
         self._runner.finished.connect(self._finished)
-        self._runner.cancelled.connect(self._schedule)
+        self._runner.cancelled.connect(self.schedule)
         self._runner.failed.connect(self._failed)
         store.listen(self._changed)
 
@@ -57,13 +57,14 @@ class BackgroundJob(QObject):
 
     def _changed(self, _old: Session, _new: Session) -> None:
         """Follow a change of the session."""
-        self._schedule()
+        self.schedule()
 
-    def _schedule(self) -> None:
+    def schedule(self) -> None:
         """Start the timer, if there is something to do."""
         self._timer.start()
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Start the job, or later if one runs."""
         if self._runner.busy:
             self._timer.start()
         else:
@@ -91,9 +92,9 @@ class IntersectionCheck(BackgroundJob):
     def _changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh or old.case is not new.case:
             self.store.change(jobs.forget_intersection, self._checked_key)
-            self._schedule()
+            self.schedule()
 
-    def _schedule(self) -> None:
+    def schedule(self) -> None:
         session = self.store.session
         if session.mesh is not None and jobs.intersection_key(session) != self._checked_key:
             self._timer.start()
@@ -107,7 +108,7 @@ class IntersectionCheck(BackgroundJob):
     def _finished(self, found: tuple[str, str]) -> None:
         self._checked_key = self._running_key
         self.store.change(jobs.set_intersection, found, self._running_key)
-        self._schedule()
+        self.schedule()
 
     def _failed(self, error: Exception) -> None:
         log.error("the intersection check failed: %s", error)
@@ -119,7 +120,7 @@ class LimitCheck(BackgroundJob):
 
     wait_ms = INTERSECTION_MS
 
-    def _schedule(self) -> None:
+    def schedule(self) -> None:
         session = self.store.session
         running = session.runs and not session.runs[-1].end
         if session.frame is not None and session.limit_results is None and not running:
@@ -132,7 +133,7 @@ class LimitCheck(BackgroundJob):
 
     def _finished(self, checked: CheckedLimits) -> None:
         self.store.change(replace, checked=checked)
-        self._schedule()
+        self.schedule()
 
     def _failed(self, error: Exception) -> None:
         log.error("limits: %s", error)
@@ -176,7 +177,7 @@ class LivePreview(BackgroundJob):
             if new.run_shown is not None and new.run_shown.frames and not new.outdated:
                 self.store.change(changes.end_preview)
             else:
-                self._begin()
+                self.begin()
         if old.case is not new.case:
             self._at_rest.start()
             self._pulled = new.case if self.store.dragging else None
@@ -197,7 +198,7 @@ class LivePreview(BackgroundJob):
             self._tried = case
             self._runner.start(jobs.make_live_fields, case, session.mesh)
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
         self._spare_memory()
         if self.fields is not None and not self._runner.busy:
             session = self.store.session
@@ -211,7 +212,7 @@ class LivePreview(BackgroundJob):
             self.fields = found if self.is_on and not stale else None
             if self._pulled is self.store.session.case:
                 self._hand.start()
-                self._begin()
+                self.begin()
             return
         fields, preview = found
         if self.fields is None or fields.mesh is not self.store.session.mesh:
@@ -222,7 +223,7 @@ class LivePreview(BackgroundJob):
             return
         self.fields = fields
         if self.store.session.case is not preview.case:
-            self._begin()
+            self.begin()
         self.store.change(changes.show_preview, preview)
 
     def _run(self) -> None:
@@ -273,7 +274,7 @@ class SectionReader(BackgroundJob):
             and (view.frame.mesh, cut_key(section)) not in self._unreadable
         ]
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
         # The section being read may be dragged on, and its cells no longer wanted.
         wanted = [(frame.mesh, section) for frame, section in self._awaited()]
         if not self._runner.busy:

@@ -58,7 +58,7 @@ def open_in(window, path, qtbot):
 def kept(window, qtbot):
     """Wait until the session is written as it is, and return what is in the file."""
     keeper = window.autosave
-    keeper.save()
+    keeper.begin()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
     return case_in(keeper.path)
 
@@ -75,7 +75,7 @@ def crashed(qtbot, folder, case_file):
     store = Store()
     keeper = Autosave(store, folder, lambda: None, lambda: (DesignTable(), None))
     store.put(changes.set_view(changes.set_case(session, steps=7), color_by="skew"))
-    keeper.save()
+    keeper.begin()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
     content = keeper.path.read_bytes()
     keeper.close()
@@ -126,7 +126,7 @@ def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypa
 
 def test_nothing_is_written_before_a_mesh_is_open(make, folder):
     window = make()
-    window.autosave.save()
+    window.autosave.begin()
     assert not window.autosave._runner.busy
     assert not folder.exists()
 
@@ -281,7 +281,7 @@ def test_the_name_of_the_case_need_not_be_utf_8(make, qtbot, folder, case_file):
     path.write_bytes(case_file.read_bytes())
     window = make()
     open_in(window, path, qtbot)
-    window.autosave.save()
+    window.autosave.begin()
     qtbot.waitUntil(window.autosave.path.exists)
     qtbot.waitUntil(lambda: not window.autosave._runner.busy)
     left = folder / f"{LEFT}1.slideviz"
@@ -324,7 +324,7 @@ def test_a_folder_that_cannot_be_written_is_logged_and_the_window_goes_on(
     folder.write_text("no folder")
     window = make()
     open_in(window, case_file, qtbot)
-    window.autosave.save()
+    window.autosave.begin()
     qtbot.waitUntil(lambda: "could not be saved" in caplog.text)
     assert window.error_reporter.count == 0
 
@@ -349,7 +349,7 @@ while window.store.session.mesh is None:
     app.processEvents()
     time.sleep(0.002)
 window.store.change(changes.set_case, steps=11)
-window.autosave.save()
+window.autosave.begin()
 while not window.autosave.path.exists():
     app.processEvents()
     time.sleep(0.002)

@@ -78,8 +78,6 @@ class Exports(QObject):
     # Pictures --------------------------------------------------------------------------
     def picture(self) -> None:
         """Ask for the options of a picture, then for a file name, and write the picture."""
-        if self._session.mesh is None:
-            return
         view = self.window.viewing
         settings = self.window.settings
         with self._renderer() as renderer:
@@ -111,8 +109,6 @@ class Exports(QObject):
 
     def copy_picture(self) -> None:
         """Copy a picture of the view to the clipboard, with a white background."""
-        if self._session.mesh is None:
-            return
         size = self._size()
         with self._renderer() as renderer, wait_cursor():
             options = PictureOptions(

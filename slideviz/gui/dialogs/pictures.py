@@ -46,7 +46,6 @@ from slideviz.gui.widgets.build import (
     QuietBar,
     as_widget,
     check_box,
-    decimal_box,
     dialog_buttons,
     hint_label,
     in_column,
@@ -309,8 +308,8 @@ class PictureDialog(PixelFields, PreviewDialog):
     # Parts -----------------------------------------------------------------------------
     def _make_size(self) -> None:
         self._make_pixels(PICTURE_SIZES)
-        self.width_cm = decimal_box(1.0, 200.0, PAPER[0], self._changed, unit=" cm")
-        self.height_cm = decimal_box(1.0, 200.0, PAPER[1], self._changed, unit=" cm")
+        self.width_cm = number_box(1.0, 200.0, PAPER[0], self._changed, unit=" cm")
+        self.height_cm = number_box(1.0, 200.0, PAPER[1], self._changed, unit=" cm")
         tip = "Pixels per inch on paper; journals ask for 300 or more."
         self.dpi = number_box(50, 1200, round(PAPER[2]), self._changed, unit=" dpi", tip=tip)
         self._form = QFormLayout()
@@ -444,8 +443,8 @@ class FilmForm(PixelFields, QWidget):
         self.kind = Choice(FILM_KINDS)
         self.kind.chosen.connect(self._kind_chosen)
         self._make_pixels(SIZE_WORDS)
-        self.fps = decimal_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
-        self.hold = decimal_box(
+        self.fps = number_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
+        self.hold = number_box(
             0.0,
             60.0,
             FilmOptions().hold,

@@ -417,15 +417,6 @@ def check_box(text: str, tip: str, toggled: Slot | None = None, name: str = "") 
 
 
 def number_box(
-    low: int, high: int, value: int, changed: Slot | None = None, *, unit: str = "", tip: str = ""
-) -> QSpinBox:
-    """Return a spin box for a whole number from ``low`` to ``high``, with its unit as suffix."""
-    box = QSpinBox()
-    box.setRange(low, high)
-    return _completed(box, value, changed, unit, tip)
-
-
-def decimal_box(
     low: float,
     high: float,
     value: float,
@@ -433,15 +424,13 @@ def decimal_box(
     *,
     unit: str = "",
     tip: str = "",
-) -> QDoubleSpinBox:
-    """Return a spin box for a number with one decimal, from ``low`` to ``high``, with its unit."""
-    box = QDoubleSpinBox()
+) -> Any:
+    """Return a spin box for a number from ``low`` to ``high``, with its unit as suffix.
+
+    For whole numbers if ``low`` is an int, else for numbers with one decimal.
+    """
+    box: Any = QSpinBox() if isinstance(low, int) else QDoubleSpinBox(decimals=1)
     box.setRange(low, high)
-    box.setDecimals(1)
-    return _completed(box, value, changed, unit, tip)
-
-
-def _completed(box: Any, value: float, changed: Slot | None, unit: str, tip: str) -> Any:
     box.setValue(value)
     box.setSuffix(unit)
     box.setToolTip(tip)

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, 
 
 from slideviz.formats.table import FILE_FORMATS, MeshFormat, formats_for, readable_patterns
 from slideviz.gui.responsiveness.timers import ROWS_MS
-from slideviz.gui.widgets.build import Choice, decimal_box, dialog_buttons, hint_label
+from slideviz.gui.widgets.build import Choice, dialog_buttons, hint_label, number_box
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
 from slideviz.session.session_file import ENDING
@@ -203,8 +203,8 @@ def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, floa
     dialog = QDialog(parent)
     dialog.setWindowTitle("Size of the picture")
     form = QFormLayout(dialog)
-    wide = decimal_box(4.0, 100.0, width, unit=" cm")
-    high = decimal_box(4.0, 100.0, height, unit=" cm")
+    wide = number_box(4.0, 100.0, width, unit=" cm")
+    high = number_box(4.0, 100.0, height, unit=" cm")
     form.addRow("Width", wide)
     form.addRow("Height, at most", high)
     kinds = QDialogButtonBox.StandardButton
