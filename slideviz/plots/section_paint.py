@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError, not_one_of
-from slideviz.mesh.metrics import metric
+from slideviz.mesh.metrics import rated_metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import walls
@@ -161,8 +161,7 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
         ends = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
         return Paint(by, values, inverted, rounded_out(*ends))
     if by != "displacement":
-        rated = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}
-        values = rated[by] if by in rated else metric(mesh, cast(Metric, by), reference).of_cells
+        values = rated_metric(mesh, cast(Metric, by), reference, quality).of_cells
         painted = Paint(by, values, inverted, RATED[by].colors or RATED[by].range)
         return painted.up_to(np.arange(len(values))) if painted.unbounded else painted
     if reference is None or reference.points.shape != mesh.points.shape:
