@@ -13,7 +13,7 @@ from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, style_axes
+from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 from slideviz.session.design_table import DesignTable
 
 if TYPE_CHECKING:
@@ -139,9 +139,7 @@ def against_designs(
     if any(curve.inverted.any() for curve in curves):
         axes.plot([], [], "x", color=style.alarm, label="inverted")
     if what == "quality" and curves:
-        for word, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
-            dot: dict[str, Any] = {"markerfacecolor": face, "color": style.scheme.text}
-            axes.plot([], [], "o", markersize=5, label=word, **dot)
+        add_dots(axes, style)
     words = curves[0].words if curves else ()
     if words:
         every = -(-len(words) // _MOST_WORDS)
@@ -176,15 +174,9 @@ def _draw_curve(
     axes: Axes, curve: DesignCurve, style: Style, series: int | None, *, mean: bool
 ) -> None:
     """Draw a curve in the look of a series; ``series`` None: points only, all in one look."""
-    look = style.series(series or 0)
-    joined = series is not None and len(curve.places) > 1
-    line: dict[str, Any] = {
-        "color": look.color,
-        "linestyle": look.dash if joined else "",
-        "linewidth": style.width,
-        "marker": look.marker,
-        "markersize": 4.5,
-    }
+    line = style.line(series or 0)
+    if series is None or len(curve.places) < 2:
+        line["linestyle"] = ""
     label = curve.label if series is not None and curve.label else None
     sound: dict[str, Any] = {"markevery": np.flatnonzero(~curve.inverted).tolist()}
     curve_id = f"curve:{curve.label}"

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.ticker import NullLocator
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, style_axes
+from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,7 +73,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
     """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
     style_axes(axes, style, "step [-]", "quality [-]")
     for index, run in enumerate(runs):
-        look = _line(style, run.series)
+        look = style.line(run.series)
         # Some markers are enough for many steps; those of each run are at other steps.
         every = max(1, len(run.steps) // 6)
         last = len(run.steps) - 1
@@ -81,14 +81,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
         hollow = {**look, "markerfacecolor": style.scheme.background}
         axes.plot(run.steps, run.minimum, label=run.label, gid=f"minimum:{run.label}", **look)
         axes.plot(run.steps, run.mean, gid=f"mean:{run.label}", **hollow)
-    for what, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
-        dot: dict[str, Any] = {
-            "marker": "o",
-            "markersize": 5,
-            "linestyle": "",
-            "color": style.scheme.text,
-        }
-        axes.plot([], [], label=what, markerfacecolor=face, **dot)
+    add_dots(axes, style)
     _quality_limits(axes, [v for run in runs for v in (*run.minimum, *run.mean)])
     axes.locator_params(axis="x", integer=True)
     add_legend(axes, style)
@@ -105,7 +98,7 @@ def convergence(axes: Axes, runs: Sequence[GreedyRun], style: Style = PRINT) -> 
     for run in runs:
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
-        line = _line(style, run.series)
+        line = style.line(run.series)
         begins = np.flatnonzero(first[shown])
         line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()
         line["markersize"] = 3.5
@@ -147,7 +140,7 @@ def against_steps(
         steps = np.array([row.steps for row in mine])
         values = np.array([float(getattr(row, what)) for row in mine])
         bad = np.array([row.inverted > 0 for row in mine]) & (what in ("minimum", "mean"))
-        line = _line(style, mine[0].series)
+        line = style.line(mine[0].series)
         axes.plot(steps, np.where(bad, np.nan, values), label=label, **line)
         if bad.any():  # an empty line that is not clipped would spoil the layout
             cross = {"color": line["color"], "linestyle": "", "marker": "x", "markersize": 6}
@@ -161,20 +154,6 @@ def against_steps(
         axes.set_ylim(bottom=0)
     _step_ticks(axes, sorted({row.steps for row in rows}))
     add_legend(axes, style)
-
-
-def _line(style: Style, index: int) -> dict[str, Any]:
-    """Return the arguments of ``Axes.plot`` for a series number."""
-    look = style.series(index)
-    return {
-        "color": look.color,
-        "linestyle": look.dash,
-        "linewidth": style.width,
-        "marker": look.marker,
-        "markersize": 4.5,
-        "markerfacecolor": look.color,
-        "markeredgewidth": 1.0,
-    }
 
 
 def _ratio(values: Sequence[float]) -> float:

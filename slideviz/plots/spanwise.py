@@ -130,20 +130,15 @@ def spanwise(
     style_axes(axes, style, f"{what} quality [-]", f"{coordinate} [mesh units]")
     ends = []
     for index, profile in enumerate(profiles):
-        look = style.series(profile.series)
         values: FloatArray = getattr(profile, what)
         there = np.isfinite(values)
         axes.plot(
             values[there],
             profile.position[there],
-            color=look.color,
-            linestyle=look.dash,
-            linewidth=style.width,
-            marker=look.marker,
-            markersize=4,
             # Shifted, so that markers of coinciding lines are side by side.
             markevery=(index, max(len(profiles), int(there.sum()) // 8)),
             label=profile.label,
+            **(style.line(profile.series) | {"markersize": 4}),
         )
         ends += [profile.edges[0], profile.edges[-1]]
     axes.set_xlim(0.0, 1.02)

@@ -72,6 +72,19 @@ class Style:
             _DASHES[(index + 2 * turn) % len(_DASHES)],
         )
 
+    def line(self, index: int) -> dict[str, Any]:
+        """Return the line of a series with markers, as arguments of matplotlib."""
+        look = self.series(index)
+        return {
+            "color": look.color,
+            "linestyle": look.dash,
+            "linewidth": self.width,
+            "marker": look.marker,
+            "markersize": 4.5,
+            "markerfacecolor": look.color,
+            "markeredgewidth": 1.0,
+        }
+
     @property
     def letters(self) -> dict[str, Any]:
         """Return size and color of letters, as arguments of matplotlib."""
@@ -109,6 +122,13 @@ def style_axes(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
     for letters in (axes.xaxis.get_offset_text(), axes.yaxis.get_offset_text()):
         letters.set_fontsize(size)
         letters.set_color(text)
+
+
+def add_dots(axes: Axes, style: Style) -> None:
+    """Add the signs of minimum and mean to the legend."""
+    for word, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
+        dot: dict[str, Any] = {"markerfacecolor": face, "color": style.scheme.text}
+        axes.plot([], [], "o", markersize=5, label=word, **dot)
 
 
 def add_legend(axes: Axes, style: Style, **options: Any) -> None:

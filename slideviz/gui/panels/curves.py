@@ -57,11 +57,9 @@ class CurveCanvas(PlotCanvas):
     While ``draggable``, a line with this value, in percent, follows the mouse until then.
     """
 
-    def __init__(self, drawing: Callable[[], Draw]) -> None:
-        super().__init__(drawing)
-        self.picked: Callable[[float], None] = lambda _: None
-        self.draggable = False
-        self._line: float | None = None
+    picked: Callable[[float], None]
+    draggable = False
+    _line: float | None = None
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self.draggable and event.buttons() & Qt.MouseButton.LeftButton and self._has_axes:

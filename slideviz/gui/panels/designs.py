@@ -262,10 +262,6 @@ class DesignCanvas(PlotCanvas):
 
     picked: Callable[[float, float], None]
 
-    def __init__(self, drawing: Callable[[], Draw]) -> None:
-        super().__init__(drawing)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton or self.wiped or not self.figure.axes:
             return
@@ -294,6 +290,7 @@ class DesignPlot(QWidget):
         )
         self.canvas = DesignCanvas(self.drawing)
         self.canvas.picked = self._picked
+        self.canvas.setCursor(Qt.CursorShape.PointingHandCursor)
         self.area = PlotArea(self.canvas)
         head = in_row(self.what, self.across, wide=[self.what, self.across], spacing=4)
         in_column(head, self.area, wide=[self.area], spacing=4, on=self)
