@@ -216,11 +216,6 @@ def is_3d(now: CommandState) -> bool:
     return has_mesh(now) and not is_2d(now)
 
 
-def has_boundary_target(now: CommandState) -> bool:
-    """Return whether there are selected or moving boundaries."""
-    return has_mesh(now) and bool(target_boundaries(now.session))
-
-
 def target_boundaries(session: Session) -> tuple[str, ...]:
     """Return the boundaries a command acts on: the selected ones, or else those that move."""
     return session.view.selected or session.case.markers_with("moving")
@@ -246,25 +241,10 @@ def is_idle(now: CommandState) -> bool:
     return has_mesh(now) and not now.busy
 
 
-def needs_repair(now: CommandState) -> bool:
-    """Return whether a mesh in memory has cells to mend, and no job runs."""
-    return is_idle(now) and to_mend(now.session) is not None
-
-
 def has_file(now: CommandState) -> bool:
     """Return whether there is a mesh in memory whose case is saved."""
     session = now.session
     return has_mesh(now) and session.case_file is not None and not session.lacks_cells
-
-
-def has_section(now: CommandState) -> bool:
-    """Return whether a section of a saved case is selected."""
-    return has_file(now) and now.session.view.section is not None
-
-
-def has_run_of_file(now: CommandState) -> bool:
-    """Return whether the shown run of a saved case has steps."""
-    return has_file(now) and has_steps(now)
 
 
 def has_steps_and_is_idle(now: CommandState) -> bool:
@@ -277,11 +257,6 @@ def can_continue(now: CommandState) -> bool:
     mesh = now.session.mesh
     whole = mesh is not None and len(mesh.parts) == mesh.zones and not now.session.lacks_cells
     return whole and has_steps_and_is_idle(now)
-
-
-def has_wheel(now: CommandState) -> bool:
-    """Return whether periodic boundaries make the mesh a passage of a wheel, and no job runs."""
-    return is_idle(now) and bool(wheel_passages(now.session))
 
 
 def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], bool]:
@@ -384,7 +359,8 @@ _FILE = Menu("file", "&File", entries=(
             call("files.save_mesh"), (KEY.Save,), "save", in_memory(is_idle)),
     Command("save_wheel", "Save as &wheel…",
             "Save the step that is shown as a wheel: its passages side by side, in one mesh.",
-            call("exports.wheel"), enabled=in_memory(has_wheel),
+            call("exports.wheel"),
+            enabled=in_memory(lambda now: is_idle(now) and bool(wheel_passages(now.session))),
             why_not="The mesh is not a passage of a wheel: two boundaries of its only zone must be "
             "periodic, by a whole part of a turn."),
     Command("save_case", "Save &case as…",
@@ -407,9 +383,11 @@ _COPY_AS = Menu("copy_as", "&Copy as", "Copy what makes again what is shown, to 
     for what, title, about, keys, able, why in (
         ("picture", "&view", "the picture of the view, with the run it shows,",
          (("Ctrl+Alt+C", "Ctrl+Alt+P")[place],), has_file, _NO_FILE),
-        ("section", "&section", "the picture of the selected section", (), has_section,
+        ("section", "&section", "the picture of the selected section", (),
+         lambda now: has_file(now) and now.session.view.section is not None,
          "Select a section of a saved case first."),
-        ("film", "&film", "the film of the steps", (), has_run_of_file,
+        ("film", "&film", "the film of the steps", (),
+         lambda now: has_file(now) and has_steps(now),
          "Save the case (Ctrl+Shift+S) and run it first."),
         ("run", "&run", "the run", (), has_file, _NO_FILE),
     )
@@ -445,7 +423,8 @@ _RUN = Menu("run", "&Run", entries=(
     Command("repair", "Re&pair",
             "Mend the inverted and poor cells of the last step of the run that is shown, or of the "
             "mesh: by moving nodes near them, never nodes of moving and fixed boundaries.",
-            call("running.repair"), ("F7",), enabled=needs_repair,
+            call("running.repair"), ("F7",),
+            enabled=lambda now: is_idle(now) and to_mend(now.session) is not None,
             why_not="No cell needs repair: all are proved valid, and their quality is above the "
             "limit in the method panel."),
     Command("continue_run", "C&ontinue from this run…",
@@ -562,7 +541,8 @@ _VIEW = Menu("view", "&View", entries=(
     Command("fit_boundary", "Fit to &boundary",
             "Zoom to the selected boundaries, or else those that move.",
             lambda w: w.viewing.fit(target_boundaries(w.store.session)),
-            ("Shift+F",), enabled=has_boundary_target,
+            ("Shift+F",),
+            enabled=lambda now: has_mesh(now) and bool(target_boundaries(now.session)),
             why_not="No boundary is selected, and none moves."),
     _SIDES,
     COMPARE,

@@ -18,6 +18,7 @@ from slideviz.scene.sections import Instances, PolygonActor
 from slideviz.scene.stage import Stage
 from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
+from slideviz.sections.plane import Box, union
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import Label
 from slideviz.session.colors import with_drawable_colors
@@ -199,7 +200,7 @@ class FlatScene:
         if self.section is not None and self.session.frame is not None:
             self.update(self.session, self.section)
 
-    def bounds(self) -> tuple[FloatArray, FloatArray] | None:
+    def bounds(self) -> Box | None:
         """Return the lower and upper corner (2,) of the section and its instances; None if empty.
 
         Cells outside the threshold count too.
@@ -212,9 +213,7 @@ class FlatScene:
             for instance in self._instances.drawn.values()
         ]
         parts.append(points)
-        low = np.min([part.min(axis=0) for part in parts], axis=0)
-        high = np.max([part.max(axis=0) for part in parts], axis=0)
-        return low[:2], high[:2]
+        return union([(part.min(axis=0)[:2], part.max(axis=0)[:2]) for part in parts])
 
     def fit(self) -> None:
         """Make the section (and that of ``beside``) fill the view."""
@@ -222,8 +221,7 @@ class FlatScene:
         boxes = [box for box in (scene.bounds() for scene in scenes) if box is not None]
         if not boxes:
             return
-        low = np.min([box[0] for box in boxes], axis=0)
-        high = np.max([box[1] for box in boxes], axis=0)
+        low, high = union(boxes)
         width, height = self.stage.plotter.window_size
         extent = np.maximum(high - low, 1e-300)
         half = max(extent[1], extent[0] * height / max(width, 1)) / 2.0 / FILL

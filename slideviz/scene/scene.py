@@ -36,12 +36,11 @@ NEAR = 8.0  # height of the view after flying to a cell, in sizes of the cell
 class Scene:
     """Draws the state of a session into a plotter.
 
-    ``plotter``: where to draw. ``scheme``: colors of background, text and edges. ``font_scale``:
-    factor of the letters' size, for pictures of many pixels.
+    ``plotter``: where to draw. ``scheme``: colors of background, text and edges.
     """
 
-    def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
-        self.stage = Stage(plotter, scheme, font_scale)
+    def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT) -> None:
+        self.stage = Stage(plotter, scheme)
         self._cells = CellLayer(self.stage)
         self._boundaries = BoundaryLayer(self.stage)
         self._threshold = ThresholdLayer(self.stage, self._cells)

@@ -17,7 +17,7 @@ from slideviz.scene.mesh import recolored
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
-from slideviz.sections.plane import Box, box_around
+from slideviz.sections.plane import Box, box_around, union
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, matrices, period_of
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
@@ -135,9 +135,7 @@ class SectionLayer(Layer):
         """Return the corners of the box around a 2D mesh and its neighbouring passages."""
         nodes = mesh.points[self.cuts.cutter(mesh).used]
         every = [nodes, *(transformed(nodes, matrix) for matrix in neighbours.values())]
-        boxes = [box_around(points) for points in every]
-        low = np.min([box[0] for box in boxes], axis=0)
-        return low, np.max([box[1] for box in boxes], axis=0)
+        return union([box_around(points) for points in every])
 
     def _neighbours(self, session: Session) -> dict[int, FloatArray]:
         return matrices(session, period_of(session) if session.view.passages else None)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import LIGHT, VALUE_EDGE, ColorScheme
+from slideviz.color_scheme import VALUE_EDGE, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.plots.section_paint import clipped
@@ -80,10 +80,10 @@ class KeyedLayer(Layer):
 class Stage:
     """The plotter of a scene, and what its layers share."""
 
-    def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
+    def __init__(self, plotter: Any, scheme: ColorScheme) -> None:
         self.plotter = plotter
         self.scheme = scheme  # Colors of background, text and edges
-        self.font_scale = font_scale  # factor of the letters' size, for pictures of many pixels
+        self.font_scale = 1.0  # factor of the letters' size, for pictures of many pixels
         self.table = lookup_table()
         """The colors of values, and of inverted cells (NaN); changed in place."""
         self.point_words: tuple[tuple[str, str], ...] = ()

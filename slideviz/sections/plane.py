@@ -6,7 +6,7 @@ The first line of a function says what it is for a plane; shapes of arrays are i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -36,6 +36,12 @@ def box_around(points: FloatArray) -> Box:
     high = points[:, :2].max(axis=0)
     room = MARGIN * float((high - low).max())
     return low - room, high + room
+
+
+def union(boxes: Sequence[Box]) -> Box:
+    """Return the smallest box that contains all boxes, in 2D or 3D."""
+    low = np.min([box[0] for box in boxes], axis=0)
+    return low, np.max([box[1] for box in boxes], axis=0)
 
 
 class Line(InPlane):

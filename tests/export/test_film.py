@@ -323,7 +323,8 @@ def test_the_view_is_filmed_with_its_camera_and_one_color_range(tmp_path, ran):
     mesh = ran.mesh
     surfaces = find_surfaces(mesh)
     with offscreen(SMALL) as plotter:
-        like = Scene(plotter, PAPER, font_scale(SMALL))
+        like = Scene(plotter, PAPER)
+        like.stage.font_scale = font_scale(SMALL)
         like.open(ran, surfaces)
         plotter.camera.parallel_scale *= 3.0
         drawing = film_of(ran, tmp_path / "v%d.png", FilmOptions(SMALL), like=like)

@@ -15,7 +15,7 @@ SIZE = 240
 @pytest.fixture
 def stage():
     plotter = pv.Plotter(off_screen=True, window_size=[SIZE, SIZE])
-    yield Stage(plotter)
+    yield Stage(plotter, LIGHT)
     plotter.close()
 
 

@@ -220,14 +220,7 @@ class CheckedField(TextField):
 
     def mark(self) -> None:
         """Mark the field as invalid, with the reason as tooltip, or as valid again."""
-        problem = self.problem or self.together
-        self.setToolTip(wrapped(problem or self._tip))
-        set_style(self, "bad", bool(problem))
-        if problem != self.fault:
-            self.fault = problem
-            if not problem:
-                _clear_report(self)
-            self.marked.emit()
+        _mark(self)
 
 
 class CheckedText(CheckedField):
@@ -413,12 +406,11 @@ class NumberBox(QSpinBox):
 
     def __init__(self) -> None:
         super().__init__()
-        self._tip = ""
-        self.fault = ""
+        self._tip = self.fault = self.together = ""
         self._before = self.value()
         # No single signal covers each change of the text, by the user or by the program.
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
-            change.connect(lambda *_: self._validate())
+            change.connect(lambda *_: _mark(self))
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
         """Accept every character, so that 2.5 is not typed as 25."""
@@ -441,7 +433,7 @@ class NumberBox(QSpinBox):
         if self.fault:
             with QSignalBlocker(self):
                 self.setValue(self.value())
-            self._validate()
+            _mark(self)
 
     def event(self, event: QEvent) -> bool:
         handled = _undo_in_field(self.lineEdit(), event)
@@ -450,7 +442,7 @@ class NumberBox(QSpinBox):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.fault and event.key() == Qt.Key.Key_Escape:
             self.setValue(self._before)
-            self._validate()
+            _mark(self)
         # Return would replace an invalid text by a number that nobody typed.
         elif not self.fault or event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
@@ -460,7 +452,7 @@ class NumberBox(QSpinBox):
             # The beginning of the text for the lowest value; what is added is selected.
             self.setValue(self.minimum())
             self.lineEdit().setSelection(len(typed), len(word))
-            self._validate()
+            _mark(self)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.fault:
@@ -485,21 +477,23 @@ class NumberBox(QSpinBox):
         if self.value() != value:
             with QSignalBlocker(self):
                 self.setValue(value)
-            self._validate()
+            _mark(self)
 
     def set_tip(self, text: str) -> None:
         self._tip = text
-        self.setToolTip(wrapped(self.fault or text))
+        _mark(self)
 
-    def _validate(self) -> None:
-        fault = self.problem
-        if fault != self.fault:
-            self.fault = fault
-            if not fault:
-                _clear_report(self)
-            self.set_tip(self._tip)
-            set_style(self, "bad", bool(fault))
-            self.marked.emit()
+
+def _mark(field: CheckedField | NumberBox) -> None:
+    """Mark a field as invalid, with the reason as tooltip, or as valid again."""
+    problem = field.problem or field.together
+    field.setToolTip(wrapped(problem or field._tip))
+    set_style(field, "bad", bool(problem))
+    if problem != field.fault:
+        field.fault = problem
+        if not problem:
+            _clear_report(field)
+        field.marked.emit()
 
 
 def unless(holds: Callable[[Any], object], why: str) -> Callable[[Any], str]:
