@@ -368,20 +368,18 @@ class Files(QObject):
         case = session.case
         if self._saved_to is not None and format_for(self._saved_to).solver:
             case = case.change(mesh_out=self._saved_to)
-        try:
+        with self.window.banner.showing_errors():
             view_to_case(replace(session, case=case), self.window.scene.camera.view).write(path)
-        except (OSError, SlidevizError) as error:
-            self.window.banner.show_error(error)
-            return False
-        self.window.store.change(changes.saved_case, replace(case, source=path))
-        self.remember(path)
-        self.window.show_status(f"Saved {path}")
-        if case.mesh_file is not None and not case.mesh_file.is_file():
-            self.window.banner.show_message(
-                f"Saved. But its mesh {case.mesh_file} no longer exists: the case cannot be "
-                f"opened without it. Put it back, or save the mesh under that name (step 0)."
-            )
-        return True
+            self.window.store.change(changes.saved_case, replace(case, source=path))
+            self.remember(path)
+            self.window.show_status(f"Saved {path}")
+            if case.mesh_file is not None and not case.mesh_file.is_file():
+                self.window.banner.show_message(
+                    f"Saved. But its mesh {case.mesh_file} no longer exists: the case cannot be "
+                    f"opened without it. Put it back, or save the mesh under that name (step 0)."
+                )
+            return True
+        return False
 
     def _copy_sample_files(self, path: Path) -> bool:
         """Copy the files of a sample, which are in a cache, beside the case that is being saved.
@@ -392,16 +390,14 @@ class Files(QObject):
         there = [target for target in moved.values() if target.exists()]
         if there and not questions.ask_replace(self.window, there):
             return False
-        try:
+        with self.window.banner.showing_errors():
             for file, target in moved.items():
                 with atomic_write(target) as out:
                     out.write(file.read_bytes())
-        except (OSError, SlidevizError) as error:
-            self.window.banner.show_error(error)
-            return False
-        if moved:
-            self.window.store.change(changes.moved_files, moved)
-        return True
+            if moved:
+                self.window.store.change(changes.moved_files, moved)
+            return True
+        return False
 
 
 def sample_folder() -> Path:

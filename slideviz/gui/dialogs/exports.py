@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from qtpy.QtCore import QObject
 from qtpy.QtWidgets import QApplication, QWidget
 
-from slideviz.errors import SlidevizError
 from slideviz.export.flat_section import save_section
 from slideviz.export.html_report import write_html_report
 from slideviz.export.offscreen import LETTERS
@@ -96,16 +95,13 @@ class Exports(QObject):
     def _write_picture(
         self, renderer: OffscreenRenderer, options: PictureOptions, path: Path
     ) -> None:
-        try:
+        with self.window.banner.showing_errors():
             with wait_cursor():
                 if path.suffix.lower() in SUFFIXES:
                     write_vector(renderer, options, path)
                 else:
                     renderer.write(options, path)
-        except (OSError, SlidevizError) as error:
-            self.window.banner.show_error(error)
-            return
-        self._written(path)
+            self._written(path)
 
     def copy_picture(self) -> None:
         """Copy a picture of the view to the clipboard, with a white background."""
@@ -123,14 +119,11 @@ class Exports(QObject):
     def copy_as(self, what: str, place: int) -> None:
         """Copy the command (``place`` 0) or the program (1) that makes again what is shown."""
         camera = self.window.viewing.scene.camera.view
-        try:
+        with self.window.banner.showing_errors():
             made = SCRIPTS[what](self._session, camera, self._size())
-        except (OSError, SlidevizError) as error:
-            self.window.banner.show_error(error)
-            return
-        QApplication.clipboard().setText(made[place])
-        line = made[place].splitlines()[-place]  # a command's first line, a program's last
-        self.window.show_status("Copied: " + line.removesuffix(" \\"))
+            QApplication.clipboard().setText(made[place])
+            line = made[place].splitlines()[-place]  # a command's first line, a program's last
+            self.window.show_status("Copied: " + line.removesuffix(" \\"))
 
     def section(self, paper: SectionStyle) -> None:
         """Ask for a file name, and write a picture of the selected section."""
@@ -145,13 +138,10 @@ class Exports(QObject):
     def report(self) -> None:
         """Ask for a file name, and write a report of the runs as one HTML file."""
         if path := self._ask("Save report", "_report.html", "HTML page (*.html)"):
-            with self._renderer() as renderer, wait_cursor():
-                try:
+            with self.window.banner.showing_errors():
+                with self._renderer() as renderer, wait_cursor():
                     write_html_report(path, renderer)
-                except SlidevizError as error:
-                    self.window.banner.show_error(error)
-                    return
-            self._written(path)
+                self._written(path)
 
     # Films -----------------------------------------------------------------------------
     def make_film(self) -> None:

@@ -341,10 +341,8 @@ class MotionPanel(Panel):
     def _copy(self) -> None:
         """Copy the selected motion to the clipboard, written as in a case file."""
         motion = self.session.case.motions[self.list.currentRow()]
-        try:
+        with self.services.banner.showing_errors():
             QApplication.clipboard().setText(write_motions((motion,)))
-        except SlidevizError as error:
-            self.services.banner.show_error(error)
 
     def _paste(self) -> None:
         """Add the motions in the clipboard, as written in a case file, below the selected one."""
@@ -388,12 +386,10 @@ class MotionPanel(Panel):
         folder = beside.parent if beside is not None else self.services.files.folder()
         names = named(marker)
         default = folder / f"displacement_{names[0] if len(names) == 1 else 'moving'}.txt"
-        try:
+        with self.services.banner.showing_errors():
             rows = TableRows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
-        except SlidevizError as error:
-            self.services.banner.show_error(error)
-            return None
+        return None
 
     def _edited(self, motion: object) -> None:
         self.change(changes.replace_motion, self.list.currentRow(), motion)

@@ -6,7 +6,8 @@ Its colors are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#bann
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 
 from qtpy.QtCore import Qt, Signal
@@ -111,6 +112,14 @@ class Banner(QFrame):
             kind = type(error).__name__
             text = f"Something unexpected went wrong ({kind}): {error}"
             self.show_message(text, details_of(error), calm=False)
+
+    @contextmanager
+    def showing_errors(self) -> Iterator[None]:
+        """Show an error of a file or of slideviz that is raised within, and go on after it."""
+        try:
+            yield
+        except (OSError, SlidevizError) as error:
+            self.show_error(error)
 
     def withdraw(self, text: str) -> None:
         """Hide the banner if it still shows this message."""
