@@ -133,15 +133,18 @@ def span_between(
     return find_straight_span(mesh, *ends, direction, pitch)
 
 
+def periodic_pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
+    """Return the pairs that the periodic boundaries of a case form; MeshError if they do not."""
+    names = case.markers_with("periodic")
+    inside = without_halo(mesh)[0]
+    return pair_up(inside, names, case.periodic_type, case.axis, case.origin) if names else ()
+
+
 def span_field(case: Case, mesh: Mesh) -> Span:
     """Return the span between hub and shroud, or root and tip, of a mesh of one zone; cached.
 
     Raises CaseError or MeshError where there is none.
     """
-    sides = case.markers_with("periodic")
     ends = span_ends(case, mesh)
-    pair: Pair | None = None
-    if sides and mesh.dim == 3:
-        inside = without_halo(mesh)[0]
-        pair = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)[0]
-    return span_between(case, mesh, ends, pair)
+    pairs = periodic_pairs(case, mesh) if mesh.dim == 3 else ()
+    return span_between(case, mesh, ends, pairs[0] if pairs else None)

@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.case.spans import periodic_pairs
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.periodic import Pair, agree, find_pairs, pair_up
+from slideviz.mesh.periodic import Pair, agree, find_pairs
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange, Polygons
@@ -56,11 +57,8 @@ def find_periods(
         named = sum(guess is not None and guess.role == "periodic" for guess in guesses)
         return -named, pair.kind != "rotational"
 
-    sides = case.markers_with("periodic") if case is not None else ()
-    if case is not None and sides:
-        every: Sequence[Pair] = pair_up(mesh, sides, case.periodic_type, case.axis, case.origin)
-    else:
-        every = sorted(find_pairs(mesh) if pairs is None else pairs, key=rank)
+    every: Sequence[Pair] = periodic_pairs(case, mesh) if case is not None else ()
+    every = every or sorted(find_pairs(mesh) if pairs is None else pairs, key=rank)
     zones = [mesh.marker_names[part.markers] for part in mesh.parts]
     first = [next((pair for pair in every if pair.first in names), None) for names in zones]
     return tuple(pair for pair in first if pair is not None)

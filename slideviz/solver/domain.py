@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.case.spans import periodic_pairs
 from slideviz.errors import MeshError, Message, Remark, note
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
@@ -15,7 +16,7 @@ from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.nearest import near_duplicates
-from slideviz.mesh.periodic import Pair, pair_up, turned_too
+from slideviz.mesh.periodic import Pair, turned_too
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.classify import Classes, classify, directions, fan_roles
 from slideviz.rbf.frames import Frame, hold_on_axis, make_frame, on_axis
@@ -152,8 +153,10 @@ def find_period(
     the system; of a node without images, itself (`Classes.representative`). Raises MeshError if
     periodic markers do not match.
     """
-    pairs = _pairs(case, without_halo(mesh)[0])
     periodic = case.periodic != "none"
+    # A rotational case needs them also without images: they give the cylindrical frame.
+    needed = periodic or case.periodic_type == "rotational"
+    pairs = periodic_pairs(case, mesh) if needed else ()
     inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
     frame, coords = make_frame(inside, pairs, periodic_distance=periodic)
     if mesh.halo is not None:
@@ -162,17 +165,6 @@ def find_period(
         pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent
     )
     return pairs, frame, coords, representative
-
-
-def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
-    """Return the periodic pairs of the case; none where neither images nor frame need them.
-
-    With PERIODIC_MODE= none a rotational case needs them still: they give the cylindrical frame.
-    """
-    names = case.markers_with("periodic")
-    if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
-        return ()
-    return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
 
 
 def _ambiguous_period(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> tuple[Message, ...]:

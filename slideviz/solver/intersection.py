@@ -11,6 +11,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import moving_nodes
+from slideviz.case.spans import periodic_pairs
 from slideviz.errors import CaseError, Message
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
@@ -18,7 +19,6 @@ from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swep
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
-from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import facet_vectors, unit
 from slideviz.solver.domain import find_period
 from slideviz.system.jit_cache import njit
@@ -263,10 +263,10 @@ def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Itera
 
     A translational image is left out where its range along the period misses that of ``around``.
     """
-    names = case.markers_with("periodic")
-    if case.periodic not in ("fixed", "moving") or not names:
+    pairs = periodic_pairs(case, mesh) if case.periodic in ("fixed", "moving") else ()
+    if not pairs:
         return
-    pair = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+    pair = pairs[0]
     if pair.kind == "translational":
         along = pair.vector / pair.period**2
         far = at @ along

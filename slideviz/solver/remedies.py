@@ -9,11 +9,12 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone, displacements
+from slideviz.case.spans import periodic_pairs
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import SlidevizError, doubts_of, messages_of
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
-from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.steps import Step
 from slideviz.terms import SLIDES
@@ -114,12 +115,9 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
 
 
 def _beyond_pitch_of_zone(case: Case, mesh: Mesh) -> str:
-    names = case.markers_with("periodic")
-    if not names:
-        return ""
     try:
+        pairs = periodic_pairs(case, mesh)
         moved = displacements(case, mesh)
-        pairs = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
     except SlidevizError:  # the run itself reports what is wrong
         return ""
     for pair in pairs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,9 +12,9 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from slideviz.case.model import Case
+from slideviz.case.spans import periodic_pairs
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import BoolArray, FloatArray, Mesh
-from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.draw import (
     GreedyRun,
@@ -91,14 +92,11 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
     axis = case.axis
     origin = case.origin
     turns = False
-    names = case.markers_with("periodic")
-    if names and span in (None, "r"):
-        try:
-            first = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
-            turns = first.kind == "rotational"
-            axis, origin = (first.axis, first.origin) if turns else (axis, origin)
-        except (MeshError, CaseError):
-            pass  # the rows say it
+    if span in (None, "r"):
+        with suppress(MeshError, CaseError):  # the rows say it
+            for first in periodic_pairs(case, mesh)[:1]:
+                turns = first.kind == "rotational"
+                axis, origin = (first.axis, first.origin) if turns else (axis, origin)
     if span is None and mesh.dim == 2:
         return None
     where = span or ("r" if turns else "z")

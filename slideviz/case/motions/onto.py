@@ -15,6 +15,7 @@ import numpy as np
 from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
+from slideviz.case.spans import periodic_pairs
 from slideviz.case.words import Word, number
 from slideviz.errors import CaseError, MeshError, Message, printable
 from slideviz.formats.files import read as read_mesh
@@ -23,9 +24,7 @@ from slideviz.machine.onto import AGREE, Laid, Nearest, Wall, find_edges, lay_on
 from slideviz.machine.onto import Target as TargetSurface
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import unit
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
@@ -216,11 +215,9 @@ def _walls(
 
     They are surfaces of the frame, as an annulus is round, and go on flat beyond the rim.
     """
-    inside = without_halo(mesh)[0]
-    sides = case.markers_with("periodic")
-    pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin) if sides else ()
+    pairs = periodic_pairs(case, mesh)
     frame, _ = make_frame(
-        inside.points, pairs, periodic_distance=case.periodic in ("fixed", "moving")
+        mesh.points, pairs, periodic_distance=case.periodic in ("fixed", "moving")
     )
     coords = frame.coords(mesh.points)
     boundary = boundary_of(mesh)

@@ -19,7 +19,7 @@ from slideviz.case.motions.motion import (
     place_words,
     without_brackets,
 )
-from slideviz.case.spans import span_field
+from slideviz.case.spans import periodic_pairs, span_field
 from slideviz.case.values import read_vector, vector_text
 from slideviz.case.words import Word, angle_deg, number
 from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
@@ -27,9 +27,7 @@ from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.smallest_distances import bodies
 from slideviz.machine.span import Span
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import pair_up
 from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import SPAN_KINDS, SpanKind, Term, Vector
 
@@ -311,10 +309,8 @@ def _turns(case: Case, mesh: Mesh, field: Span, triangles: IntArray) -> FloatArr
     ``triangles`` (t, 3): its facets, which periodic sides may cut.
     """
     out = np.zeros(len(mesh.points))
-    sides = case.markers_with("periodic")
-    if sides:
-        inside = without_halo(mesh)[0]
-        pairs = pair_up(inside, sides, case.periodic_type, case.axis, case.origin)
+    pairs = periodic_pairs(case, mesh)
+    if pairs:
         period = abs(field.shift(pairs[0]))
         if period == 0.0:  # passages repeat along the span
             return out
