@@ -109,7 +109,7 @@ class SolverSurface:
 
 def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface:
     """Return the surface of undeformed coordinates (N, d); CaseError if they are of another."""
-    boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
+    boundary = np.union1d(moving, mesh.nodes_of(mesh.marker_names))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
     far = np.asarray(distance)
     surface = SolverSurface(mesh, moving, boundary[found])
@@ -181,9 +181,9 @@ class USMesh:
                 "MPI.COMM_SELF, and the whole surface and grid"
             )
         mesh, case, displacements = _read(options or {})
-        moving = [mesh.marker(name).nodes for name in case.markers_with("moving")]
+        moving = case.markers_with("moving")
         if displacements is None and moving and not case.motions:
-            displacements = np.zeros((len(np.unique(np.concatenate(moving))), mesh.dim))
+            displacements = np.zeros((len(mesh.nodes_of(moving)), mesh.dim))
         self.comm = comm
         self.deformer = Deformer(mesh, case, displacements)
         nodes = np.asarray(self.deformer.nodes)

@@ -343,8 +343,7 @@ def zone_designs(
         part = mesh.parts[index]
         own = motion.cases[index]
         points = np.arange(part.points.start, part.points.stop)
-        on = [part.mesh.marker(name).nodes for name in own.markers_with("moving")]
-        mine = np.unique(np.concatenate(on)) + part.points.start
+        mine = part.mesh.nodes_of(own.markers_with("moving")) + part.points.start
         leaders = motion.leader[mine]
         place = np.searchsorted(nodes, leaders).clip(max=len(nodes) - 1)
         rows = np.where(nodes[place] == leaders, place, -1)

@@ -433,6 +433,10 @@ class Mesh:
                 return marker
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
 
+    def nodes_of(self, names: Iterable[str]) -> IntArray:
+        """Return the nodes (k,) of some boundaries, sorted, each once."""
+        return np.unique(np.concatenate([NO_NODES, *(self.marker(name).nodes for name in names)]))
+
     @property
     def file_counts(self) -> tuple[int, int]:
         """Return the numbers of points and cells that the mesh of its file has."""

@@ -54,7 +54,7 @@ class TableRows:
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:
         """Return the rows for the boundaries of a motion; all moving ones where it is empty."""
         names = named(marker) or case.markers_with("moving")
-        nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
+        nodes = mesh.nodes_of(names)
         for zone in (part for part in mesh.parts if len(nodes)):
             if zone.points.start <= nodes[0] and nodes[-1] < zone.points.stop:
                 nodes = nodes - zone.points.start  # as a file numbers them
@@ -132,16 +132,14 @@ DIGITS = 12
 def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
     """Return the mean of the nodes of some boundaries together, rounded to `DIGITS`."""
     digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
-    found = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
-    nodes = np.unique(np.concatenate([*found, np.empty(0, np.int64)]))
+    nodes = mesh.nodes_of(set(names).intersection(mesh.marker_names))
     middle = mesh.points[nodes].mean(axis=0) if len(nodes) else np.zeros(mesh.dim)
     return tuple(round(float(v), digits) + 0.0 for v in middle)
 
 
 def chord_of(mesh: Mesh, names: Iterable[str]) -> tuple[float, float]:
     """Return from which x to which x some boundaries go, rounded to `DIGITS`; 0 to 1 for none."""
-    nodes = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
-    x = mesh.points[np.concatenate([*nodes, np.empty(0, np.int64)]), 0]
+    x = mesh.points[mesh.nodes_of(set(names).intersection(mesh.marker_names)), 0]
     if not len(x) or not x.min() < x.max():
         return 0.0, 1.0
     digits = DIGITS - math.ceil(math.log10(np.ptp(x)))
@@ -271,8 +269,7 @@ def with_box(
     case = case if system is None else case.change(ffd_system=system)
     if name not in boxes or system is not None:
         names = named(motion.marker) or case.markers_with("moving")
-        nodes = np.unique(np.concatenate([mesh.marker(one).nodes for one in names]))
-        corners, usual = _around(mesh.points[nodes], system_of(case))
+        corners, usual = _around(mesh.points[mesh.nodes_of(names)], system_of(case))
         boxes[name] = tuple(corners.ravel().tolist())
         shapes.setdefault(name, usual)
     shapes[name] = degrees or shapes[name]

@@ -38,8 +38,8 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
     """
     if case.method != "rbf" or case.reduction is not None:
         return ""
-    nodes = [m.nodes for m in mesh.markers if case.roles.get(m.name, "fixed") != "internal"]
-    count = len(np.unique(np.concatenate([*nodes, np.empty(0, np.int64)])))
+    names = (name for name in mesh.marker_names if case.roles.get(name) != "internal")
+    count = len(mesh.nodes_of(names))
     size = 8.0 * 2.6 * count**2
     if size < LARGE:
         return ""

@@ -185,8 +185,7 @@ def _middle_of_moving(session: Session) -> FloatArray:
     mesh = session.mesh
     assert mesh is not None
     names = [name for name in mesh.marker_names if session.role(name) == "moving"]
-    nodes = [mesh.marker(name).nodes for name in names] or [mesh.cells.nodes]
-    points = padded(mesh.points[np.concatenate(nodes)])
+    points = padded(mesh.points[mesh.nodes_of(names) if names else mesh.cells.nodes])
     return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0)
 
 

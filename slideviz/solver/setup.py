@@ -390,14 +390,13 @@ def stiffness_of(case: Case, mesh: Mesh) -> Stiffness:
     # Late: scikit-fem and pyamg take 0.2 s.
     from slideviz.elastic.stiffness import Stiffness
 
-    walls = [np.empty(0, np.int64)]
-    for marker in mesh.markers:
-        role = case.roles.get(marker.name, "fixed")
-        name = marker.name.lower()
-        if role == "moving" or (role == "fixed" and not any(word in name for word in NOT_WALLS)):
-            walls.append(marker.nodes)
-    nodes = np.unique(np.concatenate(walls))
-    return Stiffness(case.deform_stiffness_type, case.deform_coeff, nodes)
+    walls = []
+    for name in mesh.marker_names:
+        role = case.roles.get(name, "fixed")
+        is_wall = not any(word in name.lower() for word in NOT_WALLS)
+        if role == "moving" or (role == "fixed" and is_wall):
+            walls.append(name)
+    return Stiffness(case.deform_stiffness_type, case.deform_coeff, mesh.nodes_of(walls))
 
 
 def _not_relaxed(case: Case, mesh: Mesh) -> tuple[Message, ...]:

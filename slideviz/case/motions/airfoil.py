@@ -83,7 +83,7 @@ class OnAirfoil(Motion):
         return words
 
     def doubts(self, mesh: Mesh, markers: Sequence[str]) -> Iterator[Doubt]:
-        x = np.concatenate([mesh.points[mesh.marker(name).nodes, 0] for name in markers])
+        x = mesh.points[mesh.nodes_of(markers), 0]
         low, high = self.chord
         size = np.ptp(x)
         covered = np.ptp(np.clip(self.chord, x.min(), x.max()))

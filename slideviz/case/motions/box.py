@@ -557,7 +557,7 @@ def _moved(
     None where no node is in the box. ``q`` (I, J, K, 3) are the control points before, ``on`` has
     the nodes (k,) of each marker.
     """
-    nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
+    nodes = mesh.nodes_of(on)
     vectors = np.zeros((len(nodes), mesh.dim))
     warnings = []
     any_inside = False

@@ -176,9 +176,9 @@ class Prescribed(Motion):
         components = self.vectors.shape[1]
         if components != mesh.dim:
             yield (f"its vectors have {components} components, and the mesh {mesh.dim} dimensions")
-        names = (name for name in case.markers_with("moving") if applies_to(self, name))
-        on = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
-        stray = np.setdiff1d(self.nodes, np.concatenate([*on, np.empty(0, np.int64)]))
+        moving = set(case.markers_with("moving")).intersection(mesh.marker_names)
+        on = mesh.nodes_of(name for name in moving if applies_to(self, name))
+        stray = np.setdiff1d(self.nodes, on)
         if len(stray):
             more = f" (and {len(stray) - 1} more)" if len(stray) > 1 else ""
             yield f"node {stray[0]}{more} is on none of the markers that it moves; remove it"

@@ -280,7 +280,7 @@ def _blade(case: Case, mesh: Mesh, on: NodesOn, names: list[str], places: list[i
             "same boundary; give both one, or none"
         )
     field = span_field(case, mesh)
-    nodes = np.unique(np.concatenate([on[name] for name in names]))
+    nodes = mesh.nodes_of(names)
 
     def sections() -> BladeSections:
         boundary = boundary_of(mesh)

@@ -1171,8 +1171,7 @@ class MovingSurface:
             every = dict.fromkeys(names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
         if self.moves_whole_mesh:  # the mesh is moved already
-            listed = [marker.nodes for marker in markers]
-            nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
+            nodes = self.mesh.nodes_of(names)
             vectors = np.zeros((len(nodes), self.mesh.dim))
             if self.config.zone is None:
                 warnings = (*warnings, *torn_interfaces(self.mesh, self.moved().points))
@@ -1202,9 +1201,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     if group == "ffd":
         problems += problems_of_boxes(config, mesh)
     raise_all(problems)
-    listed = [mesh.marker(name).nodes for name in config.markers]
-    nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
-    nodes = zone_of(config, mesh)[0] if group == "grid" else nodes
+    nodes = zone_of(config, mesh)[0] if group == "grid" else mesh.nodes_of(config.markers)
     with _overflow_as_case_error(config):
         displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
