@@ -26,7 +26,7 @@ from slideviz.errors import (
     shown,
 )
 from slideviz.formats.openfoam_paths import mesh_path
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 from slideviz.terms import ROLES
 
 if TYPE_CHECKING:
@@ -60,9 +60,7 @@ def case_of_text(path: Path, text: str, start: Case) -> Case:
 
 def write_case(path: Path, case: Case) -> None:
     """Write a case file that ``read_case`` reads back without loss; CaseError as `case_text`."""
-    text = case_text(path, case)
-    with atomic_write(path, CaseError, case.source) as file:
-        file.write(text.encode("utf-8"))
+    write_whole(path, case_text(path, case), CaseError, case.source)
 
 
 def case_text(path: Path, case: Case) -> str:

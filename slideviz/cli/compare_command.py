@@ -28,14 +28,13 @@ from slideviz.study.combinations import (
     csv_text,
     history_text,
     refused,
-    save_text,
     terminal_head,
     terminal_line,
     wanted_methods,
     wanted_modes,
     warm,
 )
-from slideviz.system.atomic import make_folder
+from slideviz.system.atomic import make_folder, write_whole
 from slideviz.terms import PERIODIC_MODES
 
 TABLE = "compare.csv"
@@ -143,9 +142,9 @@ def _computed(
         with Bar(not arguments.quiet, head, _expected(rows, tried)) as bar:
             bars.append(bar)
             rows.append(next(pulled))
-        save_text(table, csv_text(rows))
+        write_whole(table, csv_text(rows), CaseError)
         if any(row.result is not None and row.result.history for row in rows):
-            save_text(histories, history_text(rows))
+            write_whole(histories, history_text(rows), CaseError)
             files = [table, histories]
         if tried not in cannot:  # those were announced before
             _say(arguments, terminal_line(rows[-1], reasons))

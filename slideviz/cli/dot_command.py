@@ -16,7 +16,7 @@ from slideviz.cli.terminal import DONE
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.gradients import Gradients, design_gradients, sensitivity_files
 from slideviz.errors import CaseError
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 
 
 def main(arguments: Namespace) -> int:
@@ -75,14 +75,12 @@ def _write_surface(path: Path, found: Gradients) -> None:
     table = np.zeros((len(found.points), 6))
     table[:, : found.points.shape[1]] = found.points
     table[:, 3 : 3 + found.points.shape[1]] = found.surface
-    rows = [", ".join(map(repr, row)) for row in table.tolist()]
-    with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(rows) + "\n").encode())
+    rows = (", ".join(map(repr, row)) + "\n" for row in table.tolist())
+    write_whole(path, "".join(rows) or "\n", CaseError)
 
 
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
     """Write a line with the name of the objective, and one with the gradient of each variable."""
     objective = config.values["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
     rows = [f"{objective} gradient", *(repr(value) for value in found.variables.tolist())]
-    with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(rows) + "\n").encode())
+    write_whole(path, "\n".join(rows) + "\n", CaseError)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 from slideviz import walls, write
@@ -35,7 +36,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls
 from slideviz.session.opening import guess_by_name
-from slideviz.system.atomic import atomic_write
+from slideviz.system.csv_table import write_csv
 from slideviz.terms import CELL_STATES, METRICS, RATED, WALL_VALUES, Metric, field_of
 
 
@@ -159,12 +160,10 @@ def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> W
 
 def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
     """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
-    columns = zip(found.values, found.size, found.skew, found.status, *more.values(), strict=True)
-    lines = [",".join(("cell,size_skew,size,skew,status", *more))]
-    for cell, (value, size, skew, status, *others) in enumerate(columns):
-        numbers = f"{float(value)!r},{float(size)!r},{float(skew)!r}"
-        lines.append(
-            ",".join((f"{cell},{numbers},{CELL_STATES[status]}", *(repr(float(v)) for v in others)))
-        )
-    with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(lines) + "\n").encode())
+    measured = found.values, found.size, found.skew, *more.values()
+    texts = [map(repr, one.tolist()) for one in measured]
+    status = map(CELL_STATES.__getitem__, found.status.tolist())
+    rows = zip(range(len(found)), *texts[:3], status, *texts[3:], strict=True)
+    write_csv(
+        path, chain([("cell", "size_skew", "size", "skew", "status", *more)], rows), CaseError
+    )

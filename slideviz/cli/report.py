@@ -34,7 +34,8 @@ from slideviz.solver.layers import height_warnings
 from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 from slideviz.solver.steps import MeshRepair, RunResult
 from slideviz.streaming.quality import CellCounts
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import atomic_write, write_whole
+from slideviz.system.csv_table import write_csv
 from slideviz.terms import NO_REFERENCE, WALL_VALUES, Metric, Quantity, field_of
 
 LISTED = 100  # most inverted cells listed in a report
@@ -323,18 +324,15 @@ def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
     if str(path) == "-":
         print(text, end="")
         return True
-    with atomic_write(path, CaseError) as file:
-        file.write(text.encode())
+    write_whole(path, text, CaseError)
     return False
 
 
 def save_history(path: Path, report: Mapping[str, Any]) -> None:
     """Write the convergence of the data reduction as CSV, a row for each cycle."""
     columns = ("step", *CYCLE_KEYS)
-    rows = [",".join(columns)]
-    rows += [",".join(repr(row[name]) for name in columns) for row in report["convergence"]]
-    with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(rows) + "\n").encode())
+    rows = [[repr(row[name]) for name in columns] for row in report["convergence"]]
+    write_csv(path, [columns, *rows], CaseError)
 
 
 def table(rows: Sequence[Sequence[object]], indent: int = 2) -> str:

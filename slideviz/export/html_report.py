@@ -23,7 +23,7 @@ from slideviz.session.run_messages import remarks_of
 from slideviz.session.runs_words import COLUMNS
 from slideviz.session.walls_table import COLUMNS as WALL_COLUMNS
 from slideviz.session.walls_table import wall_rows
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 from slideviz.system.versions import versions
 
 _HEAD = """<!doctype html>
@@ -77,5 +77,4 @@ def write_html_report(path: Path, renderer: OffscreenRenderer) -> None:
         if rows:
             lines = (f"<tr><td>{'<td>'.join(map(escape, row))}</tr>" for row in rows)
             parts.append("\n".join([f"<h2>{title}</h2><table>", *lines, "</table>"]))
-    with atomic_write(path) as file:
-        file.write("\n".join(parts).encode())
+    write_whole(path, "\n".join(parts))

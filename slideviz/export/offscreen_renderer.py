@@ -42,7 +42,7 @@ from slideviz.session.pieces import render_in_groups, run_to_end
 from slideviz.session.saving import view_to_case
 from slideviz.session.session_file import PICTURE_KEY
 from slideviz.session.state import Run, Session, StepFrame
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 
 
 class OffscreenRenderer:
@@ -242,9 +242,7 @@ class OffscreenRenderer:
             known["pnginfo"] = PngInfo()
             text = case_text(file, view_to_case(shown, self.like.camera.view))
             known["pnginfo"].add_itxt(PICTURE_KEY, text)
-        content = png_bytes(self.image(options), **known)
-        with atomic_write(file) as out:
-            out.write(content)
+        write_whole(file, png_bytes(self.image(options), **known))
 
     def _pane(
         self, session: Session, options: PictureOptions, words: str, size: float

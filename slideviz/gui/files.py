@@ -28,7 +28,7 @@ from slideviz.session.run_messages import stopped_words
 from slideviz.session.saving import Unsaved, continued_case, files_beside, files_of, view_to_case
 from slideviz.session.session_file import ENDING, MissingMeshError
 from slideviz.session.state import Session
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -392,8 +392,7 @@ class Files(QObject):
             return False
         with self.window.banner.showing_errors():
             for file, target in moved.items():
-                with atomic_write(target) as out:
-                    out.write(file.read_bytes())
+                write_whole(target, file.read_bytes())
             if moved:
                 self.window.store.change(changes.moved_files, moved)
             return True

@@ -16,7 +16,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.transforms import Bbox
 
 from slideviz.errors import CaseError, SlidevizError
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 
 SETTINGS = {
     # Names that are not random: the same figure gives the same file.
@@ -102,5 +102,4 @@ def write_figure(
     Raises an error of the class ``error`` if the file cannot be written.
     """
     data = figure_bytes(figure, file.suffix.lower()[1:], dpi, transparent)
-    with atomic_write(file, error) as out:
-        out.write(data)
+    write_whole(file, data, error)

@@ -34,7 +34,7 @@ from slideviz.mesh.zones import marker_zones
 from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.solver.rims import are_ready, on_walls
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 from slideviz.terms import FfdSystem
 
 PLACEHOLDER = Path("table")
@@ -105,8 +105,7 @@ def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
     ``replaces`` is the only input file that may be overwritten: the one the table was read from.
     Raises CaseError if it cannot be written.
     """
-    with atomic_write(path, CaseError, replaces) as file:
-        file.write(f"{text.rstrip()}\n".encode())
+    write_whole(path, f"{text.rstrip()}\n", CaseError, replaces)
 
 
 def table_text(path: Path) -> str:

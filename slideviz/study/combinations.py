@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from slideviz.case.check import check_case
 from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.rigid import Translate
-from slideviz.errors import Cancelled, CaseError, why_failed
+from slideviz.errors import Cancelled, why_failed
 from slideviz.mesh.model import Assembly, FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
@@ -32,7 +31,6 @@ from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.steps import Progress, Step
 from slideviz.system import csv_table
-from slideviz.system.atomic import atomic_write
 from slideviz.terms import SLIDING, PeriodicMode
 
 Value = str | int | float
@@ -110,12 +108,6 @@ def history_text(rows: Sequence[CombinationRow]) -> str:
             values = [getattr(cycle, name) for name in columns[1:]]
             lines.append([tried.method, tried.periodic, tried.steps or "auto", step, *values])
     return csv_table.csv_text(lines)
-
-
-def save_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; CaseError if it cannot be written."""
-    with atomic_write(path, CaseError) as file:
-        file.write(text.encode())
 
 
 def terminal_head() -> str:

@@ -72,6 +72,17 @@ def atomic_write(
         raise error(f"{target}: cannot be written: {reason}") from problem
 
 
+def write_whole(
+    path: str | Path,
+    content: str | bytes,
+    error: type[SlidevizError] = MeshError,
+    replaces: Path | None = None,
+) -> None:
+    """Write a file, text as UTF-8, by `atomic_write`."""
+    with atomic_write(path, error, replaces) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
 def require_writable(
     path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
 ) -> None:

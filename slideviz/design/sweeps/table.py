@@ -44,7 +44,7 @@ from slideviz.case.words import number
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import Mesh
-from slideviz.system.atomic import atomic_write, make_folder, reason_of
+from slideviz.system.atomic import make_folder, reason_of, write_whole
 from slideviz.system.csv_table import csv_rows, csv_text, write_csv
 from slideviz.system.file_checks import read_json, require_regular_file
 
@@ -623,8 +623,7 @@ class SweepResults:
                 f"start again with --force (force=True), or choose another folder"
             )
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
-        with atomic_write(self._folder / SOURCES, CaseError) as file:
-            file.write(text.encode())
+        write_whole(self._folder / SOURCES, text, CaseError)
         write_csv(self.path, [self._head], CaseError)
         return []
 

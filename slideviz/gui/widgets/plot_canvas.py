@@ -26,7 +26,7 @@ from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.plots.figure_io import figure_bytes
 from slideviz.plots.style import PRINT, Style
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 
 DPI = 100  # resolution of a figure on a screen with a device pixel ratio of 1
 
@@ -333,9 +333,7 @@ def write_plot(path: Path, draw_on: Draw) -> None:
         raise SlidevizError(f"{path}: a plot is a .png, .svg or .pdf file; choose one of these")
     figure = Figure(FIGURE_INCHES, layout="constrained")
     draw_on(figure, replace(PRINT, size=8.5))
-    data = figure_bytes(figure, kind)
-    with atomic_write(path, SlidevizError) as file:
-        file.write(data)
+    write_whole(path, figure_bytes(figure, kind), SlidevizError)
 
 
 def ask_and_write(
