@@ -77,6 +77,7 @@ def _table(name: str, kind: type[Kind]) -> dict[Any, Kind]:
 
 FileFormat = Literal["su2", "su2b"]
 """The formats of SU2, by ending, which MESH_FORMAT has in capitals."""
+FILE_FORMATS: dict[FileFormat, Term] = _table("FILE_FORMATS", Term)
 
 
 # Boundaries --------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import pytest
 from slideviz import terms
 
 TABLES = [
+    (terms.FileFormat, terms.FILE_FORMATS),
     (terms.Role, terms.ROLES),
     (terms.NodeType, terms.NODE_TYPES),
     (terms.SpanKind, terms.SPAN_KINDS),

@@ -12,7 +12,6 @@ from slideviz.argument_types import CheckedFields
 from slideviz.case.limits import Limit, read_limits
 from slideviz.case.motions.motion import Motion
 from slideviz.errors import CaseError, Remark, not_one_of
-from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG
 from slideviz.rbf.reduction import AUTO, Reduction
 
@@ -26,8 +25,8 @@ class CaseFields(CheckedFields):
     mesh_file: Path | None = None
     mesh_out: Path | None = None
     reference_file: Path | None = None
-    mesh_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
-    mesh_out_format: terms.FileFormat | None = field(default=None, metadata=FILE_FORMATS)
+    mesh_format: terms.FileFormat | None = field(default=None, metadata=terms.FILE_FORMATS)
+    mesh_out_format: terms.FileFormat | None = field(default=None, metadata=terms.FILE_FORMATS)
     zone: int | None = None
     roles: Annotated[Mapping[str, terms.Role], _ROLES] = field(default_factory=dict)
     motions: Annotated[tuple[Motion, ...], "a tuple of motions, e.g. Translate(...)"] = ()

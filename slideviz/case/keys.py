@@ -44,7 +44,6 @@ from slideviz.case.values import (
 )
 from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
 from slideviz.errors import CaseError, Message, shown
-from slideviz.formats.table import FILE_FORMATS
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import (
     COLOR_BY,
@@ -673,7 +672,7 @@ def _put_file(case: Case, path: Path | None) -> Case:
     return case.change(motions=(*files, *case.motions[len(_leading_file(case)) :]))
 
 
-_FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
+_FORMAT = choice({term.label: value for value, term in terms.FILE_FORMATS.items()})
 
 _ROWS = (
     setting("MESH_FILENAME", PATH),

@@ -17,7 +17,7 @@ from slideviz import terms
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli import argument_readers
 from slideviz.errors import CaseError
-from slideviz.formats.table import FILE_FORMATS, own_endings
+from slideviz.formats.table import own_endings
 
 Read = TypeVar("Read")
 
@@ -48,7 +48,6 @@ _TYPES: dict[str, Callable[[str], Any]] = {
     "float": float,
     "lower": str.lower,
 }
-_CHOICES = {**vars(terms), "FILE_FORMATS": FILE_FORMATS}
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 _SHARED = _TABLE.pop("shared")
 COMMANDS = {
@@ -74,7 +73,7 @@ def _add(parser: _ActionsContainer, flags: str, help: str, **facts: Any) -> None
     if read := facts.get("type"):
         facts["type"] = _TYPES.get(read) or _checked(getattr(argument_readers, read))
     if isinstance(facts.get("choices"), str):
-        facts["choices"] = tuple(_CHOICES[facts["choices"]])
+        facts["choices"] = tuple(vars(terms)[facts["choices"]])
     if facts.get("action") == "append":
         facts["default"] = []
     elif isinstance(facts.get("default"), list):

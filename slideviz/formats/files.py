@@ -25,7 +25,6 @@ from slideviz.errors import MeshError, path_error, printable
 from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.openfoam_paths import mesh_path
 from slideviz.formats.table import (
-    FILE_FORMATS,
     MESHIO,
     WriteOptions,
     format_for,
@@ -46,7 +45,15 @@ from slideviz.system.platform import (
     total_memory,
 )
 from slideviz.system.threads import Tick
-from slideviz.terms import SIZE_SKEW, WALL_VALUES, FileFormat, Metric, Quantity, field_of
+from slideviz.terms import (
+    FILE_FORMATS,
+    SIZE_SKEW,
+    WALL_VALUES,
+    FileFormat,
+    Metric,
+    Quantity,
+    field_of,
+)
 
 # Limits of the process: several times what the slowest of meshio's readers needs.
 _SECONDS = 20

@@ -1,12 +1,13 @@
 """The one table of mesh formats: endings, names, readers, writers, and what each format keeps.
 
 Reading, writing, the dialogs of the window, ``convert``, help texts and warnings of losses all go
-by it. A new format is a folder with its reader and writer, and a row here. This module imports no
-reader or writer: a row names its functions, which are imported at the first use.
+by it. A new format is a folder with its reader and writer, and a table of ``table.toml``. This
+module imports no reader or writer: a row names its functions, which are imported at the first use.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -18,7 +19,7 @@ from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
-from slideviz.terms import FileFormat, Term
+from slideviz.terms import FILE_FORMATS, FileFormat
 
 if TYPE_CHECKING:
     import numpy as np
@@ -74,7 +75,7 @@ class MeshFormat:
     quality: bool = False  # whether cells can have values
     boundaries: Literal["names", "numbers"] = "names"
     """Whether boundaries keep their names, or get numbers."""
-    dims: tuple[int, ...] = (2, 3)  # dimensions of the meshes that it can store
+    dims: Sequence[int] = (2, 3)  # dimensions of the meshes that it can store
     solver: bool = False  # whether it is a solver's: cells have no values, and nobody expects any
     sections: bool = False
     """Whether it keeps other sections of SU2 texts, such as FFD boxes and halos."""
@@ -87,12 +88,11 @@ class MeshFormat:
     series: str = ""
     """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
     detects: str = ""  # returns whether a file is of this format, by its content: ``detects(path)``
-    term: Term | None = None  # its words as a value of MESH_FORMAT; None if it is not a value
 
     @property
     def value(self) -> FileFormat | None:
         """Return its value of MESH_FORMAT; only meshes of these formats can be streamed."""
-        return self.ending.removeprefix(".") if self.term else None  # type: ignore[return-value]
+        return next((name for name in FILE_FORMATS if self.ending == f".{name}"), None)
 
     def function(self, field: str) -> Callable[..., Any]:
         """Return the function that a field names, such as ``reader``."""
@@ -103,103 +103,10 @@ class MeshFormat:
 MESHIO = MeshFormat("", "a format of meshio", boundaries="numbers")
 """Any other format: meshio knows it, or nobody."""
 
-_ROWS = (
-    MeshFormat(
-        ".su2",
-        "SU2 (keeps all markers and sections)",
-        "su2.read:read_su2_file",
-        "su2.write:write_su2",
-        isolated=False,
-        solver=True,
-        sections=True,
-        zones=True,
-        content="su2.write:content_blocks",
-        detects="su2.read:is_su2",
-        term=Term("SU2", "SU2’s text"),
-    ),
-    MeshFormat(
-        ".su2b",
-        "SU2 binary (keeps all markers)",
-        "su2b.read:read_su2b",
-        "su2b.write:write_su2b",
-        isolated=False,
-        solver=True,
-        require="su2b.write:require_binary",
-        zones=True,
-        content="su2b.write:content_blocks",
-        detects="su2b.read:is_su2b",
-        term=Term("SU2B", "SU2’s binary mesh"),
-    ),
-    MeshFormat(
-        ".vtu",
-        "VTU for ParaView, with quality and displacement",
-        writer="meshio.write:write_vtu",
-        quality=True,
-    ),
-    MeshFormat(
-        ".vtkhdf",
-        "VTKHDF for ParaView: boundaries as blocks, steps",
-        "",
-        "vtkhdf:write_vtkhdf",
-        quality=True,
-        series="vtkhdf:vtkhdf_series",
-    ),
-    MeshFormat(".vtk", "Legacy VTK, with quality", quality=True, boundaries="numbers"),
-    MeshFormat(".xdmf", "XDMF, with quality", quality=True, boundaries="numbers"),
-    MeshFormat(
-        ".cgns",
-        "CGNS (of a CGNS file a copy, with other coordinates)",
-        "cgns.read:read_cgns",
-        "cgns.read:write_cgns",
-        solver=True,
-        copies=True,
-    ),
-    MeshFormat(
-        ".foam",
-        "OpenFOAM case (its points; polyhedra by parts)",
-        "openfoam.read:read_polymesh",
-        "openfoam.write:write_polymesh",
-        isolated=False,
-        solver=True,
-        copies=True,
-        require="openfoam.write:require_polymesh",
-        zones=True,
-    ),
-    MeshFormat(".med", "MED for Salome, with quality", quality=True),
-    MeshFormat(".msh", "Gmsh 4.1", writer="gmsh.write:write_gmsh"),
-    *(
-        MeshFormat(
-            f".{kind}.ugrid",
-            f"UGRID, {order}",
-            writer="ugrid.write:write_ugrid",
-            require="ugrid.write:require_ugrid",
-            solver=True,
-            boundaries="numbers",
-            dims=(3,),
-        )
-        for kind, order in (("b8", "big-endian"), ("lb8", "little-endian"))
-    ),
-    MeshFormat(".inp", "Abaqus"),
-    MeshFormat(".vol", "Netgen"),
-    MeshFormat(".mesh", "Medit", boundaries="numbers"),
-    *(
-        MeshFormat(
-            ending,
-            "Nastran",
-            writer="nastran.write:write_nastran",
-            solver=True,
-            boundaries="numbers",
-            dims=(3,),
-        )
-        for ending in (".bdf", ".nas")
-    ),
-)
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_ROWS = tuple(MeshFormat(ending, **row) for ending, row in _TABLE.items())
 FORMATS: dict[str, MeshFormat] = {row.ending: row for row in _ROWS}
 """Formats by ending; meshio writes more, but hardly any that stores boundaries besides cells."""
-FILE_FORMATS: dict[FileFormat, Term] = {
-    row.value: row.term for row in _ROWS if row.value and row.term
-}
-"""The values of MESH_FORMAT, which are SU2's own formats, with their words."""
 
 
 def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:

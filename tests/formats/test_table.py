@@ -38,7 +38,7 @@ def test_the_content_tells_where_the_ending_does_not(tmp_path):
 
 
 def test_a_new_format_is_a_row(tmp_path, monkeypatch):
-    row = replace(FORMATS[".su2"], ending=".mine", detects="", term=None)
+    row = replace(FORMATS[".su2"], ending=".mine", detects="")
     monkeypatch.setattr(table, "FORMATS", FORMATS | {".mine": row})
     path = tmp_path / "a.mine"
     sv.write(path, square(3))

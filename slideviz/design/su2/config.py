@@ -34,12 +34,11 @@ from slideviz.case.words import Word, counted, first_of, groups_of, list_of, num
 from slideviz.case.zone_cases import renamed, with_marker_names
 from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, note, raise_all, shown
 from slideviz.formats.files import read
-from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import Assembly, IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import ROLES, Role
+from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
 """What SU2 does with a list of variables; the first kind decides it for all of them."""

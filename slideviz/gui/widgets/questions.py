@@ -9,12 +9,13 @@ from pathlib import Path
 from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, QMessageBox, QWidget
 
-from slideviz.formats.table import FILE_FORMATS, MeshFormat, formats_for, readable_patterns
+from slideviz.formats.table import MeshFormat, formats_for, readable_patterns
 from slideviz.gui.responsiveness.timers import ROWS_MS
 from slideviz.gui.widgets.build import Choice, dialog_buttons, hint_label, number_box
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
 from slideviz.session.session_file import ENDING
+from slideviz.terms import FILE_FORMATS
 
 PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
