@@ -150,17 +150,16 @@ def _read_path(text: str) -> Path | None:
     return path
 
 
-def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:
+def path_text(path: Path) -> str:
     """Return a path as it is written in a case file: with slashes, in quotes where needed.
 
     Raises CaseError if a case file cannot have it: it is empty, or has a line break or a backslash.
-    ``plain``: paths that it matches need no quotes.
     """
     text = path.as_posix()
     check_writable(text)
     if "\\" in text:
         raise CaseError(f"{text!r} cannot be written to a case file: it has a backslash; rename it")
-    if plain.match(text) and text.upper() != "NONE":
+    if _PLAIN_PATH.match(text) and text.upper() != "NONE":
         return text
     return '"' + text.replace('"', '""') + '"'
 

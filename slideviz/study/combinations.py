@@ -40,7 +40,6 @@ Value = str | int | float
 class StudyColumn:
     """A column of the table."""
 
-    meaning: str
     value: Callable[[Result], Value]  # returns the value of a result
     head: str = ""
     form: str = ""
@@ -49,35 +48,16 @@ class StudyColumn:
 
 
 COLUMNS: Mapping[str, StudyColumn] = {
-    "steps_made": StudyColumn(
-        "steps made, which STEPS= auto chooses", lambda r: r.steps, "steps", "d"
-    ),
-    "min": StudyColumn("lowest quality", lambda r: r.quality.min, "min", ".6f"),
-    "mean": StudyColumn("mean quality", lambda r: r.quality.mean, "mean", ".6f"),
-    "inverted": StudyColumn("inverted cells", lambda r: r.quality.inverted, "inverted", "d"),
-    "unproven": StudyColumn(
-        "cells neither proved valid nor inverted", lambda r: r.quality.unproven
-    ),
-    "control_nodes": StudyColumn(
-        "control nodes in the last step", lambda r: r.control_nodes, "control nodes", "d"
-    ),
-    "max_error": StudyColumn(
-        "largest error of a boundary node before it is corrected, of all steps, in the mesh's "
-        "length unit",
-        lambda r: r.max_error,
-        "max error",
-        ".1e",
-    ),
-    "condition": StudyColumn("largest condition number of a system", lambda r: r.condition),
-    "seconds": StudyColumn(
-        "time of the deformation by the clock, classification included",
-        lambda r: r.seconds,
-        "seconds",
-        ".3f",
-    ),
-    "processor_seconds": StudyColumn(
-        "the same, of all processors together", lambda r: r.processor_seconds
-    ),
+    "steps_made": StudyColumn(lambda r: r.steps, "steps", "d"),  # which STEPS= auto chooses
+    "min": StudyColumn(lambda r: r.quality.min, "min", ".6f"),
+    "mean": StudyColumn(lambda r: r.quality.mean, "mean", ".6f"),
+    "inverted": StudyColumn(lambda r: r.quality.inverted, "inverted", "d"),
+    "unproven": StudyColumn(lambda r: r.quality.unproven),
+    "control_nodes": StudyColumn(lambda r: r.control_nodes, "control nodes", "d"),
+    "max_error": StudyColumn(lambda r: r.max_error, "max error", ".1e"),
+    "condition": StudyColumn(lambda r: r.condition),
+    "seconds": StudyColumn(lambda r: r.seconds, "seconds", ".3f"),
+    "processor_seconds": StudyColumn(lambda r: r.processor_seconds),
 }
 """The columns of ``compare.csv`` between `KEY_COLUMNS` and the last one, ``problem``."""
 
@@ -88,7 +68,7 @@ def csv_text(rows: Sequence[CombinationRow]) -> str:
     """Return the table as CSV, with all digits; ``limits`` only if the case has some."""
     columns = dict(COLUMNS)
     if any(row.result is not None and row.result.limits for row in rows):
-        columns["limits"] = StudyColumn("limits that are not met, or met", lambda r: r.limits)
+        columns["limits"] = StudyColumn(lambda r: r.limits)
     lines: list[list[object]] = [[*KEY_COLUMNS, *columns, "problem"]]
     for row in rows:
         tried = row.combination
