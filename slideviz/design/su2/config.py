@@ -64,8 +64,11 @@ class VariableKind:
         return self.form.replace(",", " ").split()
 
 
-_ROWS = tomllib.loads(Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
-KINDS = {name: VariableKind(**row) for name, row in _ROWS.items()}
+def _table(ending: str) -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name(ending).read_text(encoding="utf-8"))
+
+
+KINDS = {name: VariableKind(**row) for name, row in _table("variables.toml").items()}
 """SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
 WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
 """Groups whose values mean nothing."""
@@ -352,11 +355,8 @@ READ_WITH_RBF = {
     "DEFORM_NONLINEAR_ITER": integer(1, MAX_STEPS),
 }
 """Kinds of values; of keys that mean something else unless DEFORM_KIND is RBF."""
-ELASTIC = {
-    "DEFORM_STIFFNESS_TYPE": "SOLID_WALL_DISTANCE",
-    "DEFORM_COEFF": "1e6",
-    "DEFORM_NONLINEAR_ITER": "1",
-}
+_TABLE = _table("config.toml")
+ELASTIC: dict[str, str] = _TABLE["elastic"]
 """Keys that are read with METHOD= elastic, with SU2's defaults (version 8.5)."""
 FUNCTION = "KIND_RADIAL_BASIS_FUNCTION"
 
@@ -414,25 +414,9 @@ def _word(rows: Mapping[str, Entry], key: str) -> str:
     return rows[key].value.upper() if key in rows else ""
 
 
-ROLE_KEYS: dict[str, Role] = {
-    "MARKER_INTERNAL": "internal",
-    "MARKER_DEFORM_MESH_INTERNAL": "internal",
-    "MARKER_SYM": "sliding",
-    "MARKER_DEFORM_MESH_SYM_PLANE": "sliding",
-    "MARKER_DEFORM_TANGENTIAL": "sliding",
-    "MARKER_PERIODIC": "periodic",
-    "MARKER_DEFORM_NORMAL": "periodic",
-}
+ROLE_KEYS: dict[str, Role] = _TABLE["roles"]
 """Roles of the markers that keys of SU2, or of ParaBlade's branch of it, list; later keys win."""
-FILES = {
-    "MESH_FILENAME": "mesh.su2",
-    "MESH_OUT_FILENAME": "mesh_out.su2",
-    "DV_FILENAME": "surface_positions.dat",
-    "DV_SENS_FILENAME": "surface_sensitivity.dat",
-    "DV_UNORDERED_SENS_FILENAME": "unordered_sensitivity.dat",
-    "SOLUTION_ADJ_FILENAME": "solution_adj",
-    "GRAD_OBJFUNC_FILENAME": "of_grad.dat",
-}
+FILES: dict[str, str] = _TABLE["files"]
 """Keys that name files, with SU2's defaults."""
 
 
@@ -470,25 +454,20 @@ def _planes(text: str) -> frozenset[int]:
     return frozenset(map(int, words))
 
 
-CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
+CONTINUITIES: dict[str, int] = _TABLE["continuities"]
 """Values of FFD_CONTINUITY, and how many planes of control points each holds at a side."""
-VALUES: dict[str, tuple[Callable[[str], Any], str]] = {
-    "DV_SENSITIVITY_FORMAT": (_supported("SU2_NATIVE", "UNORDERED_ASCII"), "SU2_NATIVE"),
-    "OBJECTIVE_FUNCTION": (str, "DRAG"),
-    "OPT_RELAX_FACTOR": (number, "1.0"),
-    "READ_BINARY_RESTART": (lambda text: text.upper() == "YES", "YES"),
-    "FFD_CONTINUITY": (_supported("", *CONTINUITIES), ""),
-    "FFD_SYMMETRY_PLANE": (_yes, "NO"),
-    **{f"FFD_FIX_{letter}": (_planes, "NONE") for letter in "IJK"},
-    "FFD_INTPREV": (_yes, "NO"),
-    "FFD_INTPREV_ITER": (_count, "10"),
-    "FFD_INTPREV_DEPTH": (_count, "3"),
-    "CONVEXITY_CHECK": (_yes, "NO"),
-    "CONVEXITY_CHECK_ITER": (_count, "10"),
-    "CONVEXITY_CHECK_DEPTH": (_count, "3"),
-    "OPT_LINE_SEARCH_BOUND": (_positive, "1E6"),
-    "REF_LENGTH": (_positive, "1.0"),
-    "MULTIZONE_MESH": (_yes, "YES"),
+_READERS: dict[str, Callable[[str], Any]] = {
+    "text": str,
+    "number": number,
+    "positive": _positive,
+    "count": _count,
+    "planes": _planes,
+    "yes": _yes,
+    "yes, or not": lambda text: text.upper() == "YES",
+}
+VALUES = {
+    name: (_READERS[how] if isinstance(how, str) else _supported(*how), usual)
+    for name, (how, usual) in _TABLE["values"].items()
 }
 """Other keys of one value or list: how each is read, and SU2's default; except FFD_CONTINUITY,
 which is empty: control points are held only if the key is given."""
