@@ -1,9 +1,9 @@
 """The table of all keys of a case file, by which they are read, checked, written and explained.
 
-Its words are in ``keys.toml``. Values are put into a case in the order of the table, whatever their
-order in the file. Those of the
-view are in ``Case.view``, by key; `slideviz.session.saving` makes a view of them and back; runs
-without a window ignore them. The numbers of DATA_REDUCTION= AUTO in the text are EXACT_NODES and
+Its words and facts are in ``keys.toml``; rows here are of the keys that need a function. Values are
+put into a case in the order of the table, whatever their order in the file. Those of the view are
+in ``Case.view``, by key; `slideviz.session.saving` makes a view of them and back; runs without a
+window ignore them. The numbers of DATA_REDUCTION= AUTO in the text are EXACT_NODES and
 AUTO_TOLERANCE of `slideviz.solver.setup`.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -136,16 +137,32 @@ def other_method(case: Case, method: Method | None) -> str:
 
 
 _TABLE = tomllib.loads(Path(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+_FIRST = _TABLE.pop("first")
+
+
+def _facts(group: str, words: dict[str, Any]) -> dict[str, Any]:
+    """Return the facts of `Key` that a row of ``keys.toml`` has."""
+    facts = {"group": group, **words}
+    if "kind" in facts:
+        how, *numbers = facts["kind"]
+        facts["kind"] = (integer if how == "whole" else real)(*numbers)
+    if "off" in facts:
+        facts["switch"] = partial(_why_off, facts.pop("off"))
+    return facts
+
+
+def _why_off(ways: list[tuple[str, str, str]], case: Case) -> str:
+    return next((why for field, value, why in ways if getattr(case, field) == value), "")
+
+
 _WORDS: dict[str, dict[str, Any]] = {
-    name: {"group": group, **words}
-    for group, rows in _TABLE.items()
-    for name, words in rows.items()
+    name: _facts(group, words) for group, rows in _TABLE.items() for name, words in rows.items()
 }
 
 
 def row(name: str, kind: Kind, put: Put, get: Get, **facts: Any) -> Key:
     """Return the row of a key, with its words in ``keys.toml`` and further ``facts`` of `Key`."""
-    return Key(name, kind=kind, put=put, get=get, **_WORDS[name] | facts)
+    return Key(**_WORDS[name] | {"name": name, "kind": kind, "put": put, "get": get} | facts)
 
 
 def setting(name: str, kind: Kind | None = None, **facts: Any) -> Key:
@@ -164,13 +181,13 @@ def setting(name: str, kind: Kind | None = None, **facts: Any) -> Key:
 def field_row(owner: Any, name: str, kind: Kind | None, **facts: Any) -> Key:
     """Return the row of a key whose value is a field of a dataclass; ``facts`` as of `row`.
 
-    Without a ``kind`` its values are those of the field's enumeration, or YES and NO. ``owner``:
-    has the default.
+    Without a ``kind``, here or in ``keys.toml``, its values are those of the field's enumeration,
+    or YES and NO. ``owner``: has the default.
     """
     field = _WORDS[name]["field"]
     terms = owner.__dataclass_fields__[field].metadata
     default = getattr(owner, field)
-    kind = kind or (one_of(terms) if terms else YES_NO)
+    kind = kind or _WORDS[name].get("kind") or (one_of(terms) if terms else YES_NO)
     text = NO_DEFAULT if default is None else kind.write(default)
     return row(name, kind, default=text, **facts)
 
@@ -299,7 +316,7 @@ def _view(name: str, kind: Kind, **facts: Any) -> Key:
     return row(name, kind, put, lambda case: case.view.get(name), **facts)
 
 
-VIEW_ROWS = (
+_VIEW = (
     _view("VIEW_COLOR", one_of(COLOR_BY)),
     _view("VIEW_RANGE", numbers(2, "two rising numbers", True)),
     _view("VIEW_MAP", one_of(COLOR_MAPS)),
@@ -379,10 +396,6 @@ def _without_definition(case: Case) -> str:
     return "" if case.ffd_boxes else "FFD_DEFINITION defines no box"
 
 
-def _without_axis(case: Case) -> str:
-    return "FFD_COORD_SYSTEM= CARTESIAN has no axis" if case.ffd_system == "CARTESIAN" else ""
-
-
 def ffd_contradictions(case: Case) -> list[Message]:
     """Return a message for FFD keys that contradict each other."""
     boxes = len(case.ffd_boxes)
@@ -410,9 +423,9 @@ _FFD = (
     setting("FFD_BLENDING", switch=_without_definition),
     setting("FFD_BSPLINE_ORDER", ORDERS, switch=_without_definition),
     setting("FFD_COORD_SYSTEM"),
-    setting("FFD_AXIS", POINT, switch=_without_axis),
+    setting("FFD_AXIS", POINT),
 )
-FFD_ROWS = tuple(_said_where_needed(row) for row in _FFD)
+_FFD_ROWS = tuple(_said_where_needed(row) for row in _FFD)
 
 
 def _why_no_reduction(case: Case) -> str:
@@ -432,19 +445,6 @@ def why_no_tolerance(case: Case) -> str:
 def _why_no_levels(case: Case) -> str:
     levels = case.reduction is not None and case.reduction.multilevel
     return _why_no_reduction(case) or ("" if levels else "there are no levels")
-
-
-def _why_no_layers(case: Case) -> str:
-    return "layers are off" if case.layers == "no" else ""
-
-
-def _why_no_minimum_gap(case: Case) -> str:
-    """Return why layers do not give way; "" if they do."""
-    return _why_no_layers(case) or ("relaxation is off" if case.relax == "no" else "")
-
-
-def _why_no_repair(case: Case) -> str:
-    return "repair is off" if case.repair == "no" else ""
 
 
 def greedy(name: str, kind: Kind | None = None, **facts: Any) -> Key:
@@ -488,7 +488,7 @@ def get_reduction(case: Case) -> terms.DataReduction:
     return "AUTO" if case.reduction.auto else "YES"
 
 
-REDUCTION_ROWS = (
+_REDUCTION = (
     row(
         "DATA_REDUCTION",
         one_of(terms.DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
@@ -496,16 +496,10 @@ REDUCTION_ROWS = (
         get_reduction,
         default="AUTO",
     ),
-    greedy("DATA_RED_TOLERANCE", real(0.0), switch=why_no_tolerance),
-    greedy("DATA_RED_RELATIVE", real(0.0), switch=why_no_tolerance),
-    greedy("MULTILEVEL"),
-    greedy("MULTI_CRIT", switch=_why_no_levels),
-    greedy("LVL_TOL_CRIT", real(0.0, 1.0), switch=_why_no_levels),
-    greedy("LVL_SIZE", integer(1), switch=_why_no_levels),
+    greedy("DATA_RED_TOLERANCE", switch=why_no_tolerance),
+    greedy("DATA_RED_RELATIVE", switch=why_no_tolerance),
+    *(greedy(name, switch=_why_no_levels) for name in ("MULTI_CRIT", "LVL_TOL_CRIT", "LVL_SIZE")),
     row("DOUBLE_EDGE", YES_NO, _put_double_edge, lambda _: None),
-    greedy("SELECTION"),
-    greedy("MAX_CONTROL_NODES", integer(1)),
-    greedy("GAMMA", real(0.0)),
 )
 
 
@@ -563,8 +557,7 @@ def _read_ratio(text: str) -> float:
     return value
 
 
-METHOD_ROWS = (
-    setting("METHOD"),
+_METHOD = (
     setting(
         "SLIDING_MODE", idle_reason=nothing_slides, meaning=f"How nodes slide: not at all, {_WAYS}."
     ),
@@ -573,14 +566,11 @@ METHOD_ROWS = (
         "RELAX", idle_reason=lambda case: "" if case.relax == "yes" else other_method(case, "rbf")
     ),
     setting("STEPS", or_auto(integer(1, MAX_STEPS), "auto")),
-    setting(
-        "STEPS_GAIN", real(0.0, 1.0), switch=lambda case: "STEPS is a number" if case.steps else ""
-    ),
+    setting("STEPS_GAIN", switch=lambda case: "STEPS is a number" if case.steps else ""),
     replace(
         setting("INFLUENCE_FACTOR", or_auto(real(*FACTORS), "AUTO")),
         put=lambda case, factor: case.change(influence_factor=factor, support_radius=None),
     ),
-    setting("SUPPORT_RADIUS", real(0.0)),
     setting(
         "RBF_KERNEL",
         replace(
@@ -590,18 +580,11 @@ METHOD_ROWS = (
             words=terms.names(terms.KERNELS),
         ),
     ),
-    setting("POLYNOMIAL"),
     setting(
         "LAYERS",
         idle_reason=lambda case: "" if case.layers == "keep" else other_method(case, "rbf"),
     ),
-    setting("LAYER_THICKNESS", or_auto(real(0.0), "AUTO"), switch=_why_no_layers),
-    setting("LAYER_MINIMUM_GAP", real(0.0, 1.0, with_low=True), switch=_why_no_minimum_gap),
-    setting("REPAIR"),
-    setting("REPAIR_BELOW", real(0.0, 1.0, with_low=True), switch=_why_no_repair),
-    setting("REPAIR_STEPS", switch=_why_no_repair),
-    setting("IDW_POWER", real(0.0, 20.0, closed=True)),
-    setting("IDW_FIXED_WEIGHT", real(1e-12, 1e12)),
+    setting("LAYER_THICKNESS", or_auto(real(0.0), "AUTO")),
     setting(
         "DEFORM_STIFFNESS_TYPE",
         one_of(terms.STIFFNESS_TYPES, {"WALL_DISTANCE": "SOLID_WALL_DISTANCE"}),
@@ -613,8 +596,6 @@ METHOD_ROWS = (
     setting(
         "DEFORM_COEFF", Kind(_RATIOS, _read_ratio, lambda value: repr(float(value)), entry="real")
     ),
-    setting("CURVED"),
-    setting("FEATURE_ANGLE", real(0.0, 180.0, closed=True)),
 )
 
 
@@ -633,7 +614,7 @@ def _put_direction(case: Case, word: str) -> Case:
     return case.change(direction=direction, periodic_type=implied or case.periodic_type)
 
 
-PERIODIC_ROWS = (
+_PERIODIC = (
     setting("PERIODIC_MODE", idle_reason=no_pair),
     setting(
         "PERIODIC_TYPE",
@@ -680,7 +661,6 @@ _ROWS = (
     setting("MESH_OUT_FILENAME", PATH),
     setting("MESH_FORMAT", _FORMAT),
     setting("MESH_OUT_FORMAT", _FORMAT),
-    setting("ZONE", integer(1)),
     *map(role, ROLES),
     row(
         "MARKER_ZONE_INTERFACE",
@@ -706,27 +686,27 @@ _ROWS = (
         lambda case, motions: case.change(motions=(*_leading_file(case), *motions)),
         lambda case: case.motions[len(_leading_file(case)) :] or None,
     ),
-    *FFD_ROWS,
-    *PERIODIC_ROWS,
-    *METHOD_ROWS,
-    *REDUCTION_ROWS,
-    setting("GENERATE_QUALITY"),
-    setting("QUALITY_METRIC"),
+    *_FFD_ROWS,
+    *_PERIODIC,
+    *_METHOD,
+    *_REDUCTION,
     row(
         "LIMITS",
         LIMITS,
         lambda case, limits: case.change(limits=limits),
         lambda case: case.limits or None,
     ),
-    *VIEW_ROWS,
+    *_VIEW,
 )
-KEYS: dict[str, Key] = {key.name: key for key in _ROWS}
-_FIRST = (
-    *("METHOD", "SLIDING_MODE", *(key.name for key in PERIODIC_ROWS), "STEPS"),
-    *("RBF_KERNEL", "INFLUENCE_FACTOR", "DATA_REDUCTION", "DATA_RED_TOLERANCE", "FEATURE_ANGLE"),
-    *("STEPS_GAIN", "IDW_POWER", "IDW_FIXED_WEIGHT", "QUALITY_METRIC"),
-    *("DEFORM_STIFFNESS_TYPE", "DEFORM_COEFF"),
-    *("SELECTION", "MULTILEVEL", "LVL_SIZE", "GAMMA"),
-)
+
+
+def _usual(name: str) -> Key:
+    return greedy(name) if _WORDS[name]["group"] == REDUCTION else setting(name)
+
+
+_NAMED = {key.name: key for key in _ROWS}
+KEYS: dict[str, Key] = {name: _NAMED.get(name) or _usual(name) for name in _WORDS}
+"""All rows by name, in the order of ``keys.toml``, which is that of files."""
+REDUCTION_ROWS = tuple(key for key in KEYS.values() if key.group == REDUCTION)
 BY_WEIGHT = tuple(KEYS[name] for name in dict.fromkeys((*_FIRST, *KEYS)))
 """All rows, the most important first: the order of fields in the window and of words on a run."""
