@@ -209,6 +209,9 @@ LevelCriterion = Literal["size", "tol"]
 LEVEL_CRITERIA: dict[LevelCriterion, Term] = _table("LEVEL_CRITERIA", Term)
 """What ends a level of data reduction."""
 
+PHASES: dict[str, Term] = _table("PHASES", Term)
+"""The phases of a run, which ``Progress.phase`` names."""
+
 # Periodicity -------------------------------------------------------------------------------
 
 PeriodicMode = Literal["none", "periodic", "fixed", "moving"]

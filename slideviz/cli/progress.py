@@ -13,21 +13,8 @@ from slideviz.cli.terminal import control
 
 if TYPE_CHECKING:
     from slideviz.solver.deform import Progress
+from slideviz.terms import PHASES
 
-_PHASES = {
-    "classify": "sorting nodes",
-    "select": "choosing control nodes",
-    "solve": "solving",
-    "evaluate": "moving nodes",
-    "project": "sliding",
-    "relax": "relaxing cells",
-    "layers": "keeping layers",
-    "repair": "mending cells",
-    "read": "reading",
-    "write": "writing the mesh",
-    "quality": "measuring cells",
-    "convert": "converting",
-}
 _BEFORE = ("read", "convert", "classify")  # phases in which a run can still be refused
 _EVERY = 0.1
 _WIPE = "\r\033[K"  # control sequence that clears the line of a bar
@@ -110,7 +97,7 @@ class Bar:
         elif self._expected is not None:
             remaining = max(self._expected - (now - self._start), 0.0)
         left = "" if remaining is None else f", about {remaining:.0f} s left"
-        word = _PHASES.get(progress.phase, progress.phase)
+        word = PHASES[progress.phase].name
         steps = f"step {progress.step} of {progress.total}: {word}{progress.of_zone}{left}"
         self._draw(done, f"{self._head}{steps}")
 
@@ -133,7 +120,7 @@ class Bar:
             self._filled = max(self._filled, spent / (spent + progress.left or 1.0))
             filled = self._filled
             left = f", about {progress.left:.0f} s left in all"
-        word = _PHASES.get(progress.phase, progress.phase)
+        word = PHASES[progress.phase].name
         self._draw(filled, f"{self._head}{word}{progress.of_zone}: {100 * done:.0f} %{left}")
 
     def count(self, done: int, total: int, what: str, rest: float | None = None) -> None:

@@ -73,7 +73,7 @@ from slideviz.solver.rims import rims_key
 from slideviz.system.cleanup import private_folder
 from slideviz.system.csv_table import write_csv
 from slideviz.system.file_checks import require_regular_file
-from slideviz.terms import CELL_STATES
+from slideviz.terms import CELL_STATES, PHASES
 
 if TYPE_CHECKING:
     from slideviz.design.deformed_wheel import WheelQuality
@@ -222,20 +222,6 @@ def forget_intersection(session: Session, key: tuple[object, ...]) -> Session:
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]
 
-PHASES = {
-    "classify": "sorting nodes",
-    "solve": "solving",
-    "evaluate": "moving the nodes",
-    "project": "projecting onto the boundaries",
-    "relax": "relaxing the cells",
-    "layers": "keeping the layers at walls",
-    "repair": "mending the cells",
-    "quality": "quality",
-    "read": "reading the boundary",
-    "write": "copying the file",
-}
-"""Words in the window for the phases of a run (``Progress.phase``)."""
-
 
 @dataclass(frozen=True)
 class JobProgress:
@@ -328,7 +314,7 @@ def open_file(
 
 def _restored(run: Run, mesh: Mesh, report: Report, stopped: Stopped) -> Run:
     """Return a run of a session file, with the quality of its steps."""
-    tick = _tick(f"Run {run.number}: {PHASES['quality']}", report, stopped)
+    tick = _tick(f"Run {run.number}: {PHASES['quality'].label}", report, stopped)
     frames = []
     for k, one in enumerate(run.frames):
         tick(k / len(run.frames))
@@ -454,7 +440,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         raise_if_cancelled(stopped)
         # Sliding has its phases more than once in a step; a bar must not run back.
         furthest = max(furthest, overall(now))
-        phase = PHASES.get(now.phase, now.phase) + now.of_zone
+        phase = PHASES[now.phase].label + now.of_zone
         if case.steps:
             report(JobProgress(f"Step {now.step} of {now.total}: {phase}", furthest))
         elif now.phase == "classify":
@@ -508,7 +494,7 @@ def repair(
     stay.
     """
     *earlier, last = frames
-    tick = _tick(f"Repair: {PHASES['repair']}", report, stopped)
+    tick = _tick(f"Repair: {PHASES['repair'].label}", report, stopped)
     step = mended_frame(case, mesh, last.step, lambda now: tick(now.fraction))
     if step.safe is not None:  # the last straight way now ends at the mended mesh
         before = mesh
@@ -549,7 +535,7 @@ def compute_streamed(
     from slideviz.streaming.run import stream
 
     def progress(now: Progress) -> None:
-        phase = PHASES.get(now.phase, now.phase) + now.of_zone
+        phase = PHASES[now.phase].label + now.of_zone
         _tick(f"From file to file: {phase}", report, stopped)(overall(now))
 
     skin = first.mesh

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import os
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,20 +20,8 @@ from slideviz.system.cleanup import draft
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.platform import is_in_use, set_mode
 
-_REMEDIES = {  # reason and remedy by errno
-    errno.ENOENT: "the folder does not exist; create it first",
-    errno.EEXIST: "it is a file; choose another name",
-    errno.ENOTDIR: "a part of the path is a file, not a folder; choose another folder",
-    errno.EACCES: "no permission to write there; choose another folder or change its permissions",
-    errno.EPERM: "no permission to write there; choose another folder or change its permissions",
-    errno.EROFS: "the file system is read-only; choose another folder",
-    errno.ENOSPC: "the disk is full; free some space or choose another disk",
-    errno.EDQUOT: "the disk quota is used up; free some space or choose another disk",
-    errno.EFBIG: "the file is larger than the file system or the limit of the user allows",
-    errno.ENAMETOOLONG: "the file name is too long; choose a shorter one",
-    errno.ELOOP: "it is a symbolic link, whose target would be overwritten; remove the link",
-    errno.EISDIR: "it is a folder; give the name of a file",
-}
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_REMEDIES: dict[int, str] = {getattr(errno, name): words for name, words in _TABLE.items()}
 
 
 @contextmanager
