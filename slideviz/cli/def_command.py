@@ -24,7 +24,7 @@ from slideviz.cli.report import (
     print_remarks,
     report_outcome,
     run_report,
-    save_json,
+    save_report,
     write_qualities,
 )
 from slideviz.cli.run_command import measured, run_steps, silent_timer
@@ -168,7 +168,7 @@ def _set_boxes(arguments: Namespace, config: Su2Config, mesh: Mesh, begin: float
         "seconds": {"total": round(time.perf_counter() - begin, 6)},
         "warnings": list(case.warnings),
     }
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         for name, count in counts.items():
             print(f"FFD box {name}: {count} surface nodes")
         print(f"mesh: {case.mesh_out}")

@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.cli.def_command import read_configuration, variable_rows
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, save_json
+from slideviz.cli.report import print_remarks, save_report
 from slideviz.cli.terminal import DONE
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.gradients import Gradients, design_gradients, sensitivity_files
@@ -52,7 +52,7 @@ def main(arguments: Namespace) -> int:
         "seconds": {"total": round(time.perf_counter() - begin, 6)},
         "warnings": list(dict.fromkeys(found.warnings)),
     }
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         _print(report, sensitivities, gradient)
     print_remarks(report["warnings"], quiet=arguments.quiet)
     return DONE

@@ -10,7 +10,7 @@ from pathlib import Path
 from slideviz import deform, gaps, quality
 from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, save_json, table
+from slideviz.cli.report import print_remarks, save_report, table
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.design.blade_gaps import TOUCHING, Gap
 from slideviz.errors import CaseError, Remark
@@ -73,7 +73,7 @@ def main(arguments: Namespace) -> int:
             )
             raise CaseError(f"{mesh_file}: {why}")
         _draw(arguments.output, before, after)
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         for one, other in zip_longest(before, after):
             print(_lines(one, other))
         if arguments.output is not None:

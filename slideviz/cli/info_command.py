@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from slideviz.cli.mesh_source import open_mesh
 from slideviz.cli.output_paths import OutputPath, require_output_paths
-from slideviz.cli.report import info_report, save_json, table, zone_words
+from slideviz.cli.report import info_report, save_report, table, zone_words
 from slideviz.cli.terminal import DONE
 from slideviz.errors import MeshError
 from slideviz.ffd.box import Box
@@ -51,7 +51,7 @@ def _report(arguments: Namespace, mesh: Mesh, counts: CellCounts, found: Quality
             {"marker": i.marker, "zone": i.zone, "other": i.other, "nodes": len(i.nodes)}
             for i in mesh.interfaces
         ]
-    if save_json(arguments.json, report):
+    if not save_report(arguments, report):
         return DONE
     zone = zone_words(mesh.zone, mesh.zones)
     print(f"{arguments.mesh}: {mesh.dim}D{zone}, {counts.points} points")

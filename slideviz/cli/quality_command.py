@@ -22,7 +22,7 @@ from slideviz.cli.report import (
     quality_report,
     reference_words,
     report_limits,
-    save_json,
+    save_report,
     table,
     wall_lines,
 )
@@ -117,7 +117,7 @@ def _report(
     walls = None if layers is None else layers.summary()
     report |= {"walls": walls, "reference": str(reference) if reference else None}
     report |= {"metrics": metrics_report(metrics), "limits": limits_report(limits)}
-    if not save_json(arguments.json, report):
+    if save_report(arguments, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")
         print(quality_lines(found) + wall_lines(walls))

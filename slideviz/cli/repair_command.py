@@ -10,7 +10,7 @@ from typing import Any
 from slideviz import quality, read, repair, write
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, quality_lines, save_json
+from slideviz.cli.report import print_remarks, quality_lines, save_report
 from slideviz.cli.terminal import DONE, INVERTED, say
 from slideviz.formats.files import quality_data
 from slideviz.formats.losses import warning_of_losses
@@ -70,7 +70,7 @@ def main(arguments: Namespace) -> int:
         "seconds": {"total": round(time.perf_counter() - begin, 6)},
         "warnings": list(done.warnings),
     }
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         _print(report, f"{done.words()}, {done.moves}", found, before)
     print_remarks(done.warnings, quiet=arguments.quiet)
     if found.inverted:

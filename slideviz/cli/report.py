@@ -316,16 +316,16 @@ def _text(value: object) -> str:
     raise TypeError(f"a report cannot have {value!r}")
 
 
-def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
-    """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed."""
-    if path is None:
-        return False
-    text = json.dumps(report, indent=2, default=_text) + "\n"
+def save_report(arguments: Namespace, report: Mapping[str, Any]) -> bool:
+    """Write a report to the file of --json, or print it; return whether words are printed, too."""
+    path = arguments.json
+    text = json.dumps(report, indent=2, default=_text) + "\n" if path else ""
     if str(path) == "-":
         print(text, end="")
-        return True
-    write_whole(path, text, CaseError)
-    return False
+        return False
+    if path:
+        write_whole(path, text, CaseError)
+    return not arguments.quiet
 
 
 def save_history(path: Path, report: Mapping[str, Any]) -> None:
@@ -411,7 +411,7 @@ def report_outcome(
     advice = _advice(case, done, report["limits"])
     if arguments.history:
         save_history(arguments.history, report)
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}

@@ -14,7 +14,7 @@ from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli.mesh_source import open_mesh, optional_case, progress_of
 from slideviz.cli.output_paths import OutputPath, require_output_paths
-from slideviz.cli.report import reference_words, save_json
+from slideviz.cli.report import reference_words, save_report
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.errors import CaseError
 from slideviz.export.flat_section import section as draw
@@ -122,7 +122,7 @@ def _report(arguments: Namespace, scene: _Scene, shown: SectionInRun) -> int:
         "picture": str(arguments.output),
         **summary,
     }
-    if not save_json(arguments.json, report):
+    if save_report(arguments, report):
         print(f"{Path(mesh.name).name}: {chosen.describe(mesh.dim)}")
         print(f"  {shown.paint.sentence(shown.ids)}, worst is cell {summary['worst_cell']}")
         if shown.note or scene.reference:
@@ -176,7 +176,7 @@ def _meridional(arguments: Namespace, case: Case | None) -> int:
         **(zones[0] if len(zones) == 1 else {"zones": zones}),
         **summary,
     }
-    if not save_json(arguments.json, report):
+    if save_report(arguments, report):
         print(f"{name}: from {walls.words}\n  {facts}")
         print(f"  {reference_words(reference)}\n  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE

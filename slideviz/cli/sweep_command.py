@@ -18,7 +18,7 @@ from slideviz.case.words import counted, first_of
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, save_json, table
+from slideviz.cli.report import print_remarks, save_report, table
 from slideviz.cli.terminal import DONE
 from slideviz.design.sweeps.table import RESULTS, DesignRow, Designs, numbers_of, read_designs
 from slideviz.errors import CaseError, Remark
@@ -67,7 +67,7 @@ def main(arguments: Namespace) -> int:
         results = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
     report = _report(arguments, designs, results, time.perf_counter() - begin)
     report["results"] = str(folder / RESULTS)
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         _print_sweep(report)
     problems = {row.problem for row in results}
     if len(problems) == 1 and report["failed"] == len(results):

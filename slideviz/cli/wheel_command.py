@@ -7,7 +7,13 @@ from argparse import Namespace
 from slideviz import wheel
 from slideviz.cli.mesh_source import read_inputs
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import limit_lines, limits_report, print_remarks, report_limits, save_json
+from slideviz.cli.report import (
+    limit_lines,
+    limits_report,
+    print_remarks,
+    report_limits,
+    save_report,
+)
 from slideviz.cli.terminal import INVERTED
 from slideviz.design.deformed_wheel import WheelQuality
 
@@ -31,7 +37,7 @@ def main(arguments: Namespace) -> int:
     several = {"zones": [_numbers(zone) for zone in made.zones]} if made.zones else {}
     report = {"path": str(made.path)} | _numbers(made) | several
     report |= {"limits": limits, "warnings": list(made.messages)}
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if save_report(arguments, report):
         if made.zones:
             print(f"{made.path}:")
             for number, zone in enumerate(made.zones, 1):
