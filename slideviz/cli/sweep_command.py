@@ -20,7 +20,14 @@ from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks, save_report, table
 from slideviz.cli.terminal import DONE
-from slideviz.design.sweeps.table import RESULTS, DesignRow, Designs, numbers_of, read_designs
+from slideviz.design.sweeps.table import (
+    RESULTS,
+    DesignRow,
+    Designs,
+    failures,
+    numbers_of,
+    read_designs,
+)
 from slideviz.errors import CaseError, Remark
 from slideviz.system.atomic import make_folder
 from slideviz.system.cleanup import keep_partial
@@ -122,7 +129,7 @@ def _executor(arguments: Namespace) -> Iterator[Executor | None]:
 def _pulled(
     arguments: Namespace, rows: Iterator[DesignRow], total: int, results: Path
 ) -> list[DesignRow]:
-    """Run all designs and return their rows, with a progress bar."""
+    """Run all designs and return their rows in the order of the table, with a progress bar."""
     found: list[DesignRow] = []
     begin = time.monotonic()
     earlier = 0
@@ -136,7 +143,7 @@ def _pulled(
             fresh = len(found) - earlier
             left = (time.monotonic() - begin) / fresh * (total - len(found)) if fresh else None
             bar.count(len(found), total, "designs:", left)
-    return found
+    return sorted(found, key=lambda row: row.design)
 
 
 def _report(
@@ -151,7 +158,7 @@ def _report(
         "designs": len(rows),
         "earlier": len(rows) - len(fresh),
         "failed": len(rows) - len(done),
-        "inverted": [row.design for row in sorted(done, key=_number) if row.inverted],
+        "inverted": [row.design for row in rows if row.inverted],
         "limits": _missed(rows),
         "best": _named(done[0]) if done else None,
         "worst": _named(done[-1]) if done else None,
@@ -163,15 +170,11 @@ def _report(
 def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     """Return the entry of a report for each limit that designs miss: limit and their numbers."""
     missed: dict[str, list[int]] = {}
-    for row in sorted(rows, key=_number):
+    for row in rows:
         for text in row.limits.removesuffix(MET).split("; "):
             if text:
                 missed.setdefault(text.rpartition(": ")[0], []).append(row.design)
     return [{"limit": limit, "designs": designs} for limit, designs in missed.items()]
-
-
-def _number(row: DesignRow) -> int:
-    return row.design
 
 
 def _named(row: DesignRow) -> dict[str, Any]:
@@ -207,10 +210,7 @@ def _counted(designs: Sequence[int]) -> str:
 def _warn(warnings: Sequence[Remark], rows: Sequence[DesignRow], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason with its designs."""
     print_remarks(warnings, quiet=quiet)
-    reasons: dict[str, list[int]] = {}
-    for row in sorted(rows, key=_number):
-        if row.problem:
-            reasons.setdefault(row.problem, []).append(row.design)
+    reasons = failures(rows)
     for reason, failed in list(reasons.items())[:_LISTED]:
         word = "design" if len(failed) == 1 else "designs"
         print(f"slideviz: warning: {word} {first_of(failed, _LISTED)}: {reason}", file=sys.stderr)

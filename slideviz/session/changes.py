@@ -472,7 +472,7 @@ def start_run(
         if run.frames
         and not (live and run.live and not run.name and not run.saved and run.number != view.beside)
     )
-    number = 1 + max((session.newest, *(run.number for run in session.runs)))
+    number = 1 + session.last_number
     panels = session.case if name else None
     preview = None if name else session.preview
     run = Run(number, case or session.case, name=name, panels=panels, live=live)
@@ -546,8 +546,7 @@ def remove_run(session: Session, number: int) -> Session:
     runs = tuple(other for other in session.runs if other.number != number)
     beside = None if session.view.beside == number else session.view.beside
     removed = (*session.removed, run)[-MOST_REMOVED:]
-    newest = max(session.newest, *(other.number for other in session.runs))
-    session = replace(session, runs=runs, removed=removed, newest=newest)
+    session = replace(session, runs=runs, removed=removed, newest=session.last_number)
     session = set_view(session, beside=beside)
     if session.shown != number:
         return session

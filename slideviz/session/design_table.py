@@ -18,6 +18,7 @@ from slideviz.design.sweeps.table import (
     case_values,
     cells_of,
     columns_of,
+    failures,
     head_of,
     numbers_of,
     read_designs,
@@ -151,10 +152,7 @@ class DesignTable:
         """Return the results in words: counts, and a line for each reason why designs failed."""
         done = self.count_done()
         bad = sum(row.inverted > 0 for row in self.results.values())
-        reasons: dict[str, list[int]] = {}
-        for number in sorted(self.results):
-            if reason := self.results[number].problem:
-                reasons.setdefault(reason, []).append(number)
+        reasons = failures([self.results[number] for number in sorted(self.results)])
         failed = len(self.results) - done
         parts = [f"{counted(done, 'design')} done"]
         missing = sum(bool(row.limits.removesuffix(MET)) for row in self.results.values())

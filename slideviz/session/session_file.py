@@ -97,7 +97,7 @@ def stored_session(
         guesses=session.guesses,
         runs=tuple(replace(run, saved=True) for run in runs if run.end),
         shown=session.shown,
-        newest=max((session.newest, *(run.number for run in session.runs))),
+        newest=session.last_number,
         view=session.view,
         section_names=tuple(section.name for section in session.view.sections),
         designs=designs,

@@ -435,6 +435,11 @@ class Session:
         return next((run for run in self.runs if run.number == number), None)
 
     @property
+    def last_number(self) -> int:
+        """Return the highest number that a run had so far."""
+        return max((self.newest, *(run.number for run in self.runs)))
+
+    @property
     def run_shown(self) -> Run | None:
         """Return the run whose steps are shown, or None."""
         return self.run(self.shown)

@@ -299,6 +299,15 @@ WORDS = ("mesh", "warnings", "problem")  # the columns of texts after the number
 _SEPARATORS = (",", ";", "\t")
 
 
+def failures(rows: Iterable[DesignRow]) -> dict[str, list[int]]:
+    """Return the numbers of the designs that failed, by the reason."""
+    reasons: dict[str, list[int]] = {}
+    for row in rows:
+        if row.problem:
+            reasons.setdefault(row.problem, []).append(row.design)
+    return reasons
+
+
 @dataclass(frozen=True)
 class Design:
     """A row of the table: its number (from 1), its values by column, and its case."""
