@@ -124,21 +124,24 @@ def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatA
     knot = knots(count, order)
     degree = order - 1
     span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)
+
+    def around(degree: int) -> tuple[FloatArray, FloatArray]:
+        """Return the two knots around each function of degree - 1 that is not zero in the span."""
+        begin = span[:, None]
+        return knot[begin + np.arange(1 - degree, 1)], knot[begin + np.arange(1, degree + 1)]
+
     lower = np.zeros((len(at), 0))
     basis = np.ones((len(at), 1))
     for j in range(1, order):
         lower = basis
-        # The two knots around each function of degree j - 1 that is not zero in the span.
-        left = knot[span[:, None] + np.arange(1 - j, 1)]
-        right = knot[span[:, None] + np.arange(1, j + 1)]
+        left, right = around(j)
         part = lower / (right - left)
         basis = np.zeros((len(at), j + 1))
         basis[:, :-1] = (right - at[:, None]) * part
         basis[:, 1:] += (at[:, None] - left) * part
     slope = np.zeros_like(basis)
     if degree:
-        left = knot[span[:, None] + np.arange(1 - degree, 1)]
-        right = knot[span[:, None] + np.arange(1, degree + 1)]
+        left, right = around(degree)
         part = degree * lower / (right - left)
         slope[:, :-1] -= part
         slope[:, 1:] += part

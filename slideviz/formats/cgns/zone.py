@@ -118,8 +118,7 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
             f"has {what} ({name}), but slideviz needs linear elements ({', '.join(_VTK)}, MIXED); "
             "export the mesh with these"
         )
-    if (rind := node.child("Rind_t")) is not None and rind.integers(-1).any():
-        raise rind.fault("the section has rind elements, which are not read; export without them")
+    _refuse_rind(node, "the section has rind elements, which are not read; export without them")
     start, end = node.needed("IndexRange_t", "ElementRange").integers(2).tolist()
     if not 1 <= start <= end:
         raise node.fault(f"its ElementRange is {start} to {end}; it must rise from 1 or more")
@@ -245,14 +244,19 @@ def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
     return CgnsZone(node, dim, shape, points, cells, sides, tuple(sections), datasets)
 
 
+def _refuse_rind(node: Node, words: str) -> None:
+    if (rind := node.child("Rind_t")) is not None and rind.integers(-1).any():
+        raise rind.fault(words)
+
+
 def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the vertices (n, count) of a zone, and the paths of their datasets; or MeshError."""
     grid = zone.needed("GridCoordinates_t", "GridCoordinates")
-    if (rind := grid.child("Rind_t")) is not None and rind.integers(-1).any():
-        raise rind.fault(
-            "the coordinates have rind planes (copies of neighbours), which are not read; export "
-            "the mesh without them"
-        )
+    _refuse_rind(
+        grid,
+        "the coordinates have rind planes (copies of neighbours), which are not read; export the "
+        "mesh without them",
+    )
     nodes = {node.name: node for node in grid.children("DataArray_t")}
     columns = []
     datasets = []
