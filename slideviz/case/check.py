@@ -24,6 +24,7 @@ from slideviz.case.zone_cases import with_marker_names, zone_cases
 from slideviz.errors import CaseError, Doubt, Message, most_similar, note
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
+from slideviz.system.grouping import grouped
 from slideviz.terms import KERNELS, ROLES, SLIDES
 
 if TYPE_CHECKING:
@@ -386,19 +387,19 @@ def idle_settings(case: Case) -> tuple[Message, ...]:
 
 def file_before_motions(case: Case) -> tuple[Message, ...]:
     """Return a note for each sequence of motions that begins with a file for all boundaries."""
-    sequences: dict[tuple[Motion, ...], list[str]] = {}
-    for marker in case.markers_with("moving"):
-        sequence = tuple(motion for motion in case.motions if applies_to(motion, marker))
-        if len(sequence) > 1:
-            sequences.setdefault(sequence, []).append(marker)
+    sequences = grouped(
+        (tuple(motion for motion in case.motions if applies_to(motion, marker)), marker)
+        for marker in case.markers_with("moving")
+    )
     return tuple(
         note(
-            f"{first.files[0].name} moves {' and '.join(markers)} first (DEFORMATION_FILENAME), "
-            f"and then MOTION does so: {'; '.join(map(describe, others))}; "
+            f"{sequence[0].files[0].name} moves {' and '.join(markers)} first "
+            "(DEFORMATION_FILENAME), and then MOTION does so: "
+            f"{'; '.join(map(describe, sequence[1:]))}; "
             "DEFORMATION_FILENAME= NONE leaves the file out"
         )
-        for (first, *others), markers in sequences.items()
-        if first.is_case_file
+        for sequence, markers in sequences.items()
+        if len(sequence) > 1 and sequence[0].is_case_file
     )
 
 

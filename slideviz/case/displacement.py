@@ -17,6 +17,7 @@ from slideviz.case.lines import listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
 from slideviz.errors import CaseError, Message, Remark, raise_all, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.system.grouping import grouped
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
 _ZONE = re.compile(r"\s*(\d+):(.*)")
@@ -216,9 +217,7 @@ def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArr
             rows += _row(content, dim, columns)
         except CaseError as problem:
             problems += problem.within(line=line)
-    kinds: dict[str, list[Message]] = {}
-    for mistake in problems:
-        kinds.setdefault(mistake.rule, []).append(mistake)
+    kinds = grouped((mistake.rule, mistake) for mistake in problems)
     raise_all(listed(path, [_with_count(kind[0], len(kind)) for kind in kinds.values()]))
     return np.array(rows, np.float64)
 

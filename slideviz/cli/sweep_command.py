@@ -31,6 +31,7 @@ from slideviz.design.sweeps.table import (
 from slideviz.errors import CaseError, Remark
 from slideviz.system.atomic import make_folder
 from slideviz.system.cleanup import keep_partial
+from slideviz.system.grouping import grouped
 
 _LISTED = 5
 """Most designs that are listed in one line, and most reasons of failed designs that are printed."""
@@ -169,11 +170,12 @@ def _report(
 
 def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     """Return the entry of a report for each limit that designs miss: limit and their numbers."""
-    missed: dict[str, list[int]] = {}
-    for row in rows:
-        for text in row.limits.removesuffix(MET).split("; "):
-            if text:
-                missed.setdefault(text.rpartition(": ")[0], []).append(row.design)
+    missed = grouped(
+        (text.rpartition(": ")[0], row.design)
+        for row in rows
+        for text in row.limits.removesuffix(MET).split("; ")
+        if text
+    )
     return [{"limit": limit, "designs": designs} for limit, designs in missed.items()]
 
 

@@ -22,6 +22,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.solver.deform import Progress
 from slideviz.solver.setup import Setup
 from slideviz.system.platform import free_memory
+from slideviz.system.grouping import grouped
 
 TURN = np.radians(5.0)
 """Angle in radians: what moves is displaced by it, times a third of its size, where control nodes
@@ -136,16 +137,16 @@ def displacements_of(case: Case, mesh: Mesh, nodes: IntArray) -> Iterator[FloatA
     Of bodies that only affine motions move, all affine ones; for each number of the others, the
     displacement by a unit of it.
     """
-    bodies: dict[tuple[int, ...], list[IntArray]] = {}
-    for name in case.markers_with("moving"):
-        by = tuple(k for k, one in enumerate(case.motions) if applies_to(one, name))
-        bodies.setdefault(by, []).append(mesh.marker(name).nodes)
+    bodies = grouped(
+        (tuple(k for k, one in enumerate(case.motions) if applies_to(one, name)), name)
+        for name in case.markers_with("moving")
+    )
     others = set[int]()
-    for by, parts in bodies.items():
+    for by, names in bodies.items():
         if not all(case.motions[k].affine for k in by):
             others.update(by)
             continue
-        rows = np.searchsorted(nodes, np.unique(np.concatenate(parts)))
+        rows = np.searchsorted(nodes, mesh.nodes_of(names))
         arm = mesh.points[nodes[rows]]
         arm = arm - arm.mean(axis=0)
         for factor in (np.ones(len(rows)), *arm.T):

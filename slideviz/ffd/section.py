@@ -27,6 +27,7 @@ from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, Skin, ZonePart
 from slideviz.mesh.zones import names_from, names_in, require_one_zone, with_zones, zones_of
+from slideviz.system.grouping import grouped
 from slideviz.system.weak_cache import WeakCache
 
 _LETTERS = "IJK"
@@ -221,9 +222,8 @@ class _Reader:
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
         key = "FFD_SURFACE_POINTS"
-        on: dict[str, list[Row]] = {}
-        for line, words in self.rows(key, self.count(key)):
-            on.setdefault(words[0], []).append((line, words[1:]))
+        rows = self.rows(key, self.count(key))
+        on = grouped((words[0], (line, words[1:])) for line, words in rows)
         surfaces = {}
         for marker, tails in on.items():
             table = self.table(key, tails, 4)

@@ -11,10 +11,10 @@ import numpy as np
 
 from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.design.sweeps.table import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 from slideviz.session.design_table import DesignTable
+from slideviz.system.grouping import grouped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,11 +61,8 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
     """
     at = table.columns.index(column)
     place_of, words = _places(table, column)
-    groups: dict[tuple[str, ...], list[DesignRow]] = {}
-    for number, row in sorted(table.results.items()):
-        if not row.problem:
-            values = table.rows[number - 1]
-            groups.setdefault(values[:at] + values[at + 1 :], []).append(row)
+    done = [(table.rows[k - 1], row) for k, row in sorted(table.results.items()) if not row.problem]
+    groups = grouped((values[:at] + values[at + 1 :], row) for values, row in done)
     others = [name for name in table.columns if name != column]
     curves = []
     for fixed, rows in groups.items():

@@ -27,6 +27,7 @@ from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_dots, row_n
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.system.grouping import grouped
 from slideviz.system.threads import ordered_map
 from slideviz.terms import ROLES
 
@@ -272,10 +273,9 @@ def _by_surfaces(
     single = pairs[~several]
     more = pairs[several]
     groups = {(int(label),): single[single[:, 1] == label, 0] for label in np.unique(single[:, 1])}
-    together: dict[tuple[int, ...], list[int]] = {}
-    for node in np.unique(more[:, 0]):
-        key = tuple(int(label) for label in more[more[:, 0] == node, 1])
-        together.setdefault(key, []).append(int(node))
+    together = grouped(
+        (tuple(more[more[:, 0] == node, 1].tolist()), int(node)) for node in np.unique(more[:, 0])
+    )
     found = [*groups.items(), *((key, np.array(nodes)) for key, nodes in together.items())]
     return [(nodes, np.array(key)) for key, nodes in found]
 

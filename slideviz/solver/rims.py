@@ -26,6 +26,7 @@ from slideviz.rbf.frames import corners
 from slideviz.rbf.projection import across_period, as_simplices, surface_labels, surface_rim
 from slideviz.rbf.rims import Bodies, CurvedWall, FlatWall, Rims, RimWall, side_weights
 from slideviz.solver.domain import Domain, find_domain
+from slideviz.system.grouping import grouped
 from slideviz.system.weak_cache import WeakCache
 from slideviz.terms import Role
 
@@ -165,11 +166,9 @@ def _curved_walls(
         across = across_period(boundary, domain.classes.representative, roles)
     vectors = corner_vectors(place(boundary.facets))
     labels = surface_labels(boundary, vectors, roles, case.feature_angle_deg, across)
-    groups: dict[tuple[int, ...], list[int]] = {}
     merge = np.cos(np.radians(case.feature_angle_deg * MERGE_FRACTION))
-    for one, chosen in _surfaces(node, labels[facet], unit(vectors)[facet], float(merge)):
-        groups.setdefault(chosen, []).append(one)
-    for chosen, nodes in groups.items():
+    pairs = _surfaces(node, labels[facet], unit(vectors)[facet], float(merge))
+    for chosen, nodes in grouped(pairs).items():
         member = np.isin(labels, chosen)
         there, some = np.unique(boundary.facets[member], return_inverse=True)
         of_rim = np.isin(node, nodes) & member[facet]
@@ -186,8 +185,8 @@ def _curved_walls(
 
 def _surfaces(
     node: IntArray, label: IntArray, normal: FloatArray, merge: float
-) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """Yield each node with the labels of a wall that it is on, once for each wall.
+) -> Iterator[tuple[tuple[int, ...], int]]:
+    """Yield the labels of a wall, and a node on it, once for each wall of each node.
 
     Surfaces whose normals at the node have a cosine above ``merge`` are one wall: a blade that
     divides a hub has it on both sides. ``node``, ``label`` (p,), ``normal`` (p, d): of each pair of
@@ -200,12 +199,12 @@ def _surfaces(
     starts = np.flatnonzero(np.r_[True, pairs[1:, 0] != pairs[:-1, 0]])
     for first, last in zip(starts, np.r_[starts[1:], len(pairs)], strict=True):
         if last == first + 1:
-            yield int(pairs[first, 0]), (int(pairs[first, 1]),)
+            yield (int(pairs[first, 1]),), int(pairs[first, 0])
             continue
         alike = normals[first:last] @ normals[first:last].T > merge
         wall = components(last - first, *np.nonzero(alike))
         for k in range(wall.max() + 1):
-            yield int(pairs[first, 0]), tuple(pairs[first:last, 1][wall == k].tolist())
+            yield tuple(pairs[first:last, 1][wall == k].tolist()), int(pairs[first, 0])
 
 
 def _bodies(

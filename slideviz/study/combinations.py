@@ -31,6 +31,7 @@ from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.steps import Progress, Step
 from slideviz.system import csv_table
+from slideviz.system.grouping import grouped
 from slideviz.terms import SLIDING, PeriodicMode
 
 Value = str | int | float
@@ -404,10 +405,7 @@ def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combi
 
 def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]:
     """Return for each reason the combinations that have it."""
-    groups: dict[str, list[Combination]] = {}
-    for combination, problem in problems.items():
-        groups.setdefault(" ".join(problem.split()), []).append(combination)
-    return groups
+    return grouped((" ".join(problem.split()), one) for one, problem in problems.items())
 
 
 def words_for(some: Iterable[Combination], every: Iterable[Combination], names: Names) -> str:

@@ -38,6 +38,7 @@ from slideviz.mesh.model import Assembly, IntArray, Marker, Mesh
 from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
+from slideviz.system.grouping import grouped
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
@@ -572,9 +573,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     faults = dict[Message, None]()
     # SU2, ``CConfig::SetDefaultFromConfig``: a key counts for the zones whose files lack it.
     inherited = {key: replace(entry, line=-entry.line) for key, entry in rows.items()}
-    zones_of: dict[Path, list[int]] = {}  # the numbers that each file is listed for
-    for zone, file in enumerate(files, 1):
-        zones_of.setdefault(file, []).append(zone)
+    zones_of = grouped((file, zone) for zone, file in enumerate(files, 1))
     for file, numbers in zones_of.items():
         try:
             own, problems, said = _rows(file)

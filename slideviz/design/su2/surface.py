@@ -76,6 +76,7 @@ from slideviz.mesh.quality import quality
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step
+from slideviz.system.grouping import grouped
 from slideviz.terms import Side
 
 UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
@@ -1008,9 +1009,7 @@ class ZoneDisplacers(Displacer):
     @cached_property
     def _owners(self) -> list[list[tuple[int, int]]]:
         """The zones that have each variable, and its place in their lists."""
-        having: dict[tuple[DesignVariable, ...], list[int]] = {}
-        for k, zone in enumerate(self.zones):
-            having.setdefault(zone.config.variables, []).append(k)
+        having = grouped((zone.config.variables, k) for k, zone in enumerate(self.zones))
         return [[(k, at) for k in some] for each, some in having.items() for at in range(len(each))]
 
     @property

@@ -47,6 +47,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.system.atomic import make_folder, reason_of, write_whole
 from slideviz.system.csv_table import csv_rows, csv_text, write_csv
 from slideviz.system.file_checks import read_json, require_regular_file
+from slideviz.system.grouping import grouped
 
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""
@@ -301,11 +302,7 @@ _SEPARATORS = (",", ";", "\t")
 
 def failures(rows: Iterable[DesignRow]) -> dict[str, list[int]]:
     """Return the numbers of the designs that failed, by the reason."""
-    reasons: dict[str, list[int]] = {}
-    for row in rows:
-        if row.problem:
-            reasons.setdefault(row.problem, []).append(row.design)
-    return reasons
+    return grouped((row.problem, row.design) for row in rows if row.problem)
 
 
 @dataclass(frozen=True)

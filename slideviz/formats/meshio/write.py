@@ -23,6 +23,7 @@ from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import draft
+from slideviz.system.grouping import grouped
 
 _NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
 """meshio's name of an element type by VTK identifier."""
@@ -207,10 +208,11 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
 def boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
     """Return for each type of boundary element: type, nodes (m, n), marker's number from 1 (m,)."""
-    blocks: dict[int, list[tuple[NDArray, NDArray]]] = {}
-    for number, marker in enumerate(mesh.markers, 1):
-        for vtk, (_, nodes) in marker.cells.by_type.items():
-            blocks.setdefault(vtk, []).append((nodes, np.full(len(nodes), number)))
+    blocks = grouped(
+        (vtk, (nodes, np.full(len(nodes), number)))
+        for number, marker in enumerate(mesh.markers, 1)
+        for vtk, (_, nodes) in marker.cells.by_type.items()
+    )
     return [
         (vtk, np.concatenate([n for n, _ in parts]), np.concatenate([t for _, t in parts]))
         for vtk, parts in blocks.items()
