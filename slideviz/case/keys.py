@@ -9,7 +9,6 @@ AUTO_TOLERANCE of `slideviz.solver.setup`.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -46,6 +45,7 @@ from slideviz.case.values import (
 from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
 from slideviz.errors import CaseError, Message, shown
 from slideviz.rbf.reduction import Reduction
+from slideviz.system.tables import table_beside
 from slideviz.terms import (
     COLOR_BY,
     COLOR_MAPS,
@@ -136,7 +136,7 @@ def other_method(case: Case, method: Method | None) -> str:
     return f"{label if label[:2].isupper() else label[0].lower() + label[1:]} does not use it"
 
 
-_TABLE = tomllib.loads(Path(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+_TABLE = table_beside(__file__)
 _FIRST = _TABLE.pop("first")
 
 

@@ -5,12 +5,12 @@ Their geometry is in the classes of `slideviz.sections.model`.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
 from typing import Any
+
+from slideviz.system.tables import table_beside
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _shape(value: str, row: dict[str, Any]) -> ShapeTerms:
     return ShapeTerms(value, size=size, words=words, **row)
 
 
-_ROWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_ROWS = table_beside(__file__)
 SECTION_SHAPES = {value: _shape(value, row) for value, row in _ROWS.items()}
 
 

@@ -5,7 +5,6 @@ This module loads neither NumPy nor the commands, so that help is quick.
 
 from __future__ import annotations
 
-import tomllib
 from argparse import ArgumentTypeError, _ActionsContainer
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli import argument_readers
 from slideviz.errors import CaseError
 from slideviz.formats.table import own_endings
+from slideviz.system.tables import table_beside
 
 Read = TypeVar("Read")
 
@@ -48,7 +48,7 @@ _TYPES: dict[str, Callable[[str], Any]] = {
     "float": float,
     "lower": str.lower,
 }
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TABLE = table_beside(__file__)
 _SHARED = _TABLE.pop("shared")
 COMMANDS = {
     name: Command(**row | {"help": row["help"].format(**_WORDS)}) for name, row in _TABLE.items()

@@ -21,8 +21,8 @@ from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.solver.deform import Progress
 from slideviz.solver.setup import Setup
-from slideviz.system.platform import free_memory
 from slideviz.system.grouping import grouped
+from slideviz.system.platform import free_memory
 
 TURN = np.radians(5.0)
 """Angle in radians: what moves is displaced by it, times a third of its size, where control nodes

@@ -7,7 +7,6 @@ module imports no reader or writer: a row names its functions, which are importe
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -19,6 +18,7 @@ from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
+from slideviz.system.tables import table_beside
 from slideviz.terms import FILE_FORMATS, FileFormat
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class MeshFormat:
 MESHIO = MeshFormat("", "a format of meshio", boundaries="numbers")
 """Any other format: meshio knows it, or nobody."""
 
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TABLE = table_beside(__file__)
 _ROWS = tuple(MeshFormat(ending, **row) for ending, row in _TABLE.items())
 FORMATS: dict[str, MeshFormat] = {row.ending: row for row in _ROWS}
 """Formats by ending; meshio writes more, but hardly any that stores boundaries besides cells."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import errno
 import os
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,8 +18,9 @@ from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.system.cleanup import draft
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.platform import is_in_use, set_mode
+from slideviz.system.tables import table_beside
 
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TABLE = table_beside(__file__)
 _REMEDIES: dict[int, str] = {getattr(errno, name): words for name, words in _TABLE.items()}
 
 

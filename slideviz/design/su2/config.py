@@ -7,7 +7,6 @@ parts between semicolons, and passes over what follows the last one.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -39,6 +38,7 @@ from slideviz.mesh.zones import join_zones, names_in, numbered, spellings
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
 from slideviz.system.grouping import grouped
+from slideviz.system.tables import table_beside
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
@@ -65,11 +65,8 @@ class VariableKind:
         return self.form.replace(",", " ").split()
 
 
-def _table(ending: str) -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_name(ending).read_text(encoding="utf-8"))
-
-
-KINDS = {name: VariableKind(**row) for name, row in _table("variables.toml").items()}
+_TABLE = table_beside(__file__)
+KINDS = {name: VariableKind(**row) for name, row in _TABLE["kinds"].items()}
 """SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
 WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
 """Groups whose values mean nothing."""
@@ -356,7 +353,6 @@ READ_WITH_RBF = {
     "DEFORM_NONLINEAR_ITER": integer(1, MAX_STEPS),
 }
 """Kinds of values; of keys that mean something else unless DEFORM_KIND is RBF."""
-_TABLE = _table("config.toml")
 ELASTIC: dict[str, str] = _TABLE["elastic"]
 """Keys that are read with METHOD= elastic, with SU2's defaults (version 8.5)."""
 FUNCTION = "KIND_RADIAL_BASIS_FUNCTION"
