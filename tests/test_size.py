@@ -36,6 +36,12 @@ def test_an_interpolated_string_is_one_token(text):
     assert size.tokens_in(f"x = {text}\n") == 3
 
 
+def test_each_key_and_value_of_a_table_counts(tmp_path):
+    (tmp_path / "terms.toml").write_text('# Words.\n[roles.fixed]\nname = "fixed"\nends = [1, 2]\n')
+    (tmp_path / "theme.json").write_text('{"light": {"edge": "#000"}}')
+    assert size.by_package(tmp_path) == {"terms.toml": 4 + 3, "theme.json": 2 + 1}
+
+
 def test_packages_are_counted_and_the_budget_holds(tmp_path, capsys, monkeypatch):
     package = tmp_path / "slideviz" / "mesh"
     package.mkdir(parents=True)
