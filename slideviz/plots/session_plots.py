@@ -24,7 +24,7 @@ from slideviz.plots.spanwise import Profile, along, in_layers
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
-from slideviz.sections.span import SpanWalls, find_walls
+from slideviz.sections.span import ConstantSpan, SpanWalls, between_walls, find_walls
 from slideviz.session.changes import show_frame
 from slideviz.session.passages import find_periods
 from slideviz.session.section_cuts import Cuts
@@ -126,8 +126,8 @@ def _profile(
         # In layers of the undeformed mesh, so that layers of cells stay together.
         values = frame.quality.values
         if coordinate == "span":
-            walls = walls_in(session)
-            span = walls.span(walls.field.meridional(mesh.points))
+            section = between_walls(ConstantSpan("span", span=0.5), walls_in(session))
+            span = section.positions(mesh.points)
             profile = in_layers(mesh, values, span, coordinate, label=label)
         else:
             profile = along(mesh, values, coordinate, case.axis, case.origin, label=label)

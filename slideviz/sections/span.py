@@ -303,6 +303,10 @@ class SpanPlane(ConstantSpan):
     ) -> FloatArray:
         return self.plane.crossings(edges, level)
 
+    def positions(self, points: FloatArray) -> FloatArray:
+        """Return spans (n,); what is beyond root or tip counts as at it."""
+        return np.clip(super().positions(points), 0.0, 1.0)
+
     def keeps(self, turned: FloatArray, step: FloatArray) -> float:
         return self.plane.keeps(turned, step)
 

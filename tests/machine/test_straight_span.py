@@ -15,13 +15,14 @@ from slideviz.case.spans import span_ends, span_field
 from slideviz.cli import run as command
 from slideviz.errors import CaseError, MeshError
 from slideviz.machine.straight_span import StraightSpan
+from slideviz.plots.session_plots import profiles
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.span import ConstantSpan, SpanPlane, between_walls, find_walls
 from slideviz.session.opening import open_mesh
 from slideviz.session.saving import with_walls
-from slideviz.session.section_cuts import first_section
+from slideviz.session.section_cuts import first_section, position_range
 from slideviz.session.state import StepFrame
 from tests.builders import box_rules, grid
 
@@ -270,6 +271,7 @@ def test_a_section_at_a_span_is_a_plane(wing, tmp_path, capsys):
     matrix = np.eye(4)
     matrix[0, 3] = 2.0
     assert np.array_equal(section.flat_matrix(matrix, 0.0), plane.flat_matrix(matrix, 0.0))
+    assert position_range(section, mesh.points) == (0.0, 1.0)
     # Its handle moves along the span.
     patch = section.patch(cut.points)
     ends = [section.surface(np.array([patch.middle]), span) for span in (0.3, 0.4)]
@@ -299,6 +301,13 @@ def test_the_window_keeps_it_with_root_and_tip(wing):
     # Another kind of span makes it a section of another class, and back.
     about = ConstantSpan("span", span=0.5)
     assert isinstance(with_walls(about, mesh, wing.case), SpanPlane)
+
+
+def test_tables_by_span_end_at_the_tip(wing):
+    session = open_mesh(StepFrame(wing.mesh, sv.quality(wing.mesh)), None, (), wing.case)
+    [profile] = profiles(session, "span")
+    assert (profile.edges[0], profile.edges[-1]) == (0.0, 1.0)
+    assert profile.count.sum() == len(wing.mesh.cells)
 
 
 def test_the_direction_is_a_key(tmp_path):

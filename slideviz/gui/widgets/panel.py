@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtGui import QPaintEvent
-from qtpy.QtWidgets import QFormLayout, QLabel, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from slideviz.case.keys import KEYS
 from slideviz.case.spans import span_ends
@@ -204,6 +204,7 @@ class SpanWalls(Panel):
         self.along.chosen.connect(
             lambda text: self.change(changes.set_case, span_axis=KEYS["SPAN_AXIS"].kind.read(text))
         )
+        self.along.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         row = in_row(*self.ends, wide=self.ends, spacing=4)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
