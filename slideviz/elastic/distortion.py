@@ -15,7 +15,7 @@ round some work on what the one before left. A cell in a plane has a third edge 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -103,40 +103,18 @@ class Distortion:
 
         ``worst``: kappa.
         """
-        x = sealed(np.ascontiguousarray(x))
-        values = np.zeros(self.count)
-        least = np.empty(self.count)
-        folded: list[bool] = []
-
-        def add(part: Part, cells: slice, place: slice) -> None:
-            if folded:
-                return
-            write_slopes(
-                self.points,
-                x,
-                part.nodes[cells],
-                part.rows[cells],
-                CORNERS[part.vtk],
-                part.coupling[cells],
-                worst,
-                epsilon,
-                values[place],
-                sums,
-                least[place],
-            )
-            if not np.isfinite(values[place.start]):
-                folded.append(True)
-
         sums = np.zeros((len(self.owners), x.shape[1]))
-        self._in_parts(add)
-        if folded:
+        rows = [part.rows for part in self.parts]
+        values, least = self._add_slopes(x, None, rows, sums, worst, epsilon)
+        energy = float(values.sum())
+        if not np.isfinite(energy):
             return np.inf, np.zeros_like(x), np.full(self.count, -np.inf)
-        return float(values.sum()), self._by_node(sums), least
+        return energy, self._by_node(sums), least
 
     def product(self, x: FloatArray, t: FloatArray) -> FloatArray:
         """Return the Hessian at x (n, d), where no cell is folded, times t (n, d)."""
         sums = np.zeros((len(self.owners), x.shape[1]))
-        self._add_products(x, t, [part.rows for part in self.parts], sums)
+        self._add_slopes(x, t, [part.rows for part in self.parts], sums)
         return self._by_node(sums)
 
     def stiffness(self, x: FloatArray) -> FloatArray:
@@ -156,7 +134,7 @@ class Distortion:
             stretch = np.zeros_like(x)
             stretch[:, i] = self.points[:, j]
             each = np.zeros((sum(sizes), d))
-            self._add_products(x, stretch, corners, each)
+            self._add_slopes(x, stretch, corners, each)
             cell = 0
             for part, rows in zip(self.parts, corners, strict=True):
                 m = len(part.nodes)
@@ -167,39 +145,51 @@ class Distortion:
         size = np.maximum(size, LEAST * np.abs(size).max(axis=-1, keepdims=True))
         return np.einsum("mixk,mik,miyk->mixy", along, size, along)
 
-    def _add_products(
-        self, x: FloatArray, t: FloatArray, rows: Sequence[IntArray], out: FloatArray
-    ) -> None:
-        """Add the Hessians of cells at x (n, d) times t (n, d) to ``rows`` (m, n) of out."""
+    def _add_slopes(
+        self,
+        x: FloatArray,
+        t: FloatArray | None,
+        rows: Sequence[IntArray],
+        out: FloatArray,
+        worst: float = WORST,
+        epsilon: float = 0.0,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return energies and least J of cells; add the slopes of each to ``rows`` (m, n) of out.
+
+        With ``t`` (n, d) the Hessians times it in place of the slopes. Where a cell is folded, some
+        energy is infinite, and others are missing.
+        """
         x = sealed(np.ascontiguousarray(x))
-        t = sealed(np.ascontiguousarray(t))
-        of_part = dict(zip(self.parts, rows, strict=True))
-
-        def add(part: Part, cells: slice, _place: slice) -> None:
-            write_product(
-                self.points,
-                x,
-                t,
-                part.nodes[cells],
-                of_part[part][cells],
-                CORNERS[part.vtk],
-                part.coupling[cells],
-                WORST,
-                out,
-            )
-
-        self._in_parts(add)
-
-    def _in_parts(self, add: Callable[[Part, slice, slice], None]) -> None:
-        """Call ``add`` for all cells, with slices of a type's cells and of all of them."""
+        along = None if t is None else sealed(np.ascontiguousarray(t))
+        values = np.zeros(self.count)
+        least = np.empty(self.count)
+        folded = False
         first = 0
 
-        def with_place(part: Part, cells: slice) -> None:
-            add(part, cells, slice(first + cells.start, first + cells.stop))
+        def add(part: Part, of_corners: IntArray, cells: slice) -> None:
+            nonlocal folded
+            place = slice(first + cells.start, first + cells.stop)
+            if not folded:
+                write_slopes(
+                    self.points,
+                    x,
+                    along,
+                    part.nodes[cells],
+                    of_corners[cells],
+                    CORNERS[part.vtk],
+                    part.coupling[cells],
+                    worst,
+                    epsilon,
+                    values[place],
+                    out,
+                    least[place],
+                )
+                folded = folded or (along is None and not np.isfinite(values[place.start]))
 
-        for part in self.parts:
-            in_parts(partial(with_place, part), len(part.nodes))
+        for part, of_corners in zip(self.parts, rows, strict=True):
+            in_parts(partial(add, part, of_corners), len(part.nodes))
             first += len(part.nodes)
+        return values, least
 
     def _by_node(self, sums: FloatArray) -> FloatArray:
         """Return the sums (n, d) over the rows of each node."""
@@ -334,15 +324,19 @@ def _add_pulls(pull, corner, slope):  # type: ignore[no-untyped-def]
 
 @njit
 def write_slopes(  # type: ignore[no-untyped-def]
-    points, x, nodes, rows, table, coupling, worst, epsilon, values, out, least
+    points, x, along, nodes, rows, table, coupling, worst, epsilon, values, out, least
 ):
-    """Write the energies of cells (m,) and least J (m,), and add their slopes to ``rows`` of out.
+    """Write the energies of cells (m,) and least J (m,); add their slopes to ``rows`` of out.
 
-    ``rows`` (m, n): of each node. It ends at the first cell whose energy is infinite.
+    ``rows`` (m, n): of each node of the cells.
+    With a direction ``along`` (n, d): the Hessian times it in place of the slopes, without
+    regularisation; of a folded cell it is not finite. Else it ends at the first cell whose energy
+    is infinite.
     """
     n = nodes.shape[1]
     start = np.zeros((3, n, LANES))
     at = np.zeros((3, n, LANES))
+    way = np.zeros((3, n, LANES))
     slope = np.zeros((3, n, LANES))
     pull = np.empty((3, 3, LANES))
     scale = np.empty(LANES)
@@ -356,6 +350,8 @@ def write_slopes(  # type: ignore[no-untyped-def]
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, start)
         gather(x, nodes, first, count, at)
+        if along is not None:
+            gather(along, nodes, first, count, way)
         for c in range(count):
             lam[c] = coupling[first + c]
             least[first + c] = np.inf
@@ -371,7 +367,7 @@ def write_slopes(  # type: ignore[no-untyped-def]
                 chi[c] = 0.5 * (j + root) if j > 0.0 else 0.5 * epsilon * epsilon / (root - j)
             for c in range(count):
                 least[first + c] = min(least[first + c], jacobian[c])
-                if not chi[c] > 0.0:
+                if along is None and not chi[c] > 0.0:
                     values[0] = np.inf
                     return
                 log[c] = np.log(chi[c]) if lam[c] > 0.0 else 0.0
@@ -382,6 +378,10 @@ def write_slopes(  # type: ignore[no-untyped-def]
                 p = cross3(g, h)
                 q = cross3(h, f)
                 r = cross3(f, g)
+                # The slopes of half the square of the cofactors.
+                a = _crosses(q, h, g, r)
+                b = _crosses(r, f, h, p)
+                last = _crosses(p, g, f, q)
                 inverse = 1.0 / chi[c]
                 cof = (dot3(p, p) + dot3(q, q) + dot3(r, r)) * inverse * inverse
                 squares = dot3(f, f) + dot3(g, g) + dot3(h, h)
@@ -390,104 +390,53 @@ def write_slopes(  # type: ignore[no-untyped-def]
                 weight = share * (1.0 + 2.0 * worst * one)
                 s = 0.5 * weight
                 t = s * inverse * inverse
-                root = np.sqrt(epsilon * epsilon + jacobian[c] * jacobian[c])
-                u = weight * (2.0 * lam[c] * log[c] - 0.5 * cof) / root
-                columns = (
-                    _mixed(s, f, t, _crosses(q, h, g, r), u, p),
-                    _mixed(s, g, t, _crosses(r, f, h, p), u, q),
-                    _mixed(s, h, t, _crosses(p, g, f, q), u, r),
-                )
+                pressure = 2.0 * lam[c] * log[c] - 0.5 * cof
+                if along is None:
+                    root = np.sqrt(epsilon * epsilon + jacobian[c] * jacobian[c])
+                    u = weight * pressure / root
+                    columns = (
+                        _mixed(s, f, t, a, u, p),
+                        _mixed(s, g, t, b, u, q),
+                        _mixed(s, h, t, last, u, r),
+                    )
+                else:
+                    df, dg, dh = _map(duals, corner_edges(way, ends, 0.0, c), 0.0)
+                    dp = _crosses(dg, h, g, dh)
+                    dq = _crosses(dh, f, h, df)
+                    dr = _crosses(df, g, f, dg)
+                    da = add3(_crosses(dq, h, q, dh), _crosses(dg, r, g, dr))
+                    db = add3(_crosses(dr, f, r, df), _crosses(dh, p, h, dp))
+                    dlast = add3(_crosses(dp, g, p, dg), _crosses(df, q, f, dq))
+                    dlog = (dot3(p, df) + dot3(q, dg) + dot3(r, dh)) * inverse
+                    square = inverse * inverse
+                    dcof = 2.0 * (dot3(a, df) + dot3(b, dg) + dot3(last, dh)) * square
+                    force = pressure * inverse
+                    dforce = (2.0 * lam[c] + cof) * dlog - 0.5 * dcof
+                    dforce = dforce * inverse - force * dlog
+                    slopes = (
+                        _mixed(0.5, f, 0.5 * square, a, force, p),
+                        _mixed(0.5, g, 0.5 * square, b, force, q),
+                        _mixed(0.5, h, 0.5 * square, last, force, r),
+                    )
+                    more = dot3(slopes[0], df) + dot3(slopes[1], dg) + dot3(slopes[2], dh)
+                    more = 2.0 * share * worst * more
+                    u = weight * force
+                    v = -2.0 * t * dlog
+                    w = weight * dforce
+                    columns = (
+                        add3(_mixed(s, df, t, da, u, dp), _mixed(v, a, w, p, more, slopes[0])),
+                        add3(_mixed(s, dg, t, db, u, dq), _mixed(v, b, w, q, more, slopes[1])),
+                        add3(
+                            _mixed(s, dh, t, dlast, u, dr), _mixed(v, last, w, r, more, slopes[2])
+                        ),
+                    )
                 _write_pulls(duals, columns, c, pull)
             _add_pulls(pull, corner, slope)
         values[first : first + count] = value[:count]
-        _add_to_rows(slope, rows[first : first + count], out)
-
-
-@njit(inline="always")
-def _add_to_rows(slope, rows, out):  # type: ignore[no-untyped-def]
-    for c in range(len(rows)):
-        for j in range(rows.shape[1]):
-            for axis in range(out.shape[1]):
-                out[rows[c, j], axis] += slope[axis, j, c]
-
-
-@njit
-def write_product(points, x, t, nodes, rows, table, coupling, worst, out):  # type: ignore[no-untyped-def]
-    """Add the Hessians of cells times t (n, d) to ``rows`` (m, n) of out, of each node."""
-    n = nodes.shape[1]
-    start = np.zeros((3, n, LANES))
-    at = np.zeros((3, n, LANES))
-    along = np.zeros((3, n, LANES))
-    slope = np.zeros((3, n, LANES))
-    pull = np.empty((3, 3, LANES))
-    scale = np.empty(LANES)
-    jacobian = np.empty(LANES)
-    lam = np.zeros(LANES)
-    log = np.zeros(LANES)
-    share = 1.0 / len(table)
-    for first in range(0, len(nodes), LANES):
-        count = min(LANES, len(nodes) - first)
-        gather(points, nodes, first, count, start)
-        gather(x, nodes, first, count, at)
-        gather(t, nodes, first, count, along)
         for c in range(count):
-            lam[c] = coupling[first + c]
-        slope[:] = 0.0
-        for corner in table:
-            ends = corner_ends(corner)
-            _write_scales(start, ends, scale)
-            _write_jacobians(at, ends, scale, jacobian)
-            for c in range(count):
-                log[c] = np.log(jacobian[c]) if lam[c] > 0.0 else 0.0
-            for c in range(LANES):
-                duals = _duals(start, ends, scale[c], c)
-                flat = 0.0 if scale[c] != 0.0 else 1.0
-                f, g, h = _map(duals, corner_edges(at, ends, ends[4], c), flat)
-                df, dg, dh = _map(duals, corner_edges(along, ends, 0.0, c), 0.0)
-                p = cross3(g, h)
-                q = cross3(h, f)
-                r = cross3(f, g)
-                dp = _crosses(dg, h, g, dh)
-                dq = _crosses(dh, f, h, df)
-                dr = _crosses(df, g, f, dg)
-                # The slopes of half the square of the cofactors, and their changes.
-                a = _crosses(q, h, g, r)
-                b = _crosses(r, f, h, p)
-                last = _crosses(p, g, f, q)
-                da = add3(_crosses(dq, h, q, dh), _crosses(dg, r, g, dr))
-                db = add3(_crosses(dr, f, r, df), _crosses(dh, p, h, dp))
-                dlast = add3(_crosses(dp, g, p, dg), _crosses(df, q, f, dq))
-                inverse = 1.0 / jacobian[c]
-                dlog = (dot3(p, df) + dot3(q, dg) + dot3(r, dh)) * inverse
-                square = inverse * inverse
-                cof = (dot3(p, p) + dot3(q, q) + dot3(r, r)) * square
-                dcof = 2.0 * (dot3(a, df) + dot3(b, dg) + dot3(last, dh)) * square
-                squares = dot3(f, f) + dot3(g, g) + dot3(h, h)
-                one = 0.25 * (squares + cof) - 1.5 + lam[c] * log[c] * log[c]
-                force = (2.0 * lam[c] * log[c] - 0.5 * cof) * inverse
-                dforce = (2.0 * lam[c] + cof) * dlog - 0.5 * dcof
-                dforce = dforce * inverse - force * dlog
-                slopes = (
-                    _mixed(0.5, f, 0.5 * square, a, force, p),
-                    _mixed(0.5, g, 0.5 * square, b, force, q),
-                    _mixed(0.5, h, 0.5 * square, last, force, r),
-                )
-                weight = share * (1.0 + 2.0 * worst * one)
-                more = dot3(slopes[0], df) + dot3(slopes[1], dg) + dot3(slopes[2], dh)
-                more = 2.0 * share * worst * more
-                s = 0.5 * weight
-                t_a = s * square
-                u = weight * force
-                v = -2.0 * t_a * dlog
-                w = weight * dforce
-                columns = (
-                    add3(_mixed(s, df, t_a, da, u, dp), _mixed(v, a, w, p, more, slopes[0])),
-                    add3(_mixed(s, dg, t_a, db, u, dq), _mixed(v, b, w, q, more, slopes[1])),
-                    add3(_mixed(s, dh, t_a, dlast, u, dr), _mixed(v, last, w, r, more, slopes[2])),
-                )
-                _write_pulls(duals, columns, c, pull)
-            _add_pulls(pull, corner, slope)
-        _add_to_rows(slope, rows[first : first + count], out)
+            for j in range(n):
+                for axis in range(out.shape[1]):
+                    out[rows[first + c, j], axis] += slope[axis, j, c]
 
 
 @njit
