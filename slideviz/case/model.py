@@ -15,9 +15,9 @@ from slideviz.case.fields import CaseFields
 from slideviz.errors import CaseError, nearest, raise_all
 
 _NUMBERS = (
-    "zone", "axis", "origin", "feature_angle_deg", "steps", "steps_gain", "influence_factor",
-    "support_radius", "reduction", "layer_thickness", "layer_minimum_gap", "repair_below",
-    "idw_power", "idw_fixed_weight", "deform_coeff",
+    "zone", "axis", "span_axis", "origin", "feature_angle_deg", "steps", "steps_gain",
+    "influence_factor", "support_radius", "reduction", "layer_thickness", "layer_minimum_gap",
+    "repair_below", "idw_power", "idw_fixed_weight", "deform_coeff",
 )  # fmt: skip
 """The fields of a case whose numbers must be in a range, which the table of keys has."""
 

@@ -170,7 +170,7 @@ def find_straight_span(
     """
     if mesh.dim != 3:
         raise MeshError(f"{mesh.name}: the span between two boundaries needs a mesh in 3D")
-    way = unit(np.array(direction))
+    way = unit(np.array(direction) / np.abs(direction).max())
     first = mesh.points[np.unique(facets_of(mesh, root))]
     last = mesh.points[np.unique(facets_of(mesh, tip))]
     if root != tip and (last @ way).mean() < (first @ way).mean():

@@ -320,6 +320,14 @@ def test_the_direction_is_a_key(tmp_path):
         assert sv.Case.read(path).span_axis == axis
     with pytest.raises(CaseError, match="'w' is not an axis; write x, y, z"):
         sv.Case().set(SPAN_AXIS="w")
+    for axis, why in (
+        ((0.0, 0.0, 0.0), "the axis .* has no direction"),
+        ((np.nan, 0.0, 1.0), "'nan' is not a number"),
+        ((1e300, 0.0, 0.0), "is too large to compute with"),
+    ):
+        with pytest.raises(CaseError, match=f"SPAN_AXIS: .*{why}"):
+            sv.Case(span_axis=axis)
+    assert span_field(case_of(TWIST, span_axis=(0.0, 0.0, 1e-300)), box()).axis == (0.0, 0.0, 1.0)
 
 
 def test_what_has_no_straight_span_is_refused():

@@ -50,7 +50,8 @@ class SpanMotion(Motion):
     * ``chord``: scaled about the stacking line by a factor.
     * ``camber``: bent towards growing theta, by a part of the chord.
 
-    Nodes keep their span, so those of hub and shroud stay on them. ``point``: a point of the
+    Where the span is straight, as of a wing, m is along x and theta is the length across m and the
+    span. Nodes keep their span, so those of hub and shroud stay on them. ``point``: a point of the
     stacking line, which then follows the line from hub to shroud through it; None: a straight line
     fitted to the sections' centroids. Displacements depend on the undeformed blade, whatever
     motions come before; several of one blade add up in any order.
