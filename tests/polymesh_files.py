@@ -172,3 +172,41 @@ def write_mesh(folder: Path, mesh: Mesh, kinds=None, form: Form | None = None) -
     where = folder / "constant" / "polyMesh"
     write_polymesh(where, mesh.points, sides_of(mesh), patches_of(mesh), kinds, form)
     return folder
+
+
+def honeycomb(rows: int = 3, columns: int = 3):
+    """Return points (n, 2) and hexagons, counter-clockwise, of a piece of a honeycomb."""
+    numbers: dict[tuple[float, float], int] = {}
+    points = []
+    hexagons = []
+    for row in range(rows):
+        for column in range(columns):
+            centre = np.array([np.sqrt(3) * (column + row % 2 / 2), 1.5 * row])
+            hexagon = []
+            for angle in np.radians(30 + 60 * np.arange(6)):
+                corner = centre + np.array([np.cos(angle), np.sin(angle)])
+                key = (round(corner[0], 6), round(corner[1], 6))
+                if key not in numbers:
+                    points.append(corner)
+                hexagon.append(numbers.setdefault(key, len(numbers)))
+            hexagons.append(hexagon)
+    return np.array(points), hexagons
+
+
+def honeycomb_case():
+    """Return points, cells and patches of hexagonal prisms around a body, between two planes."""
+    flat, hexagons = honeycomb(24, 20)
+    middles = np.array([flat[hexagon].mean(axis=0) for hexagon in hexagons])
+    middle = middles[10 + 20 * 12]
+    outside = np.hypot(*((middles - middle) / [5.0, 2.5]).T) > 1
+    kept = [hexagon for hexagon, out in zip(hexagons, outside, strict=True) if out]
+    used = np.unique(kept)
+    flat = flat[used] - middle
+    kept = [np.searchsorted(used, hexagon).tolist() for hexagon in kept]
+    points, cells = extruded(flat, kept, [0.0, 1.0, 2.0, 3.0])
+    patches = {
+        "ends": lambda corners: np.ptp(corners[:, 2]) == 0,
+        "body": lambda corners: np.hypot(*corners[:, :2].mean(axis=0)) < 8,
+        "far": lambda corners: True,
+    }
+    return points, cells, patches

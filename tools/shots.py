@@ -30,6 +30,7 @@ from slideviz.case.motions.span import SpanMotion
 from slideviz.cli import run
 from slideviz.errors import SlidevizError
 from slideviz.formats.files import read, write
+from slideviz.formats.openfoam_paths import mesh_path
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
@@ -38,6 +39,8 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.solver.deform import deform
 from slideviz.system.cleanup import draft, killed_at_end
+from slideviz.terms import Role
+from tests.polymesh_files import honeycomb_case, write_polymesh
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -326,6 +329,24 @@ def zones(window: MainWindow, place: Path) -> None:
     _run(window)
 
 
+def openfoam(window: MainWindow, place: Path) -> None:
+    """Show a run of an OpenFOAM case of hexagonal prisms around a body."""
+    folder = place / "honeycomb"
+    points, cells, patches = honeycomb_case()
+    kinds = {"ends": "symmetryPlane"}
+    write_polymesh(folder / "constant" / "polyMesh", points, cells, patches, kinds)
+    roles: dict[str, Role] = {"body": "moving", "ends": "sliding", "far": "fixed"}
+    motions = (Rotate("body", 25.0), Translate("body", (2.0, 0.0, 0.0)))
+    case = Case(mesh_file=mesh_path(folder), roles=roles, sliding="ps", motions=motions)
+    case.write(place / "honeycomb.cfg")
+    _open(window, place / "honeycomb.cfg")
+    _run(window)
+    _look(window, 45.0, 30.0)
+    window.scene.plotter.camera.zoom(1.6)
+    window.viewing.render()
+    settle(window)
+
+
 def dark(window: MainWindow, place: Path) -> None:
     """Show a run of the 2D passage and its curves, in the dark theme."""
     window.set_theme("dark")
@@ -356,6 +377,7 @@ STATES = (
     ShotState("side-by-side", beside),
     ShotState("repaired", repaired),
     ShotState("zones", zones),
+    ShotState("openfoam", openfoam),
     ShotState("dark", dark),
 )
 

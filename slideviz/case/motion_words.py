@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.case.motions.motion import Motion, Target, named
 from slideviz.mesh.model import Mesh, Skin
+from slideviz.mesh.polyhedra import parts_words
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -79,6 +80,9 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = bounds_words(mesh)
     points, cells = mesh.file_counts
+    if mesh.whole_cells is not None:
+        cells = int(mesh.whole_cells[-1]) + 1
+        about += f"{parts_words(mesh.whole_cells)}.\n".lstrip(".\n")
     count = f"{cells:,} cells{halo}   {points:,} points"
     if isinstance(mesh, Skin):
         count += "   boundary and sections only"

@@ -13,6 +13,7 @@ from slideviz.ffd.box import Box
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.polyhedra import parts_words
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import marker_zones
 from slideviz.streaming.quality import CellCounts
@@ -60,6 +61,8 @@ def _report(arguments: Namespace, mesh: Mesh, counts: CellCounts, found: Quality
     print("  " + ", ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, (low, high) in extents))
     if report["unused_points"]:
         print(f"  {report['unused_points']} points belong to no cell")
+    if words := parts_words(mesh.whole_cells):
+        print(f"  {words}")
     if mesh.halo is not None:
         print(f"  {mesh.halo.describe()}")
     for remark in mesh.remarks:

@@ -128,3 +128,18 @@ class Polyhedra:
 
     cell: IntArray  # (m,): number of the file's cell that each cell of the mesh is in, ascending
     faces: Faces
+
+
+def parts_words(cell: IntArray | None) -> str:
+    """Return in words how many polyhedra a mesh has, and how many parts of them; "" for none.
+
+    ``cell`` is `Mesh.whole_cells`.
+    """
+    counts = np.bincount(cell) if cell is not None else np.empty(0, np.int64)
+    several = counts[counts > 1]
+    if not len(several):
+        return ""
+    return (
+        f"{len(counts):,} cells, of which {len(several):,} polyhedra are {several.sum():,} parts "
+        f"around {len(several):,} added points"
+    )

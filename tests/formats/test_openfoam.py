@@ -2,6 +2,8 @@
 
 import gzip
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +16,14 @@ from slideviz.case.zone_cases import with_marker_names
 from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.formats.openfoam_paths import mesh_path, stem_of
+from slideviz.mesh.polyhedra import parts_words
 from slideviz.session.opening import guess_roles
 from slideviz.session.state import Guess
 from tests.builders import grid
 from tests.polymesh_files import (
     Form,
     extruded,
+    honeycomb,
     merged,
     patches_of,
     sides_of,
@@ -119,24 +123,6 @@ def test_metrics_of_faces_are_those_of_elements(tmp_path_factory, seed, kind):
     for name in names:
         cells = read.whole_cells
         assert ours[name].values == pytest.approx(theirs[name].values[cells], abs=1e-9)
-
-
-def honeycomb(rows=3, columns=3):
-    """Return points (n, 2) and hexagons, counter-clockwise, of a piece of a honeycomb."""
-    points, polygons = {}, []
-    for row in range(rows):
-        for column in range(columns):
-            centre = np.array([np.sqrt(3) * (column + row % 2 / 2), 1.5 * row])
-            angles = np.radians(30 + 60 * np.arange(6))
-            corners = centre + np.column_stack([np.cos(angles), np.sin(angles)])
-            keys = [tuple(np.round(corner, 6).tolist()) for corner in corners]
-            polygons.append(
-                [
-                    points.setdefault(key, (len(points), c))[0]
-                    for key, c in zip(keys, corners, strict=True)
-                ]
-            )
-    return np.array([corner for _, corner in points.values()]), polygons
 
 
 def test_a_polyhedron_is_rated_by_its_parts(tmp_path):
@@ -534,3 +520,56 @@ def test_regions_are_zones(tmp_path):
         sv.read(case, zone=3)
     with pytest.raises(MeshError, match="there is no zone 2: it has one region; leave it out"):
         sv.read(case / "constant" / "fluid", zone=2)
+
+
+def test_polyhedra_are_told(tmp_path, capsys):
+    points, cells = extruded(*honeycomb(2, 2), [0.0, 1.0])
+    write_polymesh(tmp_path / "polyMesh", points, cells, {"all": lambda _: True})
+    assert run(["info", str(tmp_path / "polyMesh")]) == 0
+    told = "4 cells, of which 4 polyhedra are 56 parts around 4 added points"
+    assert told in capsys.readouterr().out
+    assert not parts_words(np.arange(5))
+
+
+def test_a_polyhedron_that_is_not_star_shaped(tmp_path):
+    """Seven boxes that make a C: no place in it sees all of its faces."""
+    mesh = grid((3, 3, 1), hole=[(1, 2), (1, 2), (0, 1)])
+    cells = merged(sides_of(mesh), [0, 0, 0, 0, 1, 0, 0, 0])
+    write_polymesh(tmp_path / "polyMesh", mesh.points, cells, {"all": lambda _: True})
+    read = sv.read(tmp_path / "polyMesh")
+    assert any("not star-shaped and cannot be proved valid" in text for text in read.remarks)
+    assert sv.quality(read).inverted == 0
+    moved = sv.quality(read.with_points(read.points * [-1, 1, 1]), read)
+    assert moved.inverted == moved.cells
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("checkMesh") is None, reason="OpenFOAM is not installed")
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_check_mesh_agrees(tmp_path, form, monkeypatch):
+    """OpenFOAM reads what is written, and has the same non-orthogonality and skewness."""
+    monkeypatch.setenv("WM_PROJECT_DIR", "/usr/share/openfoam")
+    points, cells = extruded(*honeycomb(6, 6), [0.0, 1.0, 2.5])
+    case = tmp_path / "case"
+    write_polymesh(case / POLY, points, cells, {"all": lambda _: True}, form=form)
+    entries = "startTime 0; endTime 1; deltaT 1; writeInterval 1;"
+    schemes = ["ddt", "grad", "div", "laplacian", "interpolation", "snGrad"]
+    entries += " ".join(f"{scheme}Schemes {{}}" for scheme in schemes)
+    (case / "system").mkdir()
+    for name in ("controlDict", "fvSchemes", "fvSolution"):
+        Form().write(case / "system", name, "dictionary", entries)
+    mesh = sv.read(case)
+    rng = np.random.default_rng(1)
+    moved = mesh.points + rng.uniform(-0.05, 0.05, mesh.points.shape)
+    sv.write(case, mesh.with_points(moved), overwrite=True)
+    said = subprocess.run(
+        ["checkMesh", "-case", case, "-constant"], capture_output=True, text=True
+    ).stdout
+    found = sv.metrics(sv.read(case), ["non-orthogonality", "skewness"])
+    for words, name in (
+        ("non-orthogonality Max: ", "non-orthogonality"),
+        ("Max skewness = ", "skewness"),
+    ):
+        number = float(said.partition(words)[2].split()[0])
+        assert found[name].max == pytest.approx(number, rel=1e-4)
+    assert "Upper triangular ordering OK." in said

@@ -1,0 +1,34 @@
+"""A case of OpenFOAM is opened by its folder in the window, and saved as another case."""
+
+import numpy as np
+
+import slideviz as sv
+from slideviz.case.motion_words import mesh_words
+from slideviz.gui.widgets import questions
+from tests.polymesh_files import honeycomb_case, write_polymesh
+
+
+def test_a_case_is_opened_by_its_folder_and_saved_as_another(driver, answers, tmp_path):
+    points, cells, patches = honeycomb_case()
+    folder = tmp_path / "honeycomb" / "constant" / "polyMesh"
+    write_polymesh(folder, points, cells, patches, {"ends": "symmetryPlane"})
+    driver.window.files.open_path(tmp_path / "honeycomb")
+    driver.settle()
+    session = driver.session
+    assert session.path == folder / "points"
+    assert session.guesses["ends"].reason == "its patch is of that type"
+    assert session.case.roles["ends"] == "sliding"
+    assert driver.window.files.stem() == "honeycomb"
+    assert len(session.mesh.cells) > len(cells)
+    words = " ".join(mesh_words(session.mesh))
+    assert f"{len(cells):,} cells" in words
+    assert f"{len(cells):,} polyhedra are" in words
+    assert "*.foam" in questions.mesh_filters(session.mesh)
+    answers("ask_save", tmp_path / "new.foam")
+    driver.window.files.save_mesh()
+    driver.settle()
+    saved = sv.read(tmp_path / "new")
+    assert np.array_equal(saved.points[: len(points)], points)
+    assert (tmp_path / "new/constant/polyMesh/faces").read_bytes() == (
+        folder / "faces"
+    ).read_bytes()
