@@ -66,6 +66,9 @@ chmod -R u=rwX,go=rX $tree
 find $tree/usr/lib/slideviz -name '*.so*' -exec chmod 644 {} +
 size=$(du -sk $tree/usr | cut -f1)
 fill $tree/DEBIAN/control <packaging/debian/control
+# What root compiled there is no file of the package.
+printf '#!/bin/sh\nset -e\n[ "$1" = upgrade ] || rm -rf /usr/lib/slideviz\n' >$tree/DEBIAN/postrm
+chmod 755 $tree/DEBIAN/postrm
 (cd $tree && find usr -type f -print0 | sort -z | xargs -0 md5sum) >$tree/DEBIAN/md5sums
 package=dist/slideviz_${version}_$architecture.deb
 dpkg-deb --root-owner-group -Zxz -z3 --build $tree "$package" >/dev/null

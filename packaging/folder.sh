@@ -31,6 +31,6 @@ $venv/bin/python -m compileall -q --invalidation-mode unchecked-hash $work/slide
 printf 'folder: %s, %s\n' $work/slideviz "$(du -sh $work/slideviz | cut -f1)"
 if [ "${ARCHIVE:-yes}" != no ]; then
     archive=dist/slideviz-$version-linux-$(uname -m).tar.xz
-    tar --create --owner=0 --group=0 --directory=$work slideviz | xz -T0 -6 >"$archive"
+    tar --create --owner=0 --group=0 --directory=$work slideviz | xz -T0 -3 >"$archive"
     printf 'folder: %s, %s\n' "$archive" "$(du -h "$archive" | cut -f1)"
 fi
