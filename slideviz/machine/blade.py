@@ -171,12 +171,11 @@ class BladeSections:
         """
         turn = np.exp(totals[CHORD] + 1j * totals[ANGLE])
         shape = turn * (self._away + totals[CAMBER] * self._camber)
-        start = self._start.real
-        swept = (
-            start
-            if not totals[SWEEP].any()
-            else self.curves.at_length(self._length + totals[SWEEP], self.spans)
-        )
+        swept = start = self._start.real
+        far = totals[SWEEP]
+        if far.any():
+            # Rounding would move the nodes that are not swept.
+            swept = np.where(far, self.curves.at_length(self._length + far, self.spans), start)
         flat = self._centre + (swept - start) + 1j * totals[LEAN] / self._radius + shape
         plane = np.stack([flat.real, flat.imag - self._turns, self.spans], axis=1)
         coords, by_plane = self.curves.coords_and_slopes(plane)

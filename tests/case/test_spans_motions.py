@@ -46,6 +46,14 @@ def test_nodes_keep_their_span_and_the_hub_stays_to_the_bit(mesh):
     assert np.linalg.norm(moved.vectors[~hub], axis=1).max() > 0.02
 
 
+def test_a_sweep_of_zero_at_the_hub_moves_no_bit_there(mesh):
+    swept = sv.SpanMotion("blade", "sweep", (0.0, 1.0), (0.0, 0.02))
+    moved = displacements(case_of(swept), mesh)
+    hub = np.abs(np.hypot(*mesh.points[moved.nodes][:, :2].T) - 0.5) < 1e-12
+    assert not moved.vectors[hub].any()
+    assert np.abs(moved.vectors[~hub]).max() > 0.01
+
+
 def test_motions_of_one_blade_add_up_in_any_order_and_equal_ones_twice(mesh):
     both = vectors(mesh, TWIST, LEAN)
     assert both == pytest.approx(vectors(mesh, LEAN, TWIST), abs=1e-14)
