@@ -25,6 +25,7 @@ from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import SAMPLES, write_sample
 from slideviz.solver.steps import Trial
+from slideviz.system.platform import needs_server
 from tests.builders import grid, layered, stage
 from tests.processes import wait_until
 
@@ -652,6 +653,7 @@ def test_roles_that_the_method_does_not_use_are_told(square, capsys):
     assert len(json.loads(out.out)["warnings"]) == 2
 
 
+@pytest.mark.skipif(not needs_server(), reason="there always is a screen")
 def test_without_a_screen_the_window_says_so(square, capsys, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -10,6 +10,7 @@ import socket
 import subprocess
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -491,6 +492,19 @@ def test_without_locks_of_the_file_system_the_file_is_the_lock(tmp_path, monkeyp
     dead.wait()
     (tmp_path / "sweep.lock").write_text(f"{dead.pid}\n{socket.gethostname()}\n")
     lock_folder(tmp_path).release()
+
+
+def test_a_lock_into_which_nobody_may_write_is_held(tmp_path, monkeypatch):
+    """Windows lets nobody write a locked file, not even its owner."""
+
+    def refused(*_, **__):
+        raise PermissionError(errno.EACCES, "locked")
+
+    monkeypatch.setattr(Path, "write_text", refused)
+    lock = lock_folder(tmp_path)
+    with pytest.raises(CaseError, match="another sweep writes its results here"):
+        lock_folder(tmp_path)
+    lock.release()
 
 
 def test_fields_of_endless_length_are_told(passage, here, tmp_path):

@@ -752,7 +752,8 @@ def lock_folder(folder: Path) -> BaseFileLock:
         try:
             lock: BaseFileLock = FileLock(path, thread_local=False, fallback_to_soft=False)
             lock.acquire(blocking=False)
-            path.write_text(f"{os.getpid()}\n")
+            with suppress(PermissionError):  # of Windows, where nobody writes a locked file
+                path.write_text(f"{os.getpid()}\n")
         except OSError as problem:
             if problem.errno not in _NO_LOCKS:
                 raise
