@@ -15,7 +15,7 @@ SEED := 0
 MINUTES := 10
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz shots folder deb study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz kill shots folder deb study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -78,6 +78,9 @@ laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=
 
 fuzz: setup ## search for faults with damaged files and absurd cases (MINUTES=10)
 	$(BIN)/python -m tools.fuzz --minutes $(MINUTES) $(ARGS)
+
+kill: setup ## end commands at random times: files are whole, old or new (MINUTES=10)
+	$(BIN)/python -m tools.kill --minutes $(MINUTES) $(ARGS)
 
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/python -m tools.shots
