@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from hashlib import blake2b
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -50,7 +51,10 @@ class Judge:
         """
         verdict = self._verdict(kind, content, alone=False)
         if verdict.problem.startswith(SLOW) and KINDS[kind].isolated:
-            return self._verdict(kind, content, alone=True)
+            alone = self._verdict(kind, content, alone=True)
+            # Limits are those of processor time; on a busy machine the clock goes on.
+            in_time = alone.problem.startswith("hang") and "it takes longer" in alone.signature
+            return replace(alone, problem="") if in_time else alone
         return verdict
 
     def _verdict(self, kind: str, content: bytes, alone: bool) -> Verdict:
@@ -73,7 +77,7 @@ class Judge:
         self.process.stdin.write(json.dumps([kind, "input", alone]) + "\n")
         self.process.stdin.flush()
         answer = ""
-        if select.select([self.process.stdout], [], [], self.limit)[0]:
+        if select.select([self.process.stdout], [], [], self.limit * (1 + 9 * alone))[0]:
             answer = self.process.stdout.readline()
         seconds = time.monotonic() - begin
         self.limit = 2 * SECONDS

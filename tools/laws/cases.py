@@ -49,7 +49,8 @@ def random_run(seed: int) -> Run:
     motions = _motions(rng, made.mesh, moving, period)
     if rng.random() < 0.2:
         thickness = float(rng.uniform(0.02, 0.3)) * made.mesh.extent
-        settings |= {"layers": "keep", "layer_thickness": thickness}
+        if settings["method"] == "rbf":  # other methods are refused with them
+            settings |= {"layers": "keep", "layer_thickness": thickness}
     case = Case(roles=roles, motions=motions, **settings)
     return Run(seed, made, case, period)
 

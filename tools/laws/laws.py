@@ -30,6 +30,7 @@ from slideviz.rbf.reduction import GAMMA
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
 from tests.oracles.gmsh_jacobians import smallest_jacobians
+from tools.laws import stages
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered
 from tools.laws.oracle import Frame, carried, goals, nodes_with
@@ -279,6 +280,13 @@ def numbers_make_sense(run: Run, steps: list[Step]) -> Iterator[str]:
         yield f"{run.case.steps} steps are asked for, {len(steps)} made"
 
 
+def again(case: Case, mesh: Mesh) -> tuple[list[Step] | None, BaseException | None]:
+    """Return what `tried` does, as it is at the moment."""
+    return tried(case, mesh)
+
+
+HELD = (moving_are_exact, fixed_keep_every_bit, images_stay_images, sliding_stay_on_surface)
+"""Laws that hold for every stage of a run."""
 LAWS: dict[str, Callable[[Run, list[Step]], Iterator[str]]] = {
     "moving": moving_are_exact,
     "fixed": fixed_keep_every_bit,
@@ -291,5 +299,11 @@ LAWS: dict[str, Callable[[Run, list[Step]], Iterator[str]]] = {
     "renumbered": numbering_does_not_matter,
     "bits": same_run_same_bits,
     "rest": rest_changes_no_bit,
+    "samples": stages.validity_is_that_of_samples,
+    "safe": stages.of_a_part(0, stages.safe_fraction_is_safe),
+    "unit": stages.of_a_part(1, stages.unit_does_not_matter(again, 1e-7)),
+    "relaxed": stages.of_a_part(2, stages.relaxed_is_held(again, HELD)),
+    "repaired": stages.of_a_part(0, stages.repaired_is_held(again, HELD)),
+    "streamed": stages.of_a_part(1, stages.streamed_is_the_same(again)),
 }
 """Law by name; those that deform again come last."""
