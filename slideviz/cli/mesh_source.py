@@ -226,6 +226,7 @@ def open_mesh(arguments: Namespace, case: Case | None = None) -> Iterator[OpenMe
             base = None
             if reference is not None:
                 base = open_one(reference, zone)
+                mesh = _divided_as(base, mesh)
                 if arguments.stream and not _same_cells(mesh, base):
                     raise MeshError(
                         f"{reference} cannot be the reference of {skin.name}: it must have the "
@@ -234,8 +235,10 @@ def open_mesh(arguments: Namespace, case: Case | None = None) -> Iterator[OpenMe
             elif case is not None and (file := case.reference_file or case.mesh_file):
                 kind = case.mesh_format if file == case.mesh_file else None
                 base = open_one(file, zone, kind) if file.is_file() else None
+                mesh = _divided_as(base, mesh)
                 base = base if base is not None and _same_cells(mesh, base) else None
                 reference = None if base is None else file
+        skin = mesh if isinstance(mesh, Mesh) else skin
         source = _source(stack, mesh, base, skin)
         if case is not None:
             known = len(case.warnings)
@@ -248,6 +251,13 @@ def open_mesh(arguments: Namespace, case: Case | None = None) -> Iterator[OpenMe
 def _mesh_of(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:
     """Return a mesh in memory or, of one in its file, its boundary and the cells at it."""
     return mesh if isinstance(mesh, Mesh) else mesh.skin(tick)
+
+
+def _divided_as(base: Mesh | StreamInput | None, mesh: Mesh | StreamInput) -> Mesh | StreamInput:
+    """Return a mesh in memory with its polyhedra divided as those of ``base``."""
+    if isinstance(mesh, Mesh) and isinstance(base, Mesh):
+        return mesh.with_parts_of(base)
+    return mesh
 
 
 def _same_cells(mesh: Mesh | StreamInput, base: Mesh | StreamInput) -> bool:

@@ -384,9 +384,10 @@ class Mesh:
 
         Raises MeshError if that has other cells. Its own reference, if it has one, takes its place.
         """
-        base = None if reference is None else checked_reference(reference, self).undeformed
+        mesh = self if reference is None else self.with_parts_of(reference)
+        base = None if reference is None else checked_reference(reference, mesh).undeformed
         if not isinstance(self, Assembly):
-            return replace(self, reference=base)
+            return replace(mesh, reference=base)
         bases = [None] * len(self.parts) if base is None else [part.mesh for part in base.parts]
         parts = tuple(
             replace(
@@ -395,6 +396,31 @@ class Mesh:
             for part, of_part in zip(self.parts, bases, strict=True)
         )
         return replace(self, reference=base, parts=parts)
+
+    def with_parts_of(self, other: Mesh) -> Self:
+        """Return the mesh with its polyhedra divided as in ``other``, if that has the same ones.
+
+        How a polyhedron is divided depends on its shape. Its added node goes along with the mean of
+        its other ones.
+        """
+        mine = self.origin.polyhedra
+        theirs = other.origin.polyhedra
+        if mine is None or theirs is None or not mine.faces.same_as(theirs.faces):
+            return self
+        count = len(other.points) - theirs.added
+        if isinstance(self, Assembly) or len(self.points) - mine.added != count:
+            return self
+        nodes = other.cells.connectivity
+        cell = np.repeat(theirs.cell, np.diff(other.cells.offsets))
+        inside = nodes < count
+        moved = (self.points[:count] - other.points[:count])[nodes[inside]]
+        sums = np.stack([np.bincount(cell[inside], column) for column in moved.T], axis=1)
+        means = sums / np.bincount(cell[inside])[:, None]
+        around = np.empty(theirs.added, np.int64)
+        around[nodes[~inside] - count] = cell[~inside]
+        points = np.concatenate([self.points[:count], other.points[count:] + means[around]])
+        origin = replace(self.origin, polyhedra=theirs)
+        return replace(self, points=points, cells=other.cells, markers=other.markers, origin=origin)
 
     @property
     def dim(self) -> int:
@@ -460,8 +486,8 @@ class Mesh:
         return node
 
     def cell_number(self, cell: int) -> int:
-        """Return the number that a cell, or the polyhedron it is in, has in its file."""
-        return cell if self.whole_cells is None else int(self.whole_cells[cell])
+        """Return the number that a cell has in its file, for messages."""
+        return cell
 
     @check_types
     def with_points(self, points: ArrayLike) -> Self:

@@ -30,6 +30,13 @@ class Faces:
         """Return the number of cells."""
         return 1 + max(self.owner.max(initial=-1), self.neighbour.max(initial=-1))
 
+    def same_as(self, other: Faces) -> bool:
+        """Return whether both have the same nodes and cells."""
+        return all(
+            np.array_equal(getattr(self, name), getattr(other, name))
+            for name in ("offsets", "nodes", "owner", "neighbour")
+        )
+
     def next_nodes(self) -> IntArray:
         """Return the node (k,) that follows each of ``nodes`` round its face."""
         after = np.roll(self.nodes, -1)
@@ -128,6 +135,11 @@ class Polyhedra:
 
     cell: IntArray  # (m,): number of the file's cell that each cell of the mesh is in, ascending
     faces: Faces
+
+    @property
+    def added(self) -> int:
+        """Return the number of nodes added in polyhedra, one in each."""
+        return int(np.count_nonzero(np.bincount(self.cell) > 1))
 
 
 def parts_words(cell: IntArray | None) -> str:

@@ -531,6 +531,29 @@ def test_polyhedra_are_told(tmp_path, capsys):
     assert not parts_words(np.arange(5))
 
 
+def test_a_deformed_case_has_its_reference(tmp_path, capsys):
+    """Read again, its polyhedra may be divided otherwise than in the undeformed mesh."""
+    points, cells = extruded(*honeycomb(4, 4), [0.0, 1.0, 2.0])
+    low = lambda at: np.ptp(at[:, 2]) == 0  # noqa: E731
+    case = tmp_path / "case"
+    write_polymesh(case / POLY, points, cells, {"ends": low, "sides": lambda _: True})
+    mesh = sv.read(case)
+    shift = np.random.default_rng(3).uniform(-0.1, 0.1, mesh.points.shape)
+    sv.write(case / "1", mesh.with_points(mesh.points + shift))
+    again = sv.read(case / "1")
+    assert not again.cells.same_as(mesh.cells)
+    rated = again.with_reference(mesh)
+    assert rated.cells.same_as(mesh.cells)
+    count = len(points)
+    assert np.array_equal(rated.points[:count], again.points[:count])
+    assert 0 < np.abs(rated.points[count:] - mesh.points[count:]).max() < 0.2
+    assert run(["quality", str(case / "1"), "--reference", str(case)]) == 0
+    assert f"{sv.quality(rated, mesh).min:.6g}"[:6] in capsys.readouterr().out
+    other = sv.read(write_mesh(tmp_path / "box", grid((2, 2, 2))))
+    with pytest.raises(MeshError, match="it must have the same cells, but"):
+        again.with_reference(other)
+
+
 def test_a_polyhedron_that_is_not_star_shaped(tmp_path):
     """Seven boxes that make a C: no place in it sees all of its faces."""
     mesh = grid((3, 3, 1), hole=[(1, 2), (1, 2), (0, 1)])
