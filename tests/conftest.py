@@ -6,7 +6,7 @@ import os
 import pytest
 from hypothesis import settings
 
-from tests.portable import rules
+from tests.portable import POSIX_ONLY, rules
 
 if os.environ.get("SLIDEVIZ_TESTS") == "portable":
     rules.install()
@@ -31,6 +31,13 @@ def pytest_xdist_auto_num_workers():
     """Return one process more than cores: where one waits for a program or a timer, it works."""
     affinity = getattr(os, "sched_getaffinity", None)
     return (len(affinity(0)) if affinity else os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items):
+    """Leave out what is not so under the rules of Windows."""
+    for item in items if os.environ.get("SLIDEVIZ_TESTS") == "portable" else ():
+        if reason := POSIX_ONLY.get(item.name.partition("[")[0]):
+            item.add_marker(pytest.mark.skip(reason=reason))
 
 
 def pytest_collection_finish():

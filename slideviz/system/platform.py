@@ -67,6 +67,11 @@ FACILITIES = (
         "only its write protection, if any",
     ),
     Facility(
+        ("removing an open file",),
+        "a signal that ends a command leaves no draft",
+        "a draft that is open stays until the next command writes to its folder",
+    ),
+    Facility(
         ("replacing an open file",),
         "a file that is open, as a large mesh in the window, can be replaced",
         "it cannot, and the message says so",
