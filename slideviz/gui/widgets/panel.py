@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtGui import QPaintEvent
-from qtpy.QtWidgets import QFormLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QSizePolicy, QWidget
 
 from slideviz.case.keys import KEYS
 from slideviz.case.spans import span_ends
@@ -204,12 +204,12 @@ class SpanWalls(Panel):
         self.along.chosen.connect(
             lambda text: self.change(changes.set_case, span_axis=KEYS["SPAN_AXIS"].kind.read(text))
         )
-        self.along.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        row = in_row(*self.ends, wide=self.ends, spacing=4)
-        rows = QVBoxLayout(self)
-        rows.setContentsMargins(0, 0, 0, 0)
-        rows.addLayout(row)
-        rows.addWidget(self.along)
+        fields = (*self.ends, self.along)
+        for field in fields:
+            field.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        row = in_row(*fields, wide=fields, spacing=4)
+        row.setContentsMargins(0, 0, 0, 0)
+        self.setLayout(row)
         self._by_name: tuple[str, str] | None = None
         self._blade: tuple[str, ...] = ()
         self.follow(lambda session: (session.mesh, session.case.around_span))
@@ -240,8 +240,8 @@ class SpanWalls(Panel):
             span = names.get(span[0], span[0]), names.get(span[1], span[1])
             span = span if {*span} <= {*names.values()} else None  # of another zone
         along = KEYS["SPAN_AXIS"].kind.write(case.span_axis)
-        words = {text: f"span along {text}" for text in (*"xyz", along)}
-        self.along.offer(words | {"AUTO": "direction automatic"})
+        words = {text: f"along {text}" for text in (*"xyz", along)}
+        self.along.offer(words | {"AUTO": "auto"})
         self.along.show_value(along)
         for k, end in enumerate(self.ends):
             end.offer({name: name for name in names.values()})
