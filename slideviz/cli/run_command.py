@@ -267,7 +267,7 @@ def _default_output(case: Case) -> Path:
 def _format_of(output: Path, case: Case) -> FileFormat | None:
     """Return the format of MESH_OUT_FORMAT, or None; raise CaseError if ``-o`` contradicts it."""
     kind = case.mesh_out_format
-    ending = output.suffix.lower()
+    ending = ending_of(output)
     if kind and output != case.mesh_out and ending in FORMATS and ending != f".{kind}":
         raise CaseError(
             f"{output}: its ending is {ending}, but MESH_OUT_FORMAT says {kind.upper()}; change "

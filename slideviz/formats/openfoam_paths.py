@@ -9,13 +9,21 @@ from __future__ import annotations
 from pathlib import Path
 
 ENDING = ".foam"
+TWO_PARTS = ".ugrid"
+"""The last part of an ending that has another one before it."""
 REGIONS = "regionProperties"
 _NAMES = ("points", "points.gz", REGIONS)
 
 
 def ending_of(path: Path) -> str:
-    """Return the ending of a mesh file, in lower case: ``.foam`` for one of OpenFOAM."""
-    return ENDING if path.name in _NAMES else path.suffix.lower()
+    """Return the ending of a mesh file, in lower case: ``.foam`` for one of OpenFOAM.
+
+    That of UGRID has two parts: ``.b8.ugrid``.
+    """
+    if path.name in _NAMES:
+        return ENDING
+    suffix = path.suffix.lower()
+    return "".join(path.suffixes[-2:]).lower() if suffix == TWO_PARTS else suffix
 
 
 def instance_of(path: Path) -> tuple[Path, str]:
@@ -36,7 +44,7 @@ def stem_of(path: Path) -> str:
     """Return the name of a mesh file without its ending; of OpenFOAM that of its case."""
     if path.name in _NAMES:
         return case_folder(path).name or "mesh"
-    return path.stem
+    return path.name[: len(path.name) - len(ending_of(path))]
 
 
 def is_time(folder: Path) -> bool:

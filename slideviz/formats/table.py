@@ -111,10 +111,7 @@ FORMATS: dict[str, MeshFormat] = {row.ending: row for row in _ROWS}
 
 def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """Return the format of a file to write: ``file_format``, or that of its ending."""
-    if file_format:
-        return FORMATS[f".{file_format}"]
-    several = "".join(path.suffixes[-2:]).lower()
-    return FORMATS.get(several) or FORMATS.get(ending_of(path), MESHIO)
+    return FORMATS.get(f".{file_format}" if file_format else ending_of(path), MESHIO)
 
 
 def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:

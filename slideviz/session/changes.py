@@ -14,6 +14,7 @@ from slideviz.case.model import Case
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, named
 from slideviz.ffd.box import Index
+from slideviz.formats.openfoam_paths import ending_of, stem_of
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.motions import new_target, with_box
 from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_periodicity
@@ -415,7 +416,7 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
         case = case.with_paths(lambda path: moved.get(path, path))
         if file and out and file in moved and out.parent == file.parent:
             new = moved[file]
-            case = case.change(mesh_out=new.with_name(f"{new.stem}_deformed{out.suffix}"))
+            case = case.change(mesh_out=new.with_name(f"{stem_of(new)}_deformed{ending_of(out)}"))
         return case
 
     return replace(

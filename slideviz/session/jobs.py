@@ -35,6 +35,7 @@ from slideviz.design.live_fields import LiveFields
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError, Message, SlidevizError
 from slideviz.formats.files import read, write
+from slideviz.formats.openfoam_paths import stem_of
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
@@ -118,7 +119,9 @@ def step_paths(path: Path, count: int) -> list[Path]:
     if format_for(path).series:
         return [path]
     width = len(str(count))
-    return [path.with_name(f"{path.stem}_{k:0{width}d}{path.suffix}") for k in range(1, count + 1)]
+    stem = stem_of(path)
+    ending = path.name[len(stem) :]
+    return [path.with_name(f"{stem}_{k:0{width}d}{ending}") for k in range(1, count + 1)]
 
 
 def save_steps(

@@ -86,7 +86,7 @@ def _save_name(
         if not name:
             return None, chosen
         path = Path(name)
-        if path.suffix.lower() in _suffixes(filters):
+        if path.name.lower().endswith(tuple(_suffixes(filters))):
             return path, chosen
         suffix = next(iter(_suffixes(chosen)), default.suffix)
         path = path.with_name(f"{path.name.rstrip('.')}{suffix}")
@@ -99,7 +99,7 @@ def _save_name(
 
 def _suffixes(filters: str) -> list[str]:
     """Return the suffixes of the filters of a file dialog, such as ``.csv``."""
-    return re.findall(r"\*(\.\w+)", filters)
+    return re.findall(r"\*((?:\.\w+)+)", filters)
 
 
 def ask_unsaved(
