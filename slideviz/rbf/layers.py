@@ -43,8 +43,8 @@ from slideviz.mesh.topology import TINY, corner_vectors, distinct_edges, facet_e
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
+from slideviz.rbf.nearest_rotation import nearest_rotations
 from slideviz.rbf.operations import difference_from, points
-from slideviz.rbf.polar import nearest_rotations
 from slideviz.rbf.projection import as_simplices
 from slideviz.rbf.tape import (
     Array,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.rbf.polar import nearest_rotations, rotation_slopes, rotations
+from slideviz.rbf.nearest_rotation import nearest_rotations, rotation_slopes, rotations
 from slideviz.rbf.tape import Tape
 
 EPS = float(np.finfo(float).eps)
