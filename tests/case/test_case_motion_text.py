@@ -9,7 +9,7 @@ from slideviz.case.motion_text import GRAMMAR, read_motions, write_motions
 from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.file import FromFile, Prescribed
-from slideviz.case.motions.kinds import KIND_OF
+from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.errors import CaseError
@@ -218,3 +218,12 @@ def test_all_wrong_motions_at_once():
 def test_displacements_of_a_program_cannot_be_written():
     with pytest.raises(CaseError, match="cannot be written to a case file; write them to a disp"):
         write_motions((Prescribed([0], [[1.0, 0.0]]),))
+
+
+def test_a_word_of_a_motions_grammar_has_one_meaning_in_all_kinds():
+    """A design's column may be named by it: ``BLADE.rotate.angle``."""
+    meanings: dict[str, set[str]] = {}
+    for kind in KINDS:
+        for word, name in kind.words:
+            meanings.setdefault(word, set()).add(name)
+    assert all(len(names) == 1 for names in meanings.values()), meanings

@@ -10,11 +10,13 @@ from slideviz.case.model import Case
 from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
 from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
 from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import KINDS
 from slideviz.case.motions.onto import Onto
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
+from slideviz.gui.panels.motion_editor import ROWS
 from slideviz.gui.panels.motions import TableDialog
 from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.fields import control_point_problem
@@ -546,3 +548,9 @@ def test_a_boundary_is_laid_onto_a_surface_without_blocking_the_window(driver, t
     assert listed(driver) == "1.  airfoil: lay onto high.su2"
     put(driver, Onto(tmp_path / "none.su2", "airfoil"))
     assert "The surface to lie on" in driver.window.run_panel.text.text()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_editor_has_a_row_for_each_field_of_each_kind(kind):
+    fields = {*kind.__dataclass_fields__}
+    assert {ROWS[name].attribute for name in kind.rows} <= fields | {*dir(kind)}

@@ -208,7 +208,8 @@ class Motion(CheckedFields):
 
         Place of the motion in the case; nodes (n,); the derivative (n, d) of their displacement by
         a number of each node; and the derivative (n, k) of that by the k numbers of the motion, in
-        the order of `design_numbers`. ``on`` has the nodes (k,) of each moving marker.
+        the order of `design_numbers`. A motion whose numbers move nodes along several directions is
+        yielded once for each. ``on`` has the nodes (k,) of each moving marker.
         """
         yield from ()
 
