@@ -15,7 +15,7 @@ SEED := 0
 MINUTES := 10
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz kill shots folder deb study clean
+.PHONY: help setup upgrade demo test quick test-all test-processors lint format docs golden bits smoke mutants bench laws fuzz kill gpu shots folder deb study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -81,6 +81,9 @@ fuzz: setup ## search for faults with damaged files and absurd cases (MINUTES=10
 
 kill: setup ## end commands at random times: files are whole, old or new (MINUTES=10)
 	$(BIN)/python -m tools.kill --minutes $(MINUTES) $(ARGS)
+
+gpu: setup ## speed and errors of a graphics card (needs one, and the extra gpu); three minutes
+	$(BIN)/python -m tools.gpu $(ARGS)
 
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/python -m tools.shots

@@ -173,6 +173,10 @@ class KernelTerm(Term):
 KERNELS: dict[str, KernelTerm] = _table("KERNELS", KernelTerm)
 """The radial functions of thesis Tables 2.1 and 2.2, with formulas in `slideviz.rbf.kernels`."""
 
+Device = Literal["auto", "cpu", "gpu"]
+DEVICES: dict[Device, Term] = _table("DEVICES", Term)
+"""Where sums of radial functions and their systems are computed."""
+
 Polynomial = Literal["auto", "no", "yes"]
 POLYNOMIALS: dict[Polynomial, Term] = _table("POLYNOMIALS", Term)
 """Whether sums of radial functions have a linear polynomial (thesis Eq. 2.1)."""

@@ -17,7 +17,7 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$python" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check '.[test,dev,docs,peers,packages]' \
+"$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check '.[test,dev,docs,peers,packages,gpu]' \
     </dev/null
 {
     printf '# Versions that were tested together, on Python %s. `make upgrade` renews them.\n' "$oldest"

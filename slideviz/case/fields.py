@@ -56,6 +56,7 @@ class CaseFields(CheckedFields):
     support_radius: float | None = None
     kernel: str = field(default="wendland-c2", metadata=terms.KERNELS)
     reduction: Reduction | None = AUTO
+    device: terms.Device = field(default="auto", metadata=terms.DEVICES)
     polynomial: terms.Polynomial = field(default="auto", metadata=terms.POLYNOMIALS)
     relax: terms.Relax = field(default="no", metadata=terms.RELAXES)
     layers: terms.Layers = field(default="no", metadata=terms.LAYERS)

@@ -28,7 +28,7 @@ Rows = Iterator[tuple[str, object] | Problem]
 LEAST_MEMORY = 2 << 30  # bytes below which a window with a small mesh may not start
 LEAST_DISK = 1 << 29  # bytes; compiled loops take a tenth of it
 FONTS = ("/usr/share/fonts", "/usr/local/share/fonts")
-EXTRAS = ("mpi4py", "openmdao", "distributed")
+EXTRAS = ("mpi4py", "openmdao", "distributed", "cupy-cuda12x")
 """Packages of extras, without which all but their features works."""
 
 
@@ -169,6 +169,13 @@ def _drawing(report: Report) -> Iterator[tuple[str, object]]:
     yield "GPU", "none used: OpenGL draws in software" if software else "used for drawing"
 
 
+def _computing(_: Report) -> Iterator[tuple[str, object]]:
+    # Late: SciPy takes 0.1 s, and may be missing.
+    from slideviz.system.device import card_name, why_no_card
+
+    yield "GPU", f"none used: {lacking}" if (lacking := why_no_card()) else card_name()
+
+
 def _size(count: float) -> str:
     return f"{count / 2**30:.1f} GiB"
 
@@ -177,6 +184,7 @@ SECTIONS = {
     "program": _program,
     "packages": _packages,
     "threads": _threads,
+    "computing": _computing,
     "memory": _memory,
     "caches": _caches,
     "drawing": _drawing,

@@ -10,9 +10,17 @@ import numpy as np
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
+from slideviz.rbf.card import CardLoops
 from slideviz.rbf.kernels import KERNELS
+from slideviz.system.device import Place
 
 CHUNK = 25_000_000  # pairs between two calls of ``tick``: some tens of milliseconds
+
+PAIRS = 1_000_000
+"""Pairs whose radial functions are in memory at a time, in each thread, when many columns of
+weights share them: the functions and their products stay in the cache."""
+
+ROWS = 256  # largest number of targets that are in memory at a time then
 
 Tick = Callable[[float], None]
 """A progress callback: takes the fraction done, and may raise to stop the work."""
@@ -31,6 +39,7 @@ class Basis:
     """Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features."""
     kernel: str = "wendland-c2"  # a key of ``KERNELS``
     polynomial: bool = False  # whether a kernel that needs no linear polynomial has one
+    place: Place = "cpu"  # where sums, matrices and factors are computed
 
     @property
     def saddle(self) -> bool:
@@ -46,6 +55,75 @@ class Basis:
     def period_over_pi(self) -> float:
         """Return theta_p / pi, the factor of the inner sine; 0 for Euclidean features."""
         return self.period / np.pi
+
+    @property
+    def metric(self) -> tuple[float, float, int]:
+        """Return theta_p / pi, 1 / R and the kernel's code, as the loops take them."""
+        return self.period_over_pi, 1.0 / self.radius, KERNELS[self.kernel].code
+
+    @property
+    def loops(self) -> HostLoops | CardLoops:
+        """Return the loops of the place where this is computed."""
+        return LOOPS[self.place]
+
+
+class HostLoops:
+    """The loops of `compiled`, and how many rows they have between two calls of ``tick``."""
+
+    def sum_rows(self, count: int) -> int:
+        """Return how many targets to sum up at a time, with ``count`` control nodes."""
+        return max(1, CHUNK // max(1, count))
+
+    matrix_rows = sum_rows
+
+    def product_rows(self, count: int) -> int:
+        """Return how many rows of a matrix are in memory at a time, when they are multiplied."""
+        return min(ROWS, max(64, PAIRS // max(1, count)))
+
+    def add_up(
+        self,
+        x: FloatArray,
+        c: FloatArray,
+        w: FloatArray,
+        metric: tuple[float, float, int],
+        out: FloatArray,
+    ) -> None:
+        """Write s at targets x (k, N) to out (3, N), of controls c (k, n) and weights w (3, n)."""
+        *lengths, kind = metric
+        if kind:
+            compiled.sum_any(x, c, w, *metric, out)
+        else:
+            compiled.sum_plain(x, c, w, *lengths, out)
+
+    def fill_matrix(
+        self,
+        x: FloatArray,
+        c: FloatArray,
+        across: FloatArray,
+        along: FloatArray,
+        metric: tuple[float, float, int],
+        out: FloatArray,
+    ) -> None:
+        """Write G (N, n) to out, as `compiled.fill_matrix`."""
+        compiled.fill_matrix(x, c, across, along, *metric, out)
+
+    def multiply(
+        self,
+        x: FloatArray,
+        c: FloatArray,
+        right: FloatArray,
+        metric: tuple[float, float, int],
+        out: FloatArray,
+    ) -> None:
+        """Write phi(|x_a - c_b|) times ``right`` (n, m) to out (N, m)."""
+        values = np.empty((x.shape[1], c.shape[1]))
+        with compiled.one_at_a_time(values.size):
+            compiled.fill_matrix(x, c, x[:0], c[:0], *metric, values)
+        np.matmul(values, right, out=out)
+
+
+LOOPS: dict[Place, HostLoops | CardLoops] = {"cpu": HostLoops(), "gpu": CardLoops()}
+"""The loops, by the place where they run."""
 
 
 def evaluate(
@@ -69,19 +147,16 @@ def evaluate(
         if len(near):
             out[near] = evaluate(basis, targets[:, near], controls, weights, tick)
         return out
-    kind = KERNELS[basis.kernel].code
-    rows = 4 if basis.period > 0 or kind or len(targets) == 4 else 3
+    metric = basis.metric
+    rows = 4 if basis.period > 0 or metric[-1] or len(targets) == 4 else 3
     c = padded_rows(controls, rows)
     w = padded_rows(weights.T, 3)
-    metric = basis.period_over_pi, 1.0 / basis.radius
+    loops = basis.loops
 
     def add_up(x: FloatArray, out: FloatArray) -> None:
-        if kind:
-            compiled.sum_any(x, c, w, *metric, kind, out)
-        else:
-            compiled.sum_plain(x, c, w, *metric, out)
+        loops.add_up(x, c, w, metric, out)
 
-    return summed(add_up, targets, c, weights.shape[1], tick)
+    return summed(add_up, targets, c, weights.shape[1], tick, loops)
 
 
 def summed(
@@ -90,15 +165,17 @@ def summed(
     controls: FloatArray,
     width: int,
     tick: Tick = no_tick,
+    loops: HostLoops | CardLoops = LOOPS["cpu"],
 ) -> FloatArray:
     """Return what ``add_up(x, out)`` writes to out (3, N) for targets x (k, N), (N, width).
 
     Targets are divided, so that ``tick`` is called often; ``controls`` (k, n) are contiguous rows.
+    ``loops``: those that ``add_up`` runs.
     """
     rows, count = controls.shape
     total = targets.shape[1]
     found = np.empty((total, width))
-    size = max(1, CHUNK // max(1, count))
+    size = loops.sum_rows(count)
     for start in range(0, total, size):
         x = padded_rows(targets[:, start : start + size], rows)
         out = np.empty_like(x[:3])
@@ -200,18 +277,16 @@ def matrix(
     total = x.shape[1]
     n = c.shape[1]
     out = np.empty((total, n))
-    size = max(1, CHUNK // max(1, n))
+    size = basis.loops.matrix_rows(n)
     for start in range(0, total, size):
         part = slice(start, min(total, start + size))
         with compiled.one_at_a_time((part.stop - part.start) * n):
-            compiled.fill_matrix(
+            basis.loops.fill_matrix(
                 np.ascontiguousarray(x[:, part]),
                 c,
                 np.ascontiguousarray(across[:, part]),
                 along,
-                basis.period_over_pi,
-                1.0 / basis.radius,
-                KERNELS[basis.kernel].code,
+                basis.metric,
                 out[part],
             )
         tick(part.stop / total)

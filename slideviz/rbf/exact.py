@@ -26,6 +26,7 @@ from slideviz.rbf.solve import (
     solve_saddle,
 )
 from slideviz.rbf.tape import Array, gather, multiply, value
+from slideviz.system.device import arrays_at
 
 
 class Fit:
@@ -134,7 +135,8 @@ class ExactFit(Fit):
         ends = self._place(rows.only(new)), self._place(rows.only(part))
         system = matrix(self._problem.basis, *ends, tick)
         with enough_threads(flops := len(system) * len(part) ** 2 / 3):
-            self._factors[int(part[0])] = extend(before, system, tick)
+            arrays = arrays_at(self._problem.basis.place)
+            self._factors[int(part[0])] = extend(before, system, tick, arrays)
         return flops
 
     def _polynomial(

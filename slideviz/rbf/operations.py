@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick, reached
+from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick, padded_rows, reached
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.loops import place, shift
@@ -15,12 +15,6 @@ from slideviz.rbf.slopes import pull_positions, push_positions
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import Array, Linear, Link, Variable, linear, recorded, summed, value
 from slideviz.system.threads import in_parts
-
-PAIRS = 1_000_000
-"""Pairs whose radial functions are in memory at a time, in each thread, when many columns of
-weights share them: the functions and their products stay in the cache."""
-
-ROWS = 256  # largest number of targets that are in memory at a time
 
 
 def flat(rows: FloatArray) -> FloatArray:
@@ -183,15 +177,17 @@ def many(
         near = np.arange(total)
     else:
         out[:] = 0.0
-    size = min(ROWS, max(64, PAIRS // max(1, n)))
+    loops = basis.loops
+    size = min(loops.product_rows(n), max(1, total))
+    c = padded_rows(controls, 4)
 
     def fill(part: slice) -> None:
         found = np.empty((size, wide.shape[1]))
         for first in range(part.start, part.stop, size):
             here = near[first : min(part.stop, first + size)]
-            values = matrix(basis, (targets[:, here], None), (controls, None))
-            np.matmul(values, wide, out=found[: len(values)])
-            place(found[: len(values)], here, out)
+            products = found[: len(here)]
+            loops.multiply(padded_rows(targets[:, here], 4), c, wide, basis.metric, products)
+            place(products, here, out)
 
     with enough_threads(0.0):  # the threads are those of the parts
         in_parts(fill, len(near))

@@ -20,7 +20,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
 from slideviz.rbf.compiled import A2, BLOCK, TARGETS_PER_TASK, distances, fast, one_minus_cos
 from slideviz.rbf.evaluate import Basis, padded_rows
-from slideviz.rbf.kernels import KERNELS, SHAPE
+from slideviz.rbf.kernels import SHAPE
 
 NEAR = 1e-12  # nodes coincide when their distance over R is at most this
 
@@ -186,7 +186,7 @@ def pull_positions(
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
         wx = padded_rows(adjoint.T, 3)
         wc = padded_rows(weights.T, 3)
-        _reverse(x, c, wx, wc, *_settings(basis), out)
+        _reverse(x, c, wx, wc, *basis.metric, out)
     return out[: len(targets)]
 
 
@@ -209,10 +209,5 @@ def push_positions(
     dc = np.zeros_like(c) if moved_controls is None else padded_rows(moved_controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _forward(x, c, padded_rows(weights.T, 3), dx, dc, *_settings(basis), out)
+        _forward(x, c, padded_rows(weights.T, 3), dx, dc, *basis.metric, out)
     return np.ascontiguousarray(out[: weights.shape[1]].T)
-
-
-def _settings(basis: Basis) -> tuple[float, float, int]:
-    """Return ``period_over_pi``, 1 / R, and the code of the function, as the loops take them."""
-    return basis.period_over_pi, 1.0 / basis.radius, KERNELS[basis.kernel].code

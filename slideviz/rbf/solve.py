@@ -15,12 +15,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
+from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve
 from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
+from slideviz.system.device import HOST, Arrays
 from slideviz.system.jit_cache import njit
 
 RANK = 1e-10
@@ -181,13 +182,16 @@ NOTHING = Factor(np.empty((0, 0)), NO_NODES, NO_NODES)
 """The factor of a matrix without rows."""
 
 
-def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) -> FloatArray:
+def solve_lower(
+    lower: FloatArray, right: FloatArray, transposed: bool = False, arrays: Arrays = HOST
+) -> FloatArray:
     """Return ``L^-1 B`` (or ``L^-T B``) for a lower triangular L (n, n) and B (n, m).
 
     By blocks, because SciPy's triangular solver keeps the interpreter lock, for seconds on large
     systems, and with it a window still; products of matrices do not.
+    ``arrays``: those that L and B are.
     """
-    out = np.array(right, dtype=float)
+    out = arrays.module.array(right, dtype=float)
     starts = range(0, len(lower), TRIANGLE)
     for start in reversed(starts) if transposed else starts:
         here = slice(start, start + TRIANGLE)
@@ -196,7 +200,7 @@ def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) 
         else:
             out[here] -= lower[here, :start] @ out[:start]
         corner = lower[here, here]
-        out[here] = solve_triangular(
+        out[here] = arrays.solve_triangular(
             corner, out[here], lower=True, trans=1 if transposed else 0, check_finite=False
         )
     return out
@@ -260,43 +264,48 @@ def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
     return extend(NOTHING, matrix, tick)
 
 
-def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
+def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick, arrays: Arrays = HOST) -> Factor:
     """Return the factor of a matrix whose leading block has the factor ``before``.
 
     Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
     few tens of milliseconds even for 10,000 unknowns. Raises DeformError if the matrix has numbers
     that are not finite.
     ``rows`` (m, n + m): the last m rows of the symmetric matrix; ``before`` is of the first n.
+    ``arrays``: those to compute with. The host has the matrix, and factorises the diagonal blocks.
     """
+    module = arrays.module
     require_finite(rows)
     done = len(before.lower)
     more = len(rows)
     old = rows.shape[1] - more
     corner = rows[:, old:]
     dropped = np.zeros(more, bool)
-    lower = np.zeros((done + more, done + more), order="F")
-    lower[:done, :done] = before.lower
+    lower = module.zeros((done + more, done + more), order="F")
+    old_lower = module.asarray(before.lower)
+    lower[:done, :done] = old_lower
     if done:
-        lower[done:, :done] = solve_lower(before.lower, rows[:, before.retained].T).T
+        beside = module.asarray(rows[:, before.retained].T)
+        lower[done:, :done] = solve_lower(old_lower, beside, arrays=arrays).T
     for start in range(0, more, BLOCK):
         stop = min(more, start + BLOCK)
         here = slice(done + start, done + stop)
         below = slice(done + stop, None)
-        panel = corner[start:, start:stop] - (
+        panel = module.asarray(corner[start:, start:stop]) - (
             lower[done + start :, : here.start] @ lower[here, : here.start].T
         )
-        head = _cholesky(panel[: stop - start], dropped[start:stop])
+        head = module.asarray(_cholesky(arrays.to_host(panel[: stop - start]), dropped[start:stop]))
         lower[here, here] = head
         if stop < more:
-            rest = solve_lower(head, panel[stop - start :].T)
-            rest[dropped[start:stop]] = 0.0
+            rest = solve_lower(head, panel[stop - start :].T, arrays=arrays)
+            rest[module.asarray(dropped[start:stop])] = 0.0
             lower[below, here] = rest.T
         tick((stop / more) ** 2)
     kept = np.concatenate([before.retained, old + np.flatnonzero(~dropped)])
     if not dropped.any():
-        return Factor(lower, kept, before.dropped)
+        return Factor(arrays.to_host(lower), kept, before.dropped)
     stay = np.concatenate([np.arange(done), done + np.flatnonzero(~dropped)])
     left_out = np.concatenate([before.dropped, old + np.flatnonzero(dropped)])
+    lower = arrays.to_host(lower)
     return Factor(np.asfortranarray(lower[np.ix_(stay, stay)]), kept, left_out)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial, reduce
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +62,8 @@ from slideviz.solver.prescribed import (
     support_radius,
 )
 from slideviz.solver.rims import find_rims
+from slideviz.system.device import Place, choose_place, free_on_card
+from slideviz.system.platform import free_memory
 from slideviz.terms import NOT_WALLS
 
 if TYPE_CHECKING:
@@ -72,6 +75,9 @@ if TYPE_CHECKING:
 EXACT_NODES = 2000
 """Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
 `slideviz.case.keys` has this number and the next in words."""
+
+SYSTEM_BYTES = 24.0
+"""Memory of a system, over the square of its unknowns: matrix, factor, and what a product takes."""
 
 AUTO_TOLERANCE = 1e-3
 """The tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement."""
@@ -114,21 +120,38 @@ def needed_by_layers(reduction: Reduction | None, gap: float) -> float:
     return LAYER * gap if reduction is not None and reduction.tolerance > LAYER * gap else 0.0
 
 
+def most_exact(case: Case, dim: int, place: Place) -> int:
+    """Return the most candidates with which DATA_REDUCTION= AUTO takes all of them.
+
+    On a card, as many as its memory and the host's have room for, in dimension ``dim``.
+    """
+    if place == "cpu":
+        return EXACT_NODES
+    unknowns = sqrt(min(free_on_card(), free_memory()) / SYSTEM_BYTES)
+    return max(EXACT_NODES, int(unknowns / (dim if case.sliding == "ds" else 1)))
+
+
 def find_reduction(
-    case: Case, extent: float, largest: float, candidates: int, gap: float
+    case: Case,
+    extent: float,
+    largest: float,
+    candidates: int,
+    gap: float,
+    exact_nodes: int,
 ) -> Reduction | None:
     """Return the settings of the selection of control nodes; None where all candidates are taken.
 
     ``extent`` and ``largest``: the extent of the mesh, and the largest displacement.
     ``candidates``: nodes that could be control nodes.
     ``gap``: the smallest distance between a moving and a sliding node (`sliding_gap`).
+    ``exact_nodes``: most candidates that AUTO takes without a selection (`most_exact`).
     """
     reduction = case.reduction
     if reduction is None or case.method != "rbf":
         return None
     if not reduction.auto:
         tolerance = reduction.relative * extent if reduction.relative else reduction.tolerance
-    elif candidates <= EXACT_NODES or not largest > 0.0:
+    elif candidates <= exact_nodes or not largest > 0.0:
         return None
     else:
         tolerance = max(min(AUTO_TOLERANCE * largest, LAYER * gap), SMALLEST * largest)
@@ -310,7 +333,9 @@ def setup_of(
     case = case.change(roles=domain.roles)
     candidates = _candidates(domain.classes, conditions.known)
     gap = sliding_gap(mesh.points, domain.boundary.facets, domain.classes)
-    reduction = find_reduction(case, mesh.extent, conditions.largest, candidates, gap)
+    place = choose_place(case.device if case.method == "rbf" else "cpu")
+    most = most_exact(case, mesh.dim, place)
+    reduction = find_reduction(case, mesh.extent, conditions.largest, candidates, gap, most)
     loose = loose_warnings(case, reduction, conditions.largest, mesh.extent, gap)
     frame = domain.frame
     coords = domain.coords
@@ -355,6 +380,7 @@ def setup_of(
             angle,
             case.kernel,
             polynomial=case.polynomial == "yes" and not KERNELS[case.kernel].polynomial,
+            place=place,
         ),
         candidates=candidates,
         reduction=reduction,
