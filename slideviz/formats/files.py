@@ -256,9 +256,11 @@ def read(
     Parameters
     ----------
     path : str or Path
-        An SU2 file, text or binary, or one of a format that meshio reads (by its ending).
+        An SU2 file, text or binary, the folder of an OpenFOAM case, or a file of another format (by
+        its ending).
     zone : int, optional
-        The zone of an SU2 file, from 1; all of them, as one mesh, when left out.
+        The zone of an SU2 file, or the region of an OpenFOAM case, from 1; all of them, as one
+        mesh, when left out.
     progress : callable, optional
         Called with the fraction done, 0 to 1; what it raises stops the reading and passes on.
     file_format : {"su2", "su2b"}, optional
@@ -283,7 +285,9 @@ def read(
         row = format_of(path, file_format)
         if not row.zones and zone not in (None, 1):
             raise path_error(
-                path, f"there is no zone {zone}; only SU2 files have zones, so leave it out"
+                path,
+                f"there is no zone {zone}; only SU2 files and OpenFOAM cases have zones, so leave "
+                "it out",
             )
         if not row.reader:
             raise path_error(

@@ -464,7 +464,10 @@ def test_unknown_endings(tmp_path, name):
 def test_only_su2_has_zones(tmp_path):
     path = save(tmp_path, GMSH_22, "grid.msh")
     assert len(read(path, zone=1).cells) == 3
-    with pytest.raises(MeshError, match="there is no zone 2; only SU2 files have zones, so leave"):
+    with pytest.raises(
+        MeshError,
+        match="there is no zone 2; only SU2 files and OpenFOAM cases have zones, so leave",
+    ):
         read(path, zone=2)
 
 

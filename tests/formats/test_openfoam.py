@@ -459,9 +459,9 @@ def test_wedges_keep_their_planes(tmp_path, along):
     mesh = sv.read(tmp_path)
     assert mesh.dim == 2
     assert mesh.points == pytest.approx(flat, abs=1e-15)
-    assert {*mesh.marker_names} == {"wall", "axis_0"}
-    assert mesh.roles == {"axis_0": "sliding"}
-    assert np.array_equal(mesh.marker("axis_0").nodes, [0, 1, 2])
+    assert {*mesh.marker_names} == {"wall", "axis"}
+    assert mesh.roles == {"axis": "sliding"}
+    assert np.array_equal(mesh.marker("axis").nodes, [0, 1, 2])
     assert sv.quality(mesh).valid == 4
     moved = mesh.points + np.array([0.1, 0.2]) * (mesh.points[:, 1:] > 0)
     sv.write(tmp_path, mesh.with_points(moved), overwrite=True)

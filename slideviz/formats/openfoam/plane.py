@@ -109,7 +109,7 @@ def plane_of(faces: Faces, points: FloatArray, patches: Sequence[Patch]) -> Plan
     built, turned = _triangulated(outline, coords)
     if turned:
         edges = edges[:, ::-1]
-    taken = [one.name for one in patches]
+    taken = [one.name for one in patches if one.count]
     axis = next(name for name in (AXIS, *(f"{AXIS}_{k}" for k in range(9))) if name not in taken)
     lines = {one.name: (sides >= one.start) & (sides < one.start + one.count) for one in patches}
     lines = {name: np.append(some, np.zeros(lone.sum(), bool)) for name, some in lines.items()}
