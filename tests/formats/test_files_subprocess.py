@@ -112,6 +112,13 @@ def test_a_reader_that_takes_too_long(tmp_path, monkeypatch):
         read(path)
 
 
+@pytest.mark.parametrize("rest", ["", "BEGIN BULK", "BEGIN BULK\n\n$ end\n#\n// x\n  \n"])
+def test_a_nastran_file_that_ends_before_its_data(tmp_path, rest):
+    path = save(tmp_path, f"SOL 101\n{rest}", "a.bdf")
+    with pytest.raises(MeshError, match=r"a.bdf: there are no data after a line BEGIN BULK; expo"):
+        read(path)
+
+
 def test_a_reader_that_wants_too_much_memory(tmp_path):
     path = save(tmp_path, FAR_NODE, "a.msh")
     with pytest.raises(MeshError, match=r"a.msh: cannot be read: it needs more memory than a file"):

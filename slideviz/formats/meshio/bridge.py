@@ -104,10 +104,23 @@ def load(path: Path, formats: list[str]) -> meshio.Mesh:
     for name in formats:
         try:
             with meshio_errors(path, f"read as {name}"):
+                if name == "nastran":
+                    _require_bulk_data(path)
                 return meshio.read(path, file_format=name)
         except MeshError as problem:
             problems.append(problem)
     raise problems[0]
+
+
+def _require_bulk_data(path: Path) -> None:
+    """Raise MeshError if a Nastran file ends before its bulk data: meshio would read on forever."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if line.strip().startswith("BEGIN BULK"):
+                break
+        # What meshio passes over: short lines and comments.
+        if all(len(line) < 4 or line.startswith(("$", "//", "#")) for line in lines):
+            raise path_error(path, "there are no data after a line BEGIN BULK; export it again")
 
 
 MESHIO_TYPES = {
