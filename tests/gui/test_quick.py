@@ -323,3 +323,22 @@ def test_the_last_number_along_x_is_whole_when_it_becomes_longer():
         place = found.place
         ends = [label.get_window_extent().x1 for label in found.figure.axes[0].get_xticklabels()]
         assert max(ends) <= 300.0
+
+
+@pytest.mark.parametrize("end", [1.09, 1.01, 1.001])
+def test_the_last_number_along_x_is_whole_after_another_plot(end):
+    """It is centred at its tick, so that it juts out the more the nearer that is to the end."""
+
+    def draw_to(high):
+        def draw(figure, style):
+            axes = figure.subplots()
+            axes.set_xlim(0.0, high)
+            axes.set_xticks([0.0, 1.0], ["0.0", "1.000"])
+
+        return draw
+
+    paper = plot_canvas.PlotFormat(300, 200, 1.0, PRINT)
+    place = plot_canvas.picture(draw_to(1.1), paper, plot_canvas.AxesPlace()).place
+    figure = plot_canvas.picture(draw_to(end), paper, place).figure
+    last = figure.axes[0].get_xticklabels()[-1]
+    assert last.get_window_extent().x1 <= figure.bbox.x1

@@ -104,12 +104,14 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     return place
 
 
-def _last_tick(axes: Axes) -> tuple[int, bool]:
-    """Return the length of the last number along x, and whether it juts out at the axes' end."""
+def _last_tick(axes: Axes) -> tuple[int, float]:
+    """Return the length of the last number along x, and its place from 0 to 1 near the end."""
     low, high = axes.get_xlim()
     inside = [at for at in axes.get_xticks() if low <= at <= high]
     texts = axes.xaxis.get_major_formatter().format_ticks(inside)
-    return (len(texts[-1]), inside[-1] > low + 0.9 * (high - low)) if texts else (0, False)
+    if not texts:
+        return 0, 0.0
+    return len(texts[-1]), max(round((inside[-1] - low) / (high - low), 2), 0.9)
 
 
 def _legend_texts(axes: Axes) -> list[str]:
