@@ -19,18 +19,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.mesh.model import column_bounds, ranges, sorted_nodes
+from slideviz.mesh.model import Cells, column_bounds, ranges, sorted_nodes
 from slideviz.mesh.planes import FacetSimplices, Planes, line_normals, normals
 from slideviz.system.threads import ordered_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from slideviz.mesh.model import Cells, FloatArray, IntArray
+    from slideviz.mesh.model import FloatArray, IntArray
 
 
 TOLERANCE = 1e-8
 """Depth, as a share of the largest extent of both boundaries, up to which they only touch."""
+
+TRIANGLE = 5
+QUADRILATERAL = 9
+"""VTK identifiers."""
 
 CHUNK = 1024
 """Facets searched at a time, so that memory stays small and an early find ends the search."""
@@ -105,6 +109,31 @@ def swept_crossing(
             facet = free.facet[(free.nodes == nodes[k]).any(axis=1).argmax()]
             return Crossing(name, point, int(facet), int(wall.facet[other]))
     return None
+
+
+def fanned(points: FloatArray, surfaces: Sequence[Cells]) -> tuple[FloatArray, list[Cells]]:
+    """Return points and surfaces with four triangles around the middle of each quadrilateral.
+
+    They do not depend on the node at which it begins, as its halves along a diagonal do: those of
+    a twisted quadrilateral may cross another one close to it where the quadrilaterals do not.
+    ``points`` (n, d); those in the middle come after them.
+    """
+    parts = [points]
+    count = len(points)
+    found = []
+    for cells in surfaces:
+        blocks = []
+        for vtk, (_, nodes) in cells.by_type.items():
+            if vtk != QUADRILATERAL:
+                blocks.append((vtk, nodes))
+                continue
+            middle = np.arange(count, count + len(nodes))
+            count += len(nodes)
+            parts.append(points[nodes].mean(axis=1))
+            corners = zip(nodes.T, np.roll(nodes, -1, axis=1).T, strict=True)
+            blocks += [(TRIANGLE, np.column_stack((*pair, middle))) for pair in corners]
+        found.append(Cells.from_blocks(blocks))
+    return np.concatenate(parts), found
 
 
 def _margin(points: FloatArray, a: FacetSimplices, b: FacetSimplices) -> float:

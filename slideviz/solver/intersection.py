@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from math import ceil, floor, pi
 
@@ -15,7 +14,13 @@ from slideviz.case.spans import periodic_pairs
 from slideviz.errors import CaseError, Message
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
-from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swept_crossing
+from slideviz.mesh.crossing import (
+    Crossing,
+    fanned,
+    first_crossing,
+    self_crossing,
+    swept_crossing,
+)
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
@@ -36,6 +41,7 @@ OPEN = 0.1
 """The markers form a closed surface, but for small gaps, where their winding around a point inside
 differs from 1 by no more than this."""
 Others = list[tuple[str, Cells]]  # names and elements of boundaries
+Path = Sequence[FloatArray]  # all points (n, d) at places of a motion, the first before it
 HALF = 0.5  # a point is outside of a surface that winds around it less often than this
 
 
@@ -52,9 +58,7 @@ def intersection_message(
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in _movers(case, mesh, nodes, vectors):
-        moved = mesh.marker(name).cells
-        find = partial(first_crossing, after, moved)
-        hit, _ = _first_new(find, mesh, moved, _others(case, mesh, name))
+        hit, _ = _first_new(_at_end, mesh, (mesh.points, after), name, _others(case, mesh, name))
         if hit is not None:
             return (
                 f"the motion puts {name} through {hit.marker} near {_place(hit)}; move {name} "
@@ -79,18 +83,36 @@ def _giving_way(case: Case, wall: str) -> str:
     return f"let {wall} move with it (role moving, internal or periodic)"
 
 
+def _at_end(path: Path, moved: Cells, others: Others) -> Crossing | None:
+    return first_crossing(path[-1], moved, others)
+
+
+def _on_way(path: Path, moved: Cells, others: Others) -> Crossing | None:
+    hits = (swept_crossing(*pair, moved, others) for pair in pairwise(path))
+    return next(filter(None, hits), None)
+
+
 def _first_new(
-    find: Callable[[Others], Crossing | None], mesh: Mesh, moved: Cells, others: Others
+    find: Callable[[Path, Cells, Others], Crossing | None],
+    mesh: Mesh,
+    path: Path,
+    name: str,
+    others: Others,
 ) -> tuple[Crossing | None, Others]:
     """Return where a moved boundary crosses one that it did not cross before the motion, or None.
 
-    With it those of the ``others`` that are left: twisted quadrilaterals close to each other may
-    cross before, as each is taken as two triangles. ``find``: returns the first crossing.
+    With it those of the ``others`` that are left: twisted quadrilaterals close to each other, each
+    taken as two triangles, may cross before the motion, or where those `fanned` do not.
+    ``find``: returns the first crossing.
     """
-    while (hit := find(others)) is not None:
-        wall = [other for other in others if other[0] == hit.marker]
-        if first_crossing(mesh.points, moved, wall) is None:
-            break
+    moved = mesh.marker(name).cells
+    while (hit := find(path, moved, others)) is not None:
+        wall = next(cells for other, cells in others if other == hit.marker)
+        if first_crossing(mesh.points, moved, [(hit.marker, wall)]) is None:
+            fans = [fanned(points, (moved, wall)) for points in path]
+            body, side = fans[0][1]
+            if find([points for points, _ in fans], body, [(hit.marker, side)]) is not None:
+                break
         others = [other for other in others if other[0] != hit.marker]
     return hit, others
 
@@ -106,13 +128,10 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in case.markers_with("moving"):
-        moved = mesh.marker(name).cells
-        find = partial(swept_crossing, mesh.points, after, moved)
-        hit, others = _first_new(find, mesh, moved, _others(case, mesh, name))
-        if hit is not None and (path := _arcs(case, mesh, nodes, vectors)):
-            pairs = pairwise((mesh.points, *path))
-            hits = (swept_crossing(*pair, moved, others) for pair in pairs)
-            hit = next(filter(None, hits), None)
+        straight = (mesh.points, after)
+        hit, others = _first_new(_on_way, mesh, straight, name, _others(case, mesh, name))
+        if hit is not None and (arcs := _arcs(case, mesh, nodes, vectors)):
+            hit, _ = _first_new(_on_way, mesh, (mesh.points, *arcs), name, others)
         if hit is not None:
             return (
                 f"the motion takes {name} through {hit.marker} near {_place(hit)} on its way; move "
@@ -175,6 +194,9 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     body = Cells.joined(parts)
     hit = self_crossing(after, body)
     if hit is None or self_crossing(mesh.points, body) is not None:
+        return None
+    points, fans = fanned(after, (body,))
+    if self_crossing(points, fans[0]) is None:
         return None
     ends = np.cumsum([len(part) for part in parts])
     one, two = sorted(np.searchsorted(ends, hit[1:], "right"))

@@ -9,7 +9,7 @@ import pytest
 
 from slideviz.errors import MeshError
 from slideviz.mesh import crossing
-from slideviz.mesh.crossing import TOLERANCE, first_crossing, swept_crossing
+from slideviz.mesh.crossing import TOLERANCE, fanned, first_crossing, swept_crossing
 from slideviz.mesh.model import Cells
 from slideviz.mesh.planes import LEAF, BoxTree, line_normals, normals
 from tests.oracles import crossing as oracle
@@ -215,6 +215,31 @@ def test_large_facet_pierced_by_a_small_body():
     big, small = triangles([[0, 1, 2]]), triangles([[3, 4, 5]])
     assert first_crossing(points, big, [("S", small)]).other_facet == 0
     assert first_crossing(points, small, [("B", big)]).marker == "B"
+
+
+@pytest.mark.parametrize("first", range(4))
+@pytest.mark.parametrize("other", range(4))
+@pytest.mark.parametrize(("gap", "crosses"), [(0.05, False), (0.0, False), (-0.05, True)])
+def test_twisted_surfaces_cross_by_their_shape_not_their_numbering(first, other, gap, crosses):
+    scene = Scene(3)
+    x = np.linspace(-1, 1, 5)
+
+    def twisted(z):
+        at, cells = sheet(x, x, lambda a, b: z + 2.0 * a * b)
+        return at, cells
+
+    wall = scene.add(*twisted(0.0))
+    body = scene.add(*twisted(gap))
+    if crosses:
+        scene.points[body.nodes, 2] += 2.0 * scene.points[body.nodes, 0]
+
+    def begins_at(cells, node):
+        return quads(np.roll(cells.by_type[9][1], node, axis=1))
+
+    points, (body, wall) = fanned(scene.points, (begins_at(body, first), begins_at(wall, other)))
+    assert (first_crossing(points, body, [("wall", wall)]) is not None) == crosses
+    assert len(body) == len(wall) == 64
+    assert len(points) == len(scene.points) + 32
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Motions that put boundaries through each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -278,6 +280,15 @@ def test_what_crosses_before_the_motion_is_no_fault_of_it(square):
 def test_a_body_whose_sides_are_twisted_is_not_lost_by_a_small_motion():
     run = random_run(1464)
     assert message(*moved(run.case, run.mesh, *run.case.motions)) is None
+
+
+def test_a_body_with_twisted_sides_may_come_near_to_a_wall_but_not_go_through():
+    run = random_run(30677)
+    assert message(*moved(run.case, run.mesh, *run.case.motions)) is None
+    further = [replace(m, vector=tuple(5.0 * v for v in m.vector)) for m in run.case.motions]
+    text = message(*moved(run.case, run.mesh, *further))
+    assert text is not None
+    assert text.startswith("the motion puts BLOCK through y_m near (")
 
 
 def pushed(mesh, name):
