@@ -161,6 +161,20 @@ def path_error(path: Path, message: str) -> MeshError:
     return MeshError(Message(message, place=(path,)))
 
 
+_ROUNDING = 1e-10  # ratio of a coordinate to the extent below which it is a rounding error of zero
+
+
+def point_words(point: Iterable[float], extent: float = 0.0, digits: int = 6) -> str:
+    """Return coordinates as text, with ``digits`` significant digits.
+
+    Those that are only rounding beside ``extent``, that of the mesh, or beside the largest of them,
+    are 0.
+    """
+    values = tuple(point)
+    least = _ROUNDING * max(extent, *map(abs, values), 0.0)
+    return ", ".join(f"{0.0 if abs(v) <= least else v:.{digits}g}" for v in values)
+
+
 def shown(text: str) -> str:
     """Return the text in quotes for a message, cut to 60 characters."""
     return repr(text if len(text) <= 60 else f"{text[:57]}...")

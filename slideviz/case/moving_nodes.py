@@ -19,7 +19,7 @@ from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.kinds import FAMILIES
 from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.zone_cases import each_zone, of_several_zones, zone_motion
-from slideviz.errors import CaseError, Message, raise_all
+from slideviz.errors import CaseError, Message, point_words, raise_all
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.zones import names_in
@@ -143,7 +143,7 @@ def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
     there = mesh.points[nodes] + vectors
     if not within(there, LARGEST) and within(mesh.points, LARGEST):
         k = int(np.argmax(~(np.abs(there) <= LARGEST).all(axis=1)))
-        where = ", ".join(f"{value:.6g}" for value in there[k])
+        where = point_words(there[k])
         raise CaseError(
             f"{mesh.name}: the motion takes node {nodes[k]} to ({where}); nothing can be computed "
             f"with coordinates larger than {LARGEST:g}, so move it less"

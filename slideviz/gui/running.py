@@ -274,7 +274,8 @@ class Running(QObject):
         bad = inverted_words(run)
         if bad:
             folding = None if session.outdated else session.folding
-            warnings.insert(0, f"{bad}. {remedy_for(run, session.mesh, folding)}")
+            said = f"{bad}. {remedy_for(run, session.mesh, folding)}"
+            warnings = [said, *(each for each in warnings if each.rstrip(".") not in said)]
         if missed:
             warnings.insert(0, f"{missed}: {outcome(run.last.limits)}.")
         if file is not None:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.errors import point_words
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import (
     CORNERS,
@@ -131,7 +132,7 @@ class SafeFraction:
     @property
     def words(self) -> str:
         """Return a sentence, its number rounded down: ``the motion is safe up to 62 %, ...``."""
-        place = ", ".join(f"{value:.4g}" for value in self.where)
+        place = point_words(self.where, digits=4)
         zone = "" if self.zone is None else f" of zone {self.zone}"
         who = f"cell {self.cell} ({self.kind}{zone}) at ({place})"
         if self.cell is None:

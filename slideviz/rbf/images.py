@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.errors import NodeError
+from slideviz.errors import NodeError, point_words
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import (
     FloatArray,
@@ -166,7 +166,7 @@ def largest_misfit(
     allowed = ROUNDING * float((high - low).max()) + FAR * (largest_coordinate(points) + origin)
     if not found[worst] <= allowed:
         one, two = images[worst]
-        where = ", ".join(f"{value:.6g}" for value in points[two])
+        where = point_words(points[two])
         raise NodeError(
             f"node {{}}, now at {where}, and its periodic image, node {{}}, have moved "
             f"differently, by {found[worst]:.3g}; rounding makes {allowed:.1g} at most; let the "

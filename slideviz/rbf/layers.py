@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.errors import point_words
 from slideviz.mesh.model import (
     BoolArray,
     FloatArray,
@@ -464,7 +465,7 @@ class GaveWay:
     def __str__(self) -> str:
         """Return the same as a sentence."""
         names = " and ".join(self.names)
-        where = ", ".join(f"{x:.6g}" for x in self.point)
+        where = point_words(self.point)
         return (
             f"the layers at {names} gave way, to {self.height:.3g} times their height at "
             f"({where}), since there is not enough room for them; leave more room, or write a "

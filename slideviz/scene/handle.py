@@ -17,6 +17,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
+from slideviz.errors import point_words
 from slideviz.ffd.box import Index
 from slideviz.mesh.model import FloatArray, row_norms
 from slideviz.scene.actors import add_overlay, remove_actor
@@ -205,7 +206,8 @@ class Drag:
         pairs = zip(numbers, units, sizes, strict=True)
         even = [self._even(0.0, value, each, size, size) for value, each, size in pairs]
         kept = np.where(np.abs(numbers - first) > 1e-9 * units, even, first)
-        words = ", ".join(f"{value:.10g}" for value in kept[: placed.dim])
+        assert placed.session.mesh is not None
+        words = point_words(kept[: placed.dim], placed.session.mesh.extent, 10)
         return Result(placed.put(kept), f"{WORDS['move']}: ({words})", placed.at(kept))
 
 

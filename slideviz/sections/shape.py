@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.argument_types import check_fields
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms, Size
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, point_words
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray
@@ -449,7 +449,7 @@ def axis_word(direction: Triple, digits: int = DIGITS) -> str:
 
 def triple_words(values: Sequence[float], digits: int = DIGITS) -> str:
     """Return numbers in brackets, with ``digits`` significant digits."""
-    return f"({', '.join(f'{value + 0.0:.{digits}g}' for value in values)})"
+    return f"({point_words(values, digits=digits)})"
 
 
 def triple(values: FloatArray) -> Triple:

@@ -17,7 +17,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes
 from slideviz.case.spans import span_ends
-from slideviz.errors import Message
+from slideviz.errors import Message, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.rims import Rims
@@ -97,7 +97,7 @@ def unsoundness(
         return None
     on = slid[beyond[slid]]
     node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
-    where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
+    where = point_words(mesh.points[node], mesh.extent)
     return (
         f"node {mesh.number(node)} at ({where}) would move by {length[node]:.3g}, more than "
         f"{GROWTH:g} times the {reach[node]:.3g} that the motion reaches, whose largest "
@@ -164,7 +164,7 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     most = float(np.linalg.norm(after[nodes] - mesh.points[nodes], axis=1).max(initial=0.0))
     if not found.length > STRAY * most > 0.0:
         return []
-    where = ", ".join(f"{value:.6g}" for value in found.point)
+    where = point_words(found.point, mesh.extent)
     ratio = found.length / most
     radius = setup.basis.radius
     smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
@@ -254,7 +254,7 @@ class _OffWall:
 
     def message(self, mesh: Mesh, points: FloatArray) -> Message:
         """Return that the node has left the wall; ``points`` (n, d): deformed."""
-        place = ", ".join(f"{value:.6g}" for value in points[self.node])
+        place = point_words(points[self.node], mesh.extent)
         return Message(
             f"node {mesh.number(self.node)} of {self.boundary} at ({place}) has left {self.wall} "
             f"by {self.distance:.3g}{self.why}",

@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import moving_nodes
 from slideviz.case.spans import periodic_pairs
-from slideviz.errors import CaseError, Message
+from slideviz.errors import CaseError, Message, point_words
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.crossing import (
@@ -203,7 +203,7 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     first = names[one]
     other = names[two]
     where = "itself" if first == other else other
-    place = ", ".join(f"{value:.4g}" for value in hit[0])
+    place = point_words(hit[0], mesh.extent, digits=4)
     rule = f"{first} goes through {where} near ({place}), so cells will overlap there"
     return Message(rule, "more steps cannot help: move it otherwise, or move it less")
 
@@ -324,7 +324,7 @@ def _others(case: Case, mesh: Mesh, moved: str) -> Others:
 
 
 def _place(hit: Crossing) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in hit.point)})"
+    return f"({point_words(hit.point, digits=4)})"
 
 
 def winding_number(points: FloatArray, facets: IntArray, p: FloatArray) -> float:

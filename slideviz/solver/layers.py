@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.errors import point_words
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, row_dots, row_norms
@@ -278,7 +279,7 @@ def height_warnings(
         k = int(np.argmax(np.nan_to_num(BADNESS["height_ratio"](ratio), nan=0.0)))
         if not 1.0 / CHANGED <= ratio[k] <= CHANGED and np.isfinite(ratio[k]):
             point = walls.columns.at(mesh.points, at[k])
-            where = ", ".join(f"{x:.6g}" for x in point)
+            where = point_words(point, mesh.extent)
             warnings.append(
                 f"the first height of the layers at {name} is {ratio[k]:.3g} times that before at "
                 f"({where}), beyond {1.0 / CHANGED:.2g} to {CHANGED}: "

@@ -12,7 +12,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.motions.box import moved_boxes
 from slideviz.case.words import wrong_by
-from slideviz.errors import DeformError, Message, Remark, UnsoundError, note
+from slideviz.errors import DeformError, Message, Remark, UnsoundError, note, point_words
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import torn_interfaces
@@ -607,7 +607,7 @@ def _dropped_warning(
         )
         return [sentence]
     node = int(solution.dropped[0])
-    where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
+    where = point_words(mesh.points[node], mesh.extent)
     which = f"node {mesh.number(node)} at {where}"
     if len(solution.dropped) == 1:
         said = (

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.errors import DeformError, MeshError, UnsoundError
+from slideviz.errors import DeformError, MeshError, UnsoundError, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.rbf.frames import on_axis
 from slideviz.rbf.images import largest_misfit
@@ -150,7 +150,7 @@ class InteriorDisplacer:
         out &= inner
         if out.any():
             k = int(np.argmax(out))
-            where = ", ".join(f"{value:.6g}" for value in points[k])
+            where = point_words(points[k], self.skin.extent)
             raise MeshError(
                 f"{self.skin.name}: node {nodes[k]} at ({where}) is outside the sector that the "
                 "boundaries enclose, so the mesh cannot be streamed; give all its sides markers, "
@@ -168,5 +168,5 @@ class InteriorDisplacer:
         after = step.mesh.points
         message = overshoot_of_rest(self.setup, self.skin, after, step.part, far)
         if message:
-            where = ", ".join(f"{value:.6g}" for value in points[k])
+            where = point_words(points[k], self.skin.extent)
             raise UnsoundError(f"step {step.index}: node {nodes[k]} at ({where}) {message}")

@@ -14,7 +14,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 from slideviz import Case, read
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
-from slideviz.errors import Message, note
+from slideviz.errors import Doubt, Message, note
 from slideviz.export.picture_options import PictureOptions, headings
 from slideviz.gui.panels.worst import CELL
 from slideviz.gui.viewport import player as player_module
@@ -817,6 +817,20 @@ def test_large_numbers_have_separators_in_the_status_bar(ready, monkeypatch):
     monkeypatch.setattr(Quality, "inverted", 1911)
     ended_badly(ready)
     assert "1,911 inverted" in ready.window.statusBar().currentMessage()
+
+
+def test_the_banner_says_nothing_twice(ready):
+    from slideviz.session.jobs import intersection_key, set_intersection
+
+    doubt = Doubt("airfoil goes through itself near (0, 0)", "move it less")
+    window = ready.window
+    key = intersection_key(ready.session)
+    window.store.change(set_intersection, ("", doubt), key)
+    ended_badly(ready, (doubt, "another warning"))
+    told = window.banner.text.text()
+    assert told.startswith("38 inverted cells. airfoil goes through itself")
+    assert told.count("goes through itself") == 1
+    assert told.count("another warning") == 1
 
 
 def test_inverted_cells_are_told_in_red_with_what_would_help(ready):

@@ -267,6 +267,16 @@ def test_what_is_told_of_a_cell(full):
     assert full.model.headers == (*COLUMNS, "x", "y")
 
 
+def test_a_cell_in_the_middle_of_the_mesh_is_at_zero(full):
+    session = full.store.session
+    cell = cells(full)[0]
+    mesh = session.frame.mesh
+    moved = mesh.points - cell_info(session.frame, cell).position + [3.06162e-17, 0.0]
+    frames = (replace(session.runs[-1].last, mesh=mesh.with_points(moved)),)
+    full.store.put(replace(session, runs=(replace(session.runs[-1], frames=frames),)))
+    assert info_text(full.store.session, cell).split("<br>")[2] == "x 0&nbsp; y 0"
+
+
 def test_places_of_a_wheel_are_told_about_its_axis(full):
     session = full.store.session
     first, second = session.mesh.marker_names[:2]

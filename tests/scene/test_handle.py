@@ -233,6 +233,15 @@ def test_numbers_snap_and_go_finely(body):
     assert angle % 5.0 == 0.0
 
 
+def test_where_nothing_is_moved_along_an_axis_it_says_zero(body):
+    motion = Translate(first_marker(body), (3.06162e-17, 0.0, 0.0))
+    moved = changes.set_case(body, motions=(motion,))
+    here = handle_of(moved)
+    (start,) = VIEWS[0].pixels(here.origin[None])
+    still = Drag(here, VIEWS[0], "move", (), here.origin, start, start).result()
+    assert still.words == "Move: (0, 0, 0)"
+
+
 def test_a_turn_goes_on_beyond_half_a_turn(body):
     now = handle_of(body)
     view = look((0.0, 0.0, 1.0), False)

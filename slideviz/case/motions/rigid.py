@@ -80,7 +80,7 @@ class Translate(ByFormula):
         return number_texts(*self.vector)
 
     def described(self, dim: int, extent: float) -> str:
-        return f"translate by {vector_words(self.vector)}"
+        return f"translate by {place_words(self.vector, extent)}"
 
     def label(self, form: str, *, exact: bool) -> str:
         moved = [axis for axis, value in enumerate(self.vector) if value]

@@ -19,6 +19,7 @@ from qtpy.QtGui import (
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QStackedWidget, QTableView
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.errors import point_words
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
@@ -29,6 +30,7 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
 )
+from slideviz.gui.widgets.fields import NOTHING
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
@@ -242,7 +244,7 @@ class WorstModel(QAbstractTableModel):
         worst = self.worst
         if role == Qt.ItemDataRole.ToolTipRole:
             place = worst.positions[at]
-            where = ", ".join(f"{value:.8g}" for value in place)
+            where = point_words(place, digits=8)
             return f"{worst.kinds[at]} at {'x, y, z'[: 3 * len(place) - 2]} = {where}"
         alarming = role == Qt.ItemDataRole.ForegroundRole and index.column() == QUALITY
         return QBrush(QColor(alarm())) if alarming and worst.inverted[at] else None
@@ -494,6 +496,8 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     """
     assert session.frame is not None
     info = cell_info(session.frame, cell)
+    least = NOTHING * session.frame.mesh.extent
+    position = np.where(np.abs(info.position) > least, info.position, 0.0)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
     around = machine_pair(session)
@@ -502,10 +506,10 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     lines = [
         f"<b>Cell {info.cell}</b>{zone}, {info.kind}{state}",
         f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
-        _place_text(info.position, around),
+        _place_text(position, around),
     ]
     if around is not None:
-        lines.append(_place_text(info.position, None))
+        lines.append(_place_text(position, None))
     near = nearest_boundary(session.frame.mesh, info.position)
     if near is not None:
         lines.append(f"{near[1]:.4g} from {escape(near[0])}, the nearest boundary")
