@@ -7,6 +7,7 @@ from qtpy.QtWidgets import QApplication
 
 import slideviz as sv
 from slideviz.case.model import Case
+from slideviz.case.motion_words import describe
 from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
 from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
 from slideviz.case.motions.file import FromFile
@@ -124,7 +125,8 @@ def test_the_list_tells_the_point_of_a_2d_rotation_and_of_a_box_what_is_missing(
     assert not run_requirements(blade.session)
     assert not button.isVisible()
     assert editor(blade).box.currentText() == "BOX"
-    assert blade.window.store.can_undo == "new box"
+    (motion,) = blade.session.case.motions
+    assert blade.window.store.can_undo == f"new box ({describe(motion)})"
     blade.window.store.undo()
     assert blade.session.case.ffd_boxes == ()
     assert button.isVisible()
@@ -422,7 +424,7 @@ def test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers(boxed,
     boxed.choose(form.box, "B")
     motion = Ffd("low", "B", (2, -1, -1), (0.0, 0.1, 0.0))
     assert boxed.session.case.motions == (motion,)
-    assert listed(boxed) == "1.  low: move (2, all, all) of B by (0, 0.1)"
+    assert listed(boxed) == "1.  low: move (2, all) of B by (0, 0.1)"
     moved = Ghosts(boxed.session.mesh).moved(boxed.session.case)["low"]
     u = (np.linspace(0.0, 1.0, 5) + 0.1) / 1.2
     np.testing.assert_allclose(moved[:, 1], 0.1 * 3 * u**2 * (1 - u), atol=1e-14)

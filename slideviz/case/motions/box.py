@@ -187,10 +187,12 @@ class BoxMotion(Motion):
         """Return the name of the box, in words."""
         return self.box or "(no box yet)"
 
-    @property
-    def control_words(self) -> str:
-        """Return the control points that move, and their box, in words."""
-        index = ", ".join("all" if index < 0 else str(index) for index in self.place_in_box)
+    def control_words(self, dim: int = 3) -> str:
+        """Return the control points that move, and their box, in words; in 2D all layers do."""
+        place = self.place_in_box
+        if dim == 2 and place[-1] < 0:
+            place = place[:-1]
+        index = ", ".join("all" if index < 0 else str(index) for index in place)
         return f"({index}) of {self.box_words}"
 
     def described(self, dim: int, extent: float) -> str:
@@ -296,10 +298,11 @@ class Ffd(BoxMotion):
         return [name_text(self.box), *map(str, self.index), *number_texts(*self.vector)]
 
     def described(self, dim: int, extent: float) -> str:
-        return f"move {self.control_words} by {vector_words(self.vector[:dim])}"
+        by = place_words(self.vector[:dim], extent)
+        return f"move {self.control_words(dim)} by {by}"
 
     def label(self, form: str, *, exact: bool) -> str:
-        return f"{self.control_words} {vector_words(self.vector, form)}"
+        return f"{self.control_words()} {vector_words(self.vector, form)}"
 
     @property
     def place_in_box(self) -> tuple[int, ...]:
@@ -349,7 +352,7 @@ class _Column(BoxMotion):
         return [name_text(self.box), *map(str, self.index), *number_texts(self.amount)]
 
     def label(self, form: str, *, exact: bool) -> str:
-        return f"{self.what} {self.control_words} {self.amount:+{form}}"
+        return f"{self.what} {self.control_words()} {self.amount:+{form}}"
 
     @property
     def place_in_box(self) -> tuple[int, ...]:
