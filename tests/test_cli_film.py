@@ -123,6 +123,14 @@ def test_a_picture_of_two_runs_is_of_one_mesh(case, tmp_path, capsys):
     assert "must deform the same mesh" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("beside", ["SLIDING_MODE=none", "undeformed"])
+def test_a_picture_of_the_undeformed_mesh_has_nothing_beside_it(case, tmp_path, capsys, beside):
+    words = ["picture", str(case), "-o", str(tmp_path / "a.png"), "--step", "0"]
+    assert run([*words, "--beside", beside]) == 1
+    assert "--step 0 is the undeformed mesh, beside which no" in capsys.readouterr().err
+    assert not (tmp_path / "a.png").exists()
+
+
 def test_inverted_cells_are_code_3_and_the_film_is_written(tmp_path, capsys):
     write_sample("square", tmp_path / "square")
     file, case = tmp_path / "a.mp4", tmp_path / "square" / "square.cfg"

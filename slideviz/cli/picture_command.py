@@ -22,6 +22,11 @@ def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, and write a picture of a step; return the exit code."""
     check_png(arguments.output)
     check_drawable(arguments.size)
+    if arguments.step == 0 and arguments.beside:
+        raise CaseError(
+            "--step 0 is the undeformed mesh, beside which no second run is shown; leave out "
+            "--beside, or name a later step"
+        )
     case, mesh = read_inputs(arguments)
     require_detail(arguments.zoom, mesh)
     beside: tuple[Case, Step] | Literal["undeformed"] | None = None
