@@ -347,6 +347,8 @@ class _Reader:
             return float(value)
         if type(value) is not kind:
             raise ValueError(f"{name or 'a value'} has a wrong type")
+        if kind is int and name in _VIEW and value < 0:
+            raise ValueError(f"{name} is negative")
         return value
 
     def _case(self, text: str) -> Case:
