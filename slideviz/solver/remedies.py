@@ -53,7 +53,7 @@ def remedies(
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if case.layers != "no" and case.layer_thickness:
         found.append(Remedy("LAYER_THICKNESS= AUTO", "an automatic thickness of the layers"))
-    if step and any(each.remedy == KEEPS_RIMS for each in messages_of(step.messages)):
+    if step and any("RIMS= SLIDE" in each.remedy for each in messages_of(step.messages)):
         found.append(Remedy("RIMS= SLIDE", "“stay on walls” for nodes on walls"))
     if step and step.layers:
         given = case.reduction or Reduction()

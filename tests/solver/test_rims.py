@@ -262,6 +262,18 @@ def test_a_fixed_wall_that_its_rim_leaves_is_told_of(rims, steps):
 
 
 @pytest.mark.parametrize("rims", ["free", "slide"])
+def test_a_foot_that_left_its_fixed_wall_is_a_remedy_of_folded_cells(rims):
+    """That wall must slide as well, which the warning says."""
+    mesh = builders.cube(4, block=False)
+    fixed = dict.fromkeys(mesh.marker_names, "fixed") | {"x_m": "moving"}
+    motions = [sv.Rotate("x_m", 40.0, (0.0, 0.0, 0.0))]
+    case = case_of(box(mesh), motions, rims=rims).change(roles=fixed)
+    step = last(case, mesh)
+    assert any("let that boundary slide" in text for text in step.warnings)
+    assert ("RIMS= SLIDE" in advice_for(case, step)) == (rims == "free")
+
+
+@pytest.mark.parametrize("rims", ["free", "slide"])
 def test_rims_that_left_their_wall_are_a_remedy_of_folded_cells(rims):
     mesh = builders.cube(4, block=False)
     case = case_of(box(mesh), [sv.Rotate("x_m", 40.0, (0.0, 0.0, 0.0))], rims=rims)
