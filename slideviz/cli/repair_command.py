@@ -93,5 +93,5 @@ def _inverted(found: Quality) -> str:
     more = " ..." if found.inverted > len(cells) else ""
     return (
         f"{found.inverted} of {found.cells} cells are still inverted ({named}{more}); what may "
-        "help: --sliding for adjacent boundaries, or remesh there"
+        "help: --sliding for adjacent boundaries that did not move, or remesh there"
     )

@@ -321,6 +321,7 @@ def test_the_command_says_which_cells_are_left(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "cannot be mended" in said
     assert "1 of 36 cells are still inverted" in said
+    assert "--sliding for adjacent boundaries that did not move, or remesh there" in said
 
 
 def test_a_run_reports_its_repair(tmp_path, capsys):
