@@ -6,7 +6,8 @@ Nothing in it comes from a network.
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Sequence
+from datetime import datetime
 from html import escape
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from slideviz.plots.figure_io import empty_figure, figure_bytes
 from slideviz.plots.session_plots import draw_histogram
 from slideviz.plots.style import PRINT
 from slideviz.session.motions import shown_case
-from slideviz.session.run_messages import remarks_of
+from slideviz.session.run_messages import end_parts, remarks_of
 from slideviz.session.runs_words import COLUMNS
 from slideviz.session.walls_table import COLUMNS as WALL_COLUMNS
 from slideviz.session.walls_table import wall_rows
@@ -32,9 +33,16 @@ _HEAD = """<!doctype html>
 body {{ font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em }}
 img {{ max-width: 100% }}
 table {{ border-collapse: collapse }}
-td {{ border-bottom: 1px solid #ccc; padding: 2px 1em 2px 0; vertical-align: top }}
+th, td {{ border-bottom: 1px solid #ccc; padding: 2px 1.5em 2px 0; text-align: left }}
+th, td {{ vertical-align: top; white-space: pre-line }}
+thead {{ border-bottom: 2px solid #888 }}
+tr {{ break-inside: avoid }}
 </style>
 <h1>{0}</h1>"""
+_UNITS = (
+    "Lengths are in the unit of the mesh, angles in degrees. Qualities are from 0, of a flat or "
+    "inverted cell, to 1, the best. Keys that are not listed have their defaults."
+)
 
 
 def write_html_report(path: Path, renderer: OffscreenRenderer) -> None:
@@ -51,30 +59,68 @@ def write_html_report(path: Path, renderer: OffscreenRenderer) -> None:
     options = PictureOptions(title=True, fill=renderer.fills).like(session.view)
     figure = empty_figure((8.0, 3.5), 150.0, "constrained")
     draw_histogram(session, figure, PRINT, log=True, full_range=True)
-    pictures = png_bytes(renderer.image(options)), figure_bytes(figure, "png", 150.0)
-    walls = [(row.name, *row.after) for row in wall_rows(session)]
-    tables: dict[str, list[Iterable[str]]] = {
-        "Runs": [(column.title, *map(column.text, runs)) for column in COLUMNS if runs],
+    pictures = {
+        "The mesh, colored": png_bytes(renderer.image(options)),
+        "Histogram of the cells": figure_bytes(figure, "png", 150.0),
+    }
+    tables: dict[str, list[Sequence[str]]] = {
+        "Runs": [
+            row
+            for column in COLUMNS
+            if set((row := (column.title, *map(column.text, runs)))[1:]) - {"–"}
+        ],
         "Limits": [
-            (str(result.limit), result.value_words, "met" if result.passed else "not met")
-            for run in shown
-            for result in run.frames[-1].limits
+            ("Limit", "Value", "Result"),
+            *(
+                (str(result.limit), result.value_words, "met" if result.passed else "not met")
+                for run in shown
+                for result in run.frames[-1].limits
+            ),
         ],
-        "Layers at walls": [WALL_COLUMNS, *walls] if walls else [],
-        "Warnings": [(text,) for run in shown for text in remarks_of(run, "warning")],
+        "Layers at walls": [
+            WALL_COLUMNS,
+            *((row.name, *row.after) for row in wall_rows(session)),
+        ],
+        "Remarks": [
+            ("Run", "Kind", "Remark"),
+            *(
+                (str(run.number), level, text)
+                for run in runs
+                for level in ("warning", "note")
+                for text in remarks_of(run, level)
+            ),
+        ],
         "Case": [
-            (key.name, key.kind.write(value))
-            for key in KEYS.values()
-            if (value := key.get(case)) is not None
+            ("Key", "Value"),
+            *(
+                (key.name, key.kind.write(value).replace("\\\n", "\n"))
+                for key in KEYS.values()
+                if (value := key.get(case)) is not None and not key.is_default(value)
+            ),
         ],
-        "Versions": [(line,) for line in versions().splitlines()],
+        "Versions": [
+            ("Programs and platform",),
+            *((line,) for line in versions().splitlines()),
+        ],
     }
     parts = [_HEAD.format(escape((session.case.source or Path(mesh.name)).name))]
-    parts.append(f"<p>{escape(mesh_words(mesh)[0])}</p>")
-    encoded = (b64encode(picture).decode() for picture in pictures)
-    parts += (f'<img alt="" src="data:image/png;base64,{picture}">' for picture in encoded)
+    said = [
+        f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
+        f"{mesh.name}: {mesh_words(mesh)[0].replace('   ', ', ')}.",
+        *(f"Run {run.number}: {''.join(end_parts(run))}" for run in runs),
+        _UNITS,
+    ]
+    parts += (f"<p>{escape(words)}</p>" for words in said)
+    for about, picture in pictures.items():
+        encoded = b64encode(picture).decode()
+        parts.append(f'<img alt="{about}" src="data:image/png;base64,{encoded}">')
     for title, rows in tables.items():
-        if rows:
-            lines = (f"<tr><td>{'<td>'.join(map(escape, row))}</tr>" for row in rows)
-            parts.append("\n".join([f"<h2>{title}</h2><table>", *lines, "</table>"]))
+        if len(rows) > 1:
+            parts += f"<h2>{title}</h2><table><thead>", _row("th", rows[0]), "</thead>"
+            parts += (_row("td", row) for row in rows[1:])
+            parts.append("</table>")
     write_whole(path, "\n".join(parts))
+
+
+def _row(tag: str, row: Sequence[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in row)}</tr>"

@@ -190,16 +190,17 @@ def _misfit(run: Run) -> float | None:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: title, function from a run to its value, and format of the value."""
+    """A column of the table: title, function from a run to its value, its format and unit."""
 
     title: str
     value: Callable[[Run], str | float | None]
     form: str = ""
+    unit: str = ""
 
     def text(self, run: Run) -> str:
         """Return the formatted value of a run; a dash where it has none."""
         value = self.value(run)
-        return "–" if value is None else format(value, self.form)
+        return "–" if value is None else f"{value:{self.form}}{self.unit}"
 
 
 COLUMNS: tuple[Column, ...] = (
@@ -218,7 +219,9 @@ COLUMNS: tuple[Column, ...] = (
     Column("limits", lambda run: outcome(run.last.limits) or None if run.last else None),
     Column("lowest first height, ratio", lambda run: height_ratios(run.last, run.case)[0], ".3f"),
     Column("highest first height, ratio", lambda run: height_ratios(run.last, run.case)[1], ".3f"),
-    Column("largest change of a wall angle", lambda run: angle_change(run.last, run.case), ".2g"),
+    Column(
+        "largest change of a wall angle", lambda run: angle_change(run.last, run.case), ".2g", "°"
+    ),
     Column("control nodes", control_nodes, ",d"),
     Column("largest error at control", lambda r: getattr(r.last_step, "max_error", None), ".3g"),
     Column("periodic misfit", _misfit, ".3g"),
