@@ -107,6 +107,8 @@ class Command:
     """`button_tip`, `button_key`: tooltip and shortcut of its button in a panel."""
     short: str = ""
     """Its text on the tool bar, if it has no icon."""
+    synonyms: str = ""
+    """What other programs call it, for the palette."""
 
     def called(self, now: CommandState) -> str:
         return (self.title_now(now) if self.title_now else "") or self.title
@@ -399,7 +401,7 @@ _EDIT = Menu("edit", "&Edit", entries=(
             (KEY.Undo,), "undo", lambda now: bool(now.undo),
             title_now=lambda now: f"Undo {now.undo}".rstrip(),
             tip_now=lambda now: now.undo and f"Undo {now.undo}",
-            why_not="There is nothing to undo."),
+            why_not="There is nothing to undo.", synonyms="back revert"),
     Command("redo", "Redo", "Redo the change that was undone.",
             lambda w: _undo_or_redo(w, w.store.redo, w.store.can_redo, "Redone"),
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
@@ -524,7 +526,8 @@ def _section_command(kind: str, row: ShapeTerms) -> Command:
         return "" if words is None else words.action
 
     return Command(f"add_{kind}", row.words[3].action, row.tip_to_add, partial(_add_section, kind),
-                   (row.key,) if row.key else (), enabled=has_mesh, title_now=title)
+                   (row.key,) if row.key else (), enabled=has_mesh, title_now=title,
+                   synonyms="slice section clip")
 
 
 COMPARE = Menu("compare", "Co&mpare with",

@@ -113,11 +113,22 @@ def test_the_name_itself_is_first(find, with_runs):
 
 def test_words_of_other_programs_are_found(find, with_runs):
     with_runs({"steps": 1})
-    words = {"zoom": "Fit to boundary", "screenshot": "Picture", "cfg": "Save case as"}
+    words = {
+        "zoom": "Fit to boundary",
+        "screenshot": "Picture",
+        "cfg": "Save case as",
+        "slice": "Cut by a line",
+        "clip": "Cut by a circle",
+        "box": "Add motion: Free-form box",
+        "revert": "Undo",
+    }
     for word, name in words.items():
         dialog = find(word)
-        assert name in rows(dialog)
+        assert name in rows(dialog), rows(dialog)
         dialog.close()
+    dialog = find("undo")
+    assert next(iter(rows(dialog))) == "Undo"
+    dialog.close()
 
 
 def test_motions_are_added_from_the_mesh_on(find, with_runs):

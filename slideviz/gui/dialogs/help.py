@@ -209,6 +209,8 @@ class Entry(NamedTuple):
     """What it does or is; of a command that is disabled, why."""
     do: Callable[..., object] | None = None
     """Does it; None where that is not possible from here."""
+    synonyms: str = ""
+    """What else it is called."""
 
 
 def palette_entries(helper: Help) -> Iterator[Entry]:
@@ -220,7 +222,8 @@ def palette_entries(helper: Help) -> Iterator[Entry]:
         act = window.findChild(QAction, name)
         about, do = (command.tip, act.trigger) if act.isEnabled() else (act.whatsThis(), None)
         keys = act.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
-        yield Entry(command.called(now).replace("&", "").rstrip("…"), keys, about, do)
+        title = command.called(now).replace("&", "").rstrip("…")
+        yield Entry(title, keys, about, do, command.synonyms)
     add = window.findChild(QToolButton, "add_motion")
     for act in add.menu().actions() if add.isEnabled() else ():
         if act.isEnabled():
@@ -277,7 +280,7 @@ class PaletteDialog(SearchDialog):
 
         self.tree.clear()
         for entry in sorted(self.entries, key=rank):
-            others = f"{entry.keys} {entry.about}".lower()
+            others = f"{entry.keys} {entry.about} {entry.synonyms}".lower()
             if letters.search(entry.title.lower()) or near in others:
                 item = QTreeWidgetItem(self.tree, entry[:3])
                 item.setData(0, PATH, entry)
