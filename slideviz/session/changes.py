@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from slideviz.case.model import Case
+from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, named
 from slideviz.ffd.box import Index
@@ -62,6 +63,15 @@ def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | No
     """Return the words in the menu for a change with keyword arguments ``named``; None: no undo."""
     words = _WORDS.get(change)
     return words if words is None or isinstance(words, str) else words(named)
+
+
+def motion_words(old: Session, new: Session) -> str:
+    """Return the motion that was changed, added or removed, in brackets; "" for none or several."""
+    before, after = old.case.motions, new.case.motions
+    found = [one for one in after if one not in before] or [*{*before} - {*after}]
+    if new.mesh is None or len(found) != 1:
+        return ""
+    return f" ({describe(found[0], new.mesh.dim, new.mesh.extent)})"
 
 
 def _replaced(rows: tuple[Row, ...], index: int, row: Row) -> tuple[Row, ...]:
@@ -185,7 +195,7 @@ def choose_section(session: Session, index: int | None) -> Session:
     return set_view(session, section_index=index)
 
 
-@undoable("handle")
+@undoable("handle shown or hidden")
 def show_handle(session: Session, shown: Handle) -> Session:
     """Return the session with the handle of what is chosen shown; "" for none."""
     return set_view(session, handle=shown)

@@ -9,7 +9,14 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 from slideviz.case.model import Case
-from slideviz.session.changes import remove_run, restore_run, set_view, show_run, undo_words
+from slideviz.session.changes import (
+    motion_words,
+    remove_run,
+    restore_run,
+    set_view,
+    show_run,
+    undo_words,
+)
 from slideviz.session.state import Guess, Session, ViewState
 
 Listener = Callable[[Session, Session], None]
@@ -280,6 +287,7 @@ class Store:
         before = UndoState.of(old)
         if before == UndoState.of(new):
             return
+        words += motion_words(old, new)
         self._redo.clear()
         if self._taking_back and self._drop_same_kind(UndoState.of(new), kind):
             return
@@ -293,7 +301,8 @@ class Store:
             if last.at_s == float("inf") or not apart:
                 self._undo.pop()
                 if last.before != UndoState.of(new):
-                    self._undo.append(replace(last, places=places | last.places, at_s=at_s))
+                    places |= last.places
+                    self._undo.append(replace(last, words=words, places=places, at_s=at_s))
                 return
         self._undo.append(UndoEntry(before, words, kind, places, at_s))
         # The removal of a run that is no longer in `removed` cannot be undone.

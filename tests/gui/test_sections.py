@@ -403,7 +403,7 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
     view = window.view
     assert has_handle(view)
     undo, redo = window.store.undo, window.store.redo
-    assert window.store.can_undo == "handle"
+    assert window.store.can_undo == "handle shown or hidden"
     undo()
     assert not has_handle(view)
     assert not panel.handle.isChecked()

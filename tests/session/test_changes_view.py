@@ -323,7 +323,7 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
         told.append((view.section and view.section.kind, view.handle))
     assert told == [
         *("removing a section", ("plane", "section")),
-        *("handle", ("plane", "")),
+        *("handle shown or hidden", ("plane", "")),
         *("choice of a section", ("cylinder", "")),
         *("new section", ("plane", "")),
         *("new section", (None, "")),

@@ -181,7 +181,7 @@ def test_each_change_that_can_be_undone_has_words():
         "set_view": "view",
         "show_boundaries": "hidden boundaries",
         "shape_box": "box",
-        "show_handle": "handle",
+        "show_handle": "handle shown or hidden",
         "adopt_settings": "settings of a run",
     }
 
