@@ -6,6 +6,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
+from slideviz.case.motion_words import describe
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.samples.table import write_sample
@@ -91,7 +92,8 @@ def test_what_is_dragged_stays_under_the_mouse_and_is_undone_as_one(window, blad
     assert window.scene.camera.place[:9] == pytest.approx(camera[:9])
     drag(blade, ("move", ()), (-20, 10))
     assert len(motions(window)) == 1
-    assert window.store.can_undo == "drag"
+    (last,) = motions(window)
+    assert window.store.can_undo == f"drag ({describe(last, 3)})", "which motion, and its values"
     window.store.undo()
     assert motions(window) == (motion,)
     window.store.undo()
@@ -118,13 +120,25 @@ def test_arrows_rings_and_boxes_make_a_motion_of_each_kind(window, blade):
     assert motions(window)[1:] == (turned, grown)
 
 
+def test_a_click_on_the_current_motion_brings_its_handle_back(window, blade):
+    drag(blade, ("move", (2,)), (0, 30))
+    QTest.keyClick(window.view, Qt.Key.Key_Escape)
+    assert blade.placed() is None
+    row = window.motions.list
+    assert row.currentRow() == 0
+    place = row.visualItemRect(row.item(0)).center()
+    QTest.mouseClick(row.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert window.store.session.view.handle == "motion"
+    assert blade.placed() is not None
+
+
 def test_escape_gives_back_what_was(window, blade):
     drag(blade, ("move", (0,)), (30, -20), release=False)
     assert len(motions(window)) == 1
     QTest.keyClick(window.view, Qt.Key.Key_Escape)
     QApplication.processEvents()
     assert motions(window) == ()
-    assert window.store.can_undo != "drag"
+    assert "drag" not in window.store.can_undo
     QTest.mouseRelease(window.view, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
     keys(window, "gx3", Qt.Key.Key_Escape)
     assert motions(window) == ()
@@ -388,4 +402,4 @@ def test_alt_takes_a_row_and_again_a_plane(window, driver, boxed):
     assert sum(index == -1 for index in seen[1]) == 2
     assert len(motions(window)) == 1
     assert window.store.session.view.marked_cell is None
-    assert window.store.can_undo == "control point"
+    assert window.store.can_undo.startswith("control point")

@@ -168,6 +168,8 @@ class MotionPanel(Panel):
         self.list.setAlternatingRowColors(True)
         elide_items(self.list)
         self.list.currentRowChanged.connect(self._row_changed)
+        # A click on the row that is current already brings its handle back.
+        self.list.clicked.connect(lambda at: self.change(changes.choose_motion, at.row()))
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
         self.editor = MotionEditor(SpanWalls(self.services))
