@@ -28,6 +28,7 @@ from slideviz.gui.widgets.build import (
     wrapped,
 )
 from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.theme import role_icon
 from slideviz.mesh.zones import marker_zones
 from slideviz.session import changes
@@ -332,6 +333,10 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         ("Show &all", changes.show_boundaries, (store.session.mesh.marker_names,)),
     ):
         menu.addAction(text).triggered.connect(_slot(store, function, *values))
+    window = main_window(parent)
+    if window is not None:
+        fit = window.viewing.fit
+        menu.addAction("Fit to &boundary").triggered.connect(lambda *_: fit(names))
     return menu
 
 
