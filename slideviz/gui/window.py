@@ -52,7 +52,16 @@ from slideviz.gui.viewport.player import Player
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
-from slideviz.gui.widgets.build import Choice, in_column, plain_labels, reveal, tool_button, wrapped
+from slideviz.gui.widgets.build import (
+    ALIGN_LEFT,
+    Choice,
+    ElidedLabel,
+    in_column,
+    plain_labels,
+    reveal,
+    tool_button,
+    wrapped,
+)
 from slideviz.gui.widgets.error_reporter import ErrorReporter
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
@@ -285,6 +294,10 @@ class MainWindow(Services):
             )
         )
         self.preparing.hide()
+        self.said = ElidedLabel(mode=Qt.TextElideMode.ElideMiddle)
+        self.said.setAlignment(ALIGN_LEFT)
+        self.statusBar().messageChanged.connect(self._say)
+        self.statusBar().addPermanentWidget(self.said, 1)  # no room is left for Qt's, which is cut
         self.statusBar().addPermanentWidget(self.preparing)
         self.statusBar().addPermanentWidget(self.mesh_text)
         self.statusBar().setSizeGripEnabled(False)
@@ -400,6 +413,10 @@ class MainWindow(Services):
     def show_status(self, text: str) -> None:
         """Show a short message in the status bar for 8 s; an empty text clears it."""
         self.statusBar().showMessage(text, 8000)
+
+    def _say(self, text: str) -> None:
+        self.said.setText(text)
+        self.said.setToolTip(wrapped(text))
 
     def _say_reading(self, text: str) -> None:
         """Show the progress of reading a section; an empty text clears only such a message."""

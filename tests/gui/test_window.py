@@ -254,6 +254,10 @@ def test_a_click_in_the_view_selects_and_the_right_button_assigns_a_role_and_iso
     assert opened.session.view.hidden == set(mesh.marker_names) - {"inflow"}
     window.actions_table.by_name["show_all"].trigger()
     assert not opened.session.view.hidden
+    trigger("Fit to boundary")
+    x = opened.window.scene.camera.place[3]
+    assert x == pytest.approx(np.mean(mesh.points[mesh.marker("inflow").nodes, 0]), abs=1e-6)
+    opened.window.viewing.fit()
     trigger("Hide")
     assert opened.session.view.hidden == {"inflow"}
 
@@ -824,9 +828,10 @@ def test_the_banner_says_nothing_twice(ready):
 
     doubt = Doubt("airfoil goes through itself near (0, 0)", "move it less")
     window = ready.window
+    ended_badly(ready, (doubt, "another warning"))
     key = intersection_key(ready.session)
     window.store.change(set_intersection, ("", doubt), key)
-    ended_badly(ready, (doubt, "another warning"))
+    window.running._run_done(None)
     told = window.banner.text.text()
     assert told.startswith("38 inverted cells. airfoil goes through itself")
     assert told.count("goes through itself") == 1
@@ -1117,6 +1122,24 @@ def test_the_question_promises_the_same_result_only_where_that_is_true(ready, an
 
 
 # View -------------------------------------------------------------------------------------
+
+
+def test_a_long_message_loses_its_middle_and_the_tip_has_it(opened):
+    """As after a live run: numbers are at both ends."""
+    window = opened.window
+    words = f"Done: min 0.8218, {'mean 0.9302, 0 inverted, ' * 12}the preview was off by 0.0013"
+    window.show_status(words)
+    come_to_rest()
+    assert window.said.shown.startswith("Done: min 0.8218, mean")
+    assert "…" in window.said.shown[20:-20]
+    assert window.said.shown.endswith("off by 0.0013")
+    assert "the preview was off by 0.0013" in window.said.toolTip()
+    assert words.count("mean") == window.said.toolTip().count("mean")
+    assert window.said.geometry().right() <= window.mesh_text.geometry().left()
+    window.show_status("Saved")
+    assert window.said.shown == window.said.toolTip() == "Saved"
+    window.show_status("")
+    assert window.said.shown == window.said.toolTip() == ""
 
 
 @pytest.mark.usefixtures("painted")
