@@ -13,7 +13,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from slideviz.errors import MeshError, Message
+from slideviz.errors import MeshError, Message, point_words
 from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.halo import without_halo
@@ -96,8 +96,7 @@ class Pair:
         """Return the transformation in words, for people."""
         if self.kind == "rotational":
             return f"{np.degrees(abs(self.angle)):.6g}° about {axis_text(self.axis)}"
-        exact = np.where(np.abs(self.vector) > 1e-9 * self.period, self.vector, 0.0)
-        return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in exact)})"
+        return f"{self.period:.6g} along ({point_words(self.vector, self.period, 4)})"
 
 
 def match(

@@ -206,8 +206,7 @@ class Drag:
         pairs = zip(numbers, units, sizes, strict=True)
         even = [self._even(0.0, value, each, size, size) for value, each, size in pairs]
         kept = np.where(np.abs(numbers - first) > 1e-9 * units, even, first)
-        assert placed.session.mesh is not None
-        words = point_words(kept[: placed.dim], placed.session.mesh.extent, 10)
+        words = point_words(kept[: placed.dim], unit, 10)
         return Result(placed.put(kept), f"{WORDS['move']}: ({words})", placed.at(kept))
 
 

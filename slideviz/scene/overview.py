@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from slideviz.errors import SlidevizError, not_one_of
+from slideviz.errors import SlidevizError, not_one_of, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 TINY = 0.05  # size of the moved boundaries, relative to the mesh's, below which a detail is shown
@@ -40,7 +40,7 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
         if zoom not in (words := get_args(get_args(Zoom)[1])):
             raise SlidevizError(f"zoom: {not_one_of(zoom, words)}")
         return
-    place = ", ".join(f"{x:g}" for x in zoom.centre)
+    place = point_words(zoom.centre)
     if len(zoom.centre) != mesh.dim:
         raise SlidevizError(
             f"a detail about {place} is not a place in a {mesh.dim}D mesh; give {mesh.dim} "

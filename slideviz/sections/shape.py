@@ -466,5 +466,4 @@ def direction_label(direction: FloatArray) -> Label:
     word = "xyz"[int(np.argmax(np.abs(direction)))]
     if direction.max() > 1.0 - 1e-12:
         return Label(word, word)
-    parts = ", ".join(f"{value:.3g}" for value in direction.round(12) + 0.0)
-    return Label(f"along ({parts})", word + "′")
+    return Label(f"along ({point_words(direction, digits=3)})", word + "′")
