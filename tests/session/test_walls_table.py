@@ -57,7 +57,7 @@ def test_runs_have_heights_of_walls_with_layers_only():
     run = sheared_session({}).runs[0]
     texts = {column.title: column.text(run) for column in COLUMNS}
     assert texts["lowest first height, ratio"] == texts["highest first height, ratio"] == "0.500"
-    assert texts["largest change of a wall angle"] == "45"
+    assert texts["largest change of a wall angle"] == "45°"
 
 
 def test_colors_show_the_numbers_at_walls_with_layers_only():

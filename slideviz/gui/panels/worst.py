@@ -496,7 +496,8 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     """
     assert session.frame is not None
     info = cell_info(session.frame, cell)
-    position = info.position * (np.abs(info.position) > NOTHING * session.frame.mesh.extent)
+    least = NOTHING * session.frame.mesh.extent
+    position = np.where(np.abs(info.position) > least, info.position, 0.0)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
     around = machine_pair(session)
