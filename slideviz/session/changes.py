@@ -67,7 +67,8 @@ def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | No
 
 def motion_words(old: Session, new: Session) -> str:
     """Return the motion that was changed, added or removed, in brackets; "" for none or several."""
-    before, after = old.case.motions, new.case.motions
+    before = old.case.motions
+    after = new.case.motions
     found = [one for one in after if one not in before] or [*{*before} - {*after}]
     if new.mesh is None or len(found) != 1:
         return ""
