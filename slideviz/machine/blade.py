@@ -27,6 +27,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 SECTIONS = 24  # sections of a blade, of which centroids and edges are found
 TIED = 1e-6  # distances are equal up to this part of the largest one
 STEP = 1e-200  # of derivatives
+ROUNDING = 1e-14
+"""Part of the largest change up to which one is zero: spans at a wall are 0 but for rounding."""
 Complex = NDArray[np.complex128]
 
 TOTALS = 5
@@ -205,7 +207,8 @@ def change_of(
     if row == CHORD:
         slope = slope / value[:, None]
         value = np.log(value)
-    return row, value, slope
+    rounding = np.abs(value) <= ROUNDING * np.abs(value).max(initial=0.0)
+    return row, np.where(rounding, 0.0, value), slope
 
 
 ROWS: Mapping[str, int] = {

@@ -5,12 +5,15 @@ import weakref
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.check import check_case
 from slideviz.case.moving_nodes import displacements
 from slideviz.case.spans import span_field
 from slideviz.errors import CaseError
+from slideviz.machine.blade import ROWS, change_of
 from slideviz.mesh.periodic import pair_up
 from slideviz.samples.table import sample, sample_case
 from slideviz.session.motions import Ghosts
@@ -52,6 +55,16 @@ def test_a_sweep_of_zero_at_the_hub_moves_no_bit_there(mesh):
     hub = np.abs(np.hypot(*mesh.points[moved.nodes][:, :2].T) - 0.5) < 1e-12
     assert not moved.vectors[hub].any()
     assert np.abs(moved.vectors[~hub]).max() > 0.01
+
+
+@pytest.mark.parametrize("kind", ROWS)
+@given(at=st.floats(-1e-15, 1e-15), most=st.floats(1e-3, 3.0))
+def test_a_curve_that_begins_without_change_has_none_at_the_wall(kind, at, most):
+    # The span of a node on a wall is 0 but for rounding.
+    none = 1.0 if kind == "chord" else 0.0
+    _, change, _ = change_of(kind, (0.0, 0.5, 1.0), (none, none + most, none), np.array([at, 0.3]))
+    assert change[0] == 0.0
+    assert change[1] != 0.0
 
 
 def test_motions_of_one_blade_add_up_in_any_order_and_equal_ones_twice(mesh):
