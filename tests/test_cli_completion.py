@@ -55,7 +55,7 @@ def said(*command):
 def test_the_shell_offers(shell, words, offered, capsys, tmp_path):
     shell_or_skip(shell)
     file = tmp_path / "script"
-    file.write_text(script_of(shell, capsys))
+    file.write_text(script_of(shell, capsys), newline="\n")
     if shell == "fish":
         out = said("fish", "--no-config", "-c", f"source {file}; complete -C '{words}'")
         found = {line.split("\t")[0] for line in out.splitlines()}
@@ -73,7 +73,7 @@ def test_zsh_takes_the_script(capsys, tmp_path):
     """It completes on a terminal only: here each command's arguments are read."""
     shell_or_skip("zsh")
     file = tmp_path / "_slideviz"
-    file.write_text(script_of("zsh", capsys))
+    file.write_text(script_of("zsh", capsys), newline="\n")
     ask = (
         f"autoload -U compinit; compinit -D; source {file}; "
         "_describe() { print -l ${commands%%:*} }; _files() { : }; "

@@ -52,7 +52,7 @@ def _lacking(name):
             "sudo apt-get install libegl1",
         ),
         ("FONTS", (), "finds no font", "sudo apt-get install fontconfig-config fonts-dejavu-core"),
-        ("LEAST_MEMORY", float("inf"), "of memory are free", "close other programs"),
+        ("free_memory", lambda: 1e6, "of memory are free", "close other programs"),
         ("LEAST_DISK", float("inf"), "are free for temporary files", "free some space in /"),
     ],
 )
@@ -65,6 +65,12 @@ def test_what_is_missing_comes_with_the_line_that_mends_it(
     lines = missing.splitlines()
     (at,) = [k for k, line in enumerate(lines) if what in line]
     assert lines[at + 1].strip().startswith(remedy)
+
+
+def test_memory_is_unknown_where_the_system_does_not_say(monkeypatch, capsys):
+    monkeypatch.setattr("slideviz.cli.doctor_command.free_memory", lambda: float("inf"))
+    assert run(["doctor"]) == 0
+    assert re.search("free +unknown\n", capsys.readouterr().out)
 
 
 def test_without_opengl_the_packages_are_named(monkeypatch, capsys):

@@ -12,6 +12,7 @@ import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from importlib import metadata
+from math import isfinite
 from pathlib import Path
 
 from slideviz import __version__
@@ -177,7 +178,7 @@ def _computing(_: Report) -> Iterator[tuple[str, object]]:
 
 
 def _size(count: float) -> str:
-    return f"{count / 2**30:.1f} GiB"
+    return f"{count / 2**30:.1f} GiB" if isfinite(count) else "unknown"
 
 
 SECTIONS = {
