@@ -59,7 +59,8 @@ def _patched(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 TEXTS = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
-    for path in (ROOT / "slideviz").rglob("*.py")
+    for folder in ("slideviz", "tools")
+    for path in (ROOT / folder).rglob("*.py")
 }
 
 

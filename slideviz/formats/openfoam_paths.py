@@ -53,7 +53,17 @@ def is_time(folder: Path) -> bool:
 
 
 def mesh_path(path: Path) -> Path:
-    """Return the file that stands for a mesh, which need not exist; other paths as they are."""
+    """Return the file that stands for a mesh, which need not exist; other paths as they are.
+
+    So are those that the system does not let us look at: who reads them says why.
+    """
+    try:
+        return _mesh_path(path)
+    except OSError:
+        return path
+
+
+def _mesh_path(path: Path) -> Path:
     folder = path
     if path.suffix.lower() == ENDING:
         folder = path.parent if (path.parent / "constant").is_dir() else path.with_suffix("")

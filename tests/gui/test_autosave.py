@@ -114,7 +114,7 @@ def test_nobody_else_may_read_what_is_kept_its_files_are_found_and_a_proper_end_
 
 
 def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypatch):
-    monkeypatch.setattr(autosave, "AUTOSAVE_MS", 20)
+    monkeypatch.setattr(autosave.Autosave, "wait_ms", 20)
     window = make()
     open_in(window, case_file, qtbot)
     qtbot.waitUntil(window.autosave.path.exists)
