@@ -247,6 +247,7 @@ def test_a_wing_is_twisted_between_its_root_and_tip(driver, tmp_path):
     driver.type(form.curve, "0:0, 1:8")
     root, tip = form.walls.ends
     assert (root.currentData(), tip.currentData()) == ("symmetry", "wing")
+    assert form.walls.title.text() == "Root, tip"
     mesh = driver.session.mesh
     moved = window.scene.motion_ghosts["wing"] - mesh.points[mesh.marker("wing").nodes]
     assert np.abs(moved[:, 1]).max() == 0.0

@@ -267,7 +267,7 @@ class MotionEditor(QWidget):
             if name == "box":
                 self.form.addRow("", self.new_box)
                 self.form.addRow("Degrees", self.degree)
-        self.form.addRow("Hub, shroud", self.walls)
+        self.form.addRow(self.walls.title, self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
         widest = max(label.sizeHint().width() for label in self._titles.values())
         for label in self._titles.values():

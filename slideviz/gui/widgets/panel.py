@@ -182,6 +182,8 @@ class Panel(QWidget):
 
 WALLS = {"Hub": "0, the hub or root", "Shroud": "1, the shroud or tip"}
 """Each with the span there, in words."""
+OF_MACHINE = "Hub, shroud"
+OF_WING = "Root, tip"
 
 
 class SpanWalls(Panel):
@@ -210,6 +212,7 @@ class SpanWalls(Panel):
         row = in_row(*fields, wide=fields, spacing=4)
         row.setContentsMargins(0, 0, 0, 0)
         self.setLayout(row)
+        self.title = QLabel(OF_MACHINE)
         self._by_name: tuple[str, str] | None = None
         self._blade: tuple[str, ...] = ()
         self.follow(lambda session: (session.mesh, session.case.around_span))
@@ -247,6 +250,9 @@ class SpanWalls(Panel):
             end.offer({name: name for name in names.values()})
             end.setCurrentIndex(-1)
             end.show_value((span or self._by_name or ("", ""))[k])
+        tip = self.ends[1].currentData()
+        is_wing = case.span_axis is not None or case.roles.get(tip) == "moving"
+        self.title.setText(OF_WING if is_wing else OF_MACHINE)
 
     def _chosen(self, _: object) -> None:
         hub = self.ends[0].currentData()
