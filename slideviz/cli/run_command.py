@@ -33,7 +33,7 @@ from slideviz.cli.terminal import say
 from slideviz.errors import CaseError
 from slideviz.formats.files import metric_data, quality_data
 from slideviz.formats.losses import warning_of_losses
-from slideviz.formats.openfoam_paths import ending_of, mesh_path, stem_of
+from slideviz.formats.openfoam_paths import ending_of, mesh_path, shown_name, stem_of
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 from slideviz.mesh.metrics import MetricValues, rated_metric
 from slideviz.mesh.model import Mesh
@@ -78,7 +78,7 @@ def main(arguments: Namespace) -> int:
 
         picture(
             arguments.picture,
-            replace(last, name=output.name),
+            replace(last, name=shown_name(output)),
             done.mesh,
             case=case,
             step=done.steps[-1],

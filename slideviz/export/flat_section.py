@@ -12,6 +12,7 @@ from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, not_one_of
 from slideviz.export.titles import pair_names
+from slideviz.formats.openfoam_paths import shown_name
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.plots.cells import surroundings
@@ -67,7 +68,7 @@ def save_section(
         )
     raise_if_cancelled(stopped)
     report(JobProgress(f"Drawing {path.name}"))
-    name = session.path.name if session.path is not None else ""
+    name = shown_name(session.path) if session.path is not None else ""
     style = replace(paper, trimmed=True, edges="edges" in session.view.drawn, name=name)
     if len(shown) == 1:
         shown = [replace(shown[0], name=frame_words(session), place="")]

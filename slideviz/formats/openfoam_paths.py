@@ -47,6 +47,15 @@ def stem_of(path: Path) -> str:
     return path.name[: len(path.name) - len(ending_of(path))]
 
 
+def shown_name(path: Path) -> str:
+    """Return the name of a file for titles; of OpenFOAM that of its case, with the time if any."""
+    if path.name not in _NAMES:
+        return path.name
+    instance = instance_of(path.absolute())[0]
+    time = "" if instance.name == "constant" else f", time {instance.name}"
+    return f"{instance.parent.name}{time}"
+
+
 def is_time(folder: Path) -> bool:
     """Return whether a folder is one of a case's times."""
     return folder.name.replace(".", "", 1).isdecimal() and (folder.parent / "constant").is_dir()

@@ -24,6 +24,7 @@ from qtpy.QtCore import QLockFile, QObject
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
+from slideviz.formats.openfoam_paths import shown_name
 from slideviz.gui.background import BackgroundJob
 from slideviz.gui.responsiveness.timers import AUTOSAVE_MS
 from slideviz.gui.widgets.banner import Banner
@@ -84,7 +85,7 @@ class SessionRecovery(QObject):
         path = session.content.source or session.content.mesh_file
         text = (
             f"slideviz did not end properly. Restore the session of {_time_text(session.when)} "
-            f"with {path.name} in {path.parent}?" + (f" ({more} more)" if more else "")
+            f"with {shown_name(path)} in {path.parent}?" + (f" ({more} more)" if more else "")
         )
         answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
         self.banner.ask(text, answers, self._trace, later=self._postpone)

@@ -16,7 +16,7 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 from slideviz.errors import SlidevizError
 from slideviz.formats.files import is_source
 from slideviz.formats.losses import left_out
-from slideviz.formats.openfoam_paths import mesh_path, stem_of
+from slideviz.formats.openfoam_paths import mesh_path, shown_name, stem_of
 from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
@@ -117,7 +117,7 @@ class Files(QObject):
         """Start the job that opens a file; ``mesh``: where the user says that its mesh is."""
         self._again = partial(self.start_opening, path, zone, done)
         job = partial(jobs.open_file, mesh_file=mesh, unpacked=sample_folder())
-        self.window.running.start_job(f"Opening {path.name}", done, job, path, zone)
+        self.window.running.start_job(f"Opening {shown_name(path)}", done, job, path, zone)
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, MissingMeshError):
@@ -279,7 +279,9 @@ class Files(QObject):
         session = self.window.store.session
         if self.ask_about_unsaved(self._open_saved, "opening the deformed mesh"):
             job = partial(jobs.open_file, case=continued_case(session, path))
-            self.window.running.start_job(f"Opening {path.name}", self._opened, job, path, None)
+            self.window.running.start_job(
+                f"Opening {shown_name(path)}", self._opened, job, path, None
+            )
 
     def ask_output(self) -> Path | None:
         """Ask for the deformed mesh's file, not that of a mesh that stays in its file; or None."""

@@ -21,6 +21,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.formats.openfoam_paths import shown_name
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
@@ -223,8 +224,8 @@ class RecentButton(QPushButton):
         when = when_changed(path)
         self.setEnabled(bool(when))
         self.setToolTip(wrapped(str(path) if when else f"{path} no longer exists."))
-        self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
-        name = rich_label(f"<b>{html.escape(path.name)}</b>")
+        self.setAccessibleName(f"{shown_name(path)} in {path.parent}, {when or 'missing'}")
+        name = rich_label(f"<b>{html.escape(shown_name(path))}</b>")
         time = QLabel(when or "missing")
         folder = str(path.parent).replace(str(Path.home()), "~", 1)
         self.folder = ElidedLabel(folder, Qt.TextElideMode.ElideMiddle)

@@ -24,6 +24,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
+from slideviz.formats.openfoam_paths import shown_name
 from slideviz.gui.autosave import Autosave, SessionRecovery
 from slideviz.gui.background import (
     READING,
@@ -387,8 +388,10 @@ class MainWindow(Services):
         if session.lacks_cells:
             self.banner.show_message("\n".join(remarks))
             notes = [boxes_hint(session)]
-        name = (session.case.source or session.path).name
-        self.show_status(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
+        file = session.case.source or session.path
+        assert file is not None
+        words = "".join(f". {text}" for text in notes if text)
+        self.show_status(f"Opened {shown_name(file)}{words}")
 
     # Jobs ------------------------------------------------------------------------------
     def start_run(self) -> None:

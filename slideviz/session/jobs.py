@@ -35,7 +35,7 @@ from slideviz.design.live_fields import LiveFields
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError, Message, SlidevizError
 from slideviz.formats.files import read, write
-from slideviz.formats.openfoam_paths import stem_of
+from slideviz.formats.openfoam_paths import shown_name, stem_of
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
@@ -282,7 +282,7 @@ def open_file(
     ending = path.suffix.lower()
     moved = dict[Path, Path]()
     if ending in (".cfg", ENDING):
-        report(JobProgress(f"Reading {path.name}"))
+        report(JobProgress(f"Reading {shown_name(path)}"))
     if ending == ENDING:
         case, moved = read_case_of(path, unpacked or path.parent, mesh_file)
     elif ending == ".png":
@@ -294,8 +294,8 @@ def open_file(
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
         mesh_path = case.mesh_file
         zone = case.zone if zone is None else zone
-    report(JobProgress(f"Reading {mesh_path.name}"))
-    reading = _tick(f"Reading {mesh_path.name}", report, stopped)
+    report(JobProgress(f"Reading {shown_name(mesh_path)}"))
+    reading = _tick(f"Reading {shown_name(mesh_path)}", report, stopped)
     kind = case.mesh_format if case is not None else None
     if kind != "su2" and is_large(mesh_path, zone):
         mesh = read_boundary(mesh_path, zone, reading)

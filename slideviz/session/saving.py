@@ -10,6 +10,7 @@ from typing import Any
 from slideviz.case.keys import SectionText, hyphened
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
+from slideviz.formats.openfoam_paths import shown_name
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.sections.model import Section
@@ -139,7 +140,7 @@ def title_of(session: Session) -> str:
     lost = session.unsaved_mesh and not comes_again
     star = "*" if session.unsaved_case or unsaved_sections(session) or lost else ""
     part = f" – {run.progress_words}" if run is not None and run.incomplete else ""
-    return f"{star}{file.name}{part} – slideviz" if file else "slideviz"
+    return f"{star}{shown_name(file)}{part} – slideviz" if file else "slideviz"
 
 
 Camera = tuple[float, ...]

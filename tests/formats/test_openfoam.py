@@ -15,7 +15,7 @@ import slideviz as sv
 from slideviz.case.zone_cases import with_marker_names
 from slideviz.cli import run
 from slideviz.errors import MeshError
-from slideviz.formats.openfoam_paths import mesh_path, stem_of
+from slideviz.formats.openfoam_paths import mesh_path, shown_name, stem_of
 from slideviz.mesh.polyhedra import parts_words
 from slideviz.session.opening import guess_roles
 from slideviz.session.state import Guess
@@ -260,6 +260,9 @@ def test_the_file_that_stands_for_a_mesh(tmp_path):
     for path in (case, case / "constant", points.parent, case / "any.foam", points):
         assert mesh_path(path) == points
         assert stem_of(mesh_path(path)) == "case"
+        assert shown_name(mesh_path(path)) == "case"
+    assert shown_name(mesh_path(case / "0.1")) == "case, time 0.1"
+    assert shown_name(tmp_path / "a.su2") == "a.su2"
     assert mesh_path(case / "0.1") == case / "0.1/polyMesh/points"
     assert mesh_path(tmp_path / "new.foam") == tmp_path / "new/constant/polyMesh/points"
     for other in (tmp_path, tmp_path / "a.su2", tmp_path / "0.1", case / "system"):

@@ -19,6 +19,7 @@ def test_a_case_is_opened_by_its_folder_and_saved_as_another(driver, answers, tm
     assert session.guesses["ends"].reason == "its patch is of that type"
     assert session.case.roles["ends"] == "sliding"
     assert driver.window.files.stem() == "honeycomb"
+    assert driver.window.windowTitle() == "honeycomb – slideviz"
     assert len(session.mesh.cells) > len(cells)
     words = " ".join(mesh_words(session.mesh))
     assert f"{len(cells):,} cells" in words
