@@ -109,8 +109,9 @@ def _threads(_: Report) -> Iterator[tuple[str, object]]:
     yield "cores", os.cpu_count()
     yield "compiled loops", cores()
     for pool in threadpool_info():
-        words = f"{pool['num_threads']} threads, {pool['version']} {pool.get('architecture', '')}"
-        yield f"{pool['user_api']} of {pool['prefix']}", words.strip()
+        build = " ".join(filter(None, (pool["version"], pool.get("architecture"))))
+        words = ", ".join(filter(None, (f"{pool['num_threads']} threads", build)))
+        yield f"{pool['user_api']} of {pool['prefix']}", words
 
 
 def _memory(report: Report) -> Iterator[tuple[str, object]]:
