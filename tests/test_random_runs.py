@@ -103,10 +103,10 @@ def test_no_law_is_broken_by_small_bodies(seed):
 def test_numbering_may_change_no_more_than_a_run_says_itself():
     run = random_run(30634)
     steps = list(deform(run.case, run.mesh))
-    assert 1e-9 < laws.doubt(run, steps) < 1e-3
+    assert 1e-9 < laws.doubt(run.mesh, steps) < 1e-3
     assert list(laws.numbering_does_not_matter(run, steps)) == []
     plain = random_run(SLIDES)
-    assert laws.doubt(plain, list(deform(plain.case, plain.mesh))) == 0.0
+    assert laws.doubt(plain.mesh, list(deform(plain.case, plain.mesh))) == 0.0
 
 
 def test_images_see_one_that_goes_another_way(monkeypatch):
