@@ -90,7 +90,14 @@ def test_the_bytes_of_ugrid_have_the_order_that_the_name_says(tmp_path):
         assert len(data) == 28 + 27 * 24 + 24 * 20 + 8 * 32
 
 
-def test_ugrid_of_a_flat_mesh_is_refused_before_the_work(tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("ending", "words"),
+    [
+        (".b8.ugrid", "UGRID holds 3D meshes of up to 2^31 points"),
+        (".bdf", "Nastran's bulk data hold 3D meshes whose numbers of nodes and elements have 8"),
+    ],
+)
+def test_a_flat_mesh_is_refused_before_the_work(tmp_path, capsys, monkeypatch, ending, words):
     monkeypatch.chdir(tmp_path)
     write("flat.su2", square(4))
     text = (
@@ -98,8 +105,10 @@ def test_ugrid_of_a_flat_mesh_is_refused_before_the_work(tmp_path, capsys, monke
     )
     (tmp_path / "flat.cfg").write_text(text)
     monkeypatch.setattr("slideviz.cli.run_command.deform", None)  # no work is begun
-    assert run(["run", "flat.cfg", "-o", "out.b8.ugrid"]) == 1
-    assert "UGRID holds 3D meshes of up to 2^31 points" in capsys.readouterr().err
+    assert run(["run", "flat.cfg", "-o", f"out{ending}"]) == 1
+    assert words in capsys.readouterr().err
+    with pytest.raises(MeshError, match=re.escape(words)):
+        write(f"out{ending}", square(4))
 
 
 def test_gmsh_reads_nodes_cells_and_names(tmp_path):
