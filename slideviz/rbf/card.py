@@ -6,7 +6,6 @@ nodes, so that a target's sum does not depend on the others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.rbf.compiled import _K, one_at_a_time
+from slideviz.rbf.compiled import _K, Inputs, Metric, one_at_a_time
 from slideviz.rbf.kernels import SHAPE
 from slideviz.system.device import card_arrays, free_on_card
 
@@ -47,17 +46,10 @@ def _kernel(module: Any, name: str, kind: int, rows: int, periodic: bool) -> Any
     return module.RawModule(code=code, options=options).get_function(name)
 
 
-def _run(
-    name: str,
-    threads: int,
-    inputs: Sequence[FloatArray],
-    metric: tuple[float, float, int],
-    out: Any,
-) -> Any:
+def _run(name: str, threads: int, inputs: Inputs, metric: Metric, out: Any) -> Any:
     """Return ``out``, on the card, which a function of ``card.cu`` fills from inputs on the host.
 
-    ``inputs``: features of targets (k, N) and controls (k, n), and two or three other arrays.
-    ``metric``: theta_p / pi, 1 / R and the kernel's code, as the loops in `compiled` take them.
+    ``inputs``: features of targets (k, N) and controls (k, n), and one or two other arrays.
     """
     if not threads:
         return out
@@ -95,46 +87,25 @@ class CardLoops:
         """Return how many rows of a matrix to fill at a time, when they are multiplied."""
         return min(self.matrix_rows(count), PRODUCT_ROWS)
 
-    def add_up(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        w: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write s at targets x (k, N) to out (3, N), of controls c (k, n) and weights w (3, n)."""
+    def add_up(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """As of `HostLoops`."""
         arrays = card_arrays()
         found = arrays.module.empty(out.shape)
-        out[:] = arrays.to_host(_run("add_up", x.shape[1], (x, c, w), metric, found))
+        out[:] = arrays.to_host(_run("add_up", out.shape[1], inputs, metric, found))
 
-    def fill_matrix(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        across: FloatArray,
-        along: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write G (N, n) to out, as `slideviz.rbf.compiled.fill_matrix`."""
-        out[:] = card_arrays().to_host(self._filled((x, c, across, along), metric))
+    def fill_matrix(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """As of `HostLoops`."""
+        out[:] = card_arrays().to_host(self._filled(inputs, metric))
 
-    def multiply(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        right: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write phi(|x_a - c_b|) times ``right`` (n, m) to out (N, m)."""
+    def multiply(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """As of `HostLoops`."""
+        x, c, right = inputs
         arrays = card_arrays()
         with one_at_a_time(x.shape[1] * c.shape[1]):  # threads share the memory of the card
             filled = self._filled((x, c, x[:0], c[:0]), metric)
             out[:] = arrays.to_host(filled @ arrays.module.asarray(right))
 
-    def _filled(self, inputs: Sequence[FloatArray], metric: tuple[float, float, int]) -> Any:
+    def _filled(self, inputs: Inputs, metric: Metric) -> Any:
         """Return G (N, n), on the card."""
         x, c, *_ = inputs
         out = card_arrays().module.empty((x.shape[1], c.shape[1]))

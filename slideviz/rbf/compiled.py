@@ -11,7 +11,7 @@ a time, because Numba's fallback thread pool must not be entered from two thread
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from math import factorial
@@ -19,8 +19,15 @@ from math import factorial
 import numpy as np
 from numba import get_num_threads, prange, set_num_threads
 
+from slideviz.mesh.model import FloatArray
 from slideviz.rbf.kernels import SHAPE
 from slideviz.system.jit_cache import njit
+
+Inputs = Sequence[FloatArray]
+"""What a loop takes first: features of targets (k, N) and of controls (k, n), and other arrays."""
+
+Metric = tuple[float, float, int]
+"""theta_p / pi, 1 / R and the kernel's code."""
 
 LOCK = threading.Lock()  # held by `one_at_a_time` while a compiled loop runs
 

@@ -11,6 +11,7 @@ from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.card import CardLoops
+from slideviz.rbf.compiled import Inputs, Metric
 from slideviz.rbf.kernels import KERNELS
 from slideviz.system.device import Place
 
@@ -57,8 +58,8 @@ class Basis:
         return self.period / np.pi
 
     @property
-    def metric(self) -> tuple[float, float, int]:
-        """Return theta_p / pi, 1 / R and the kernel's code, as the loops take them."""
+    def metric(self) -> Metric:
+        """Return what the loops take."""
         return self.period_over_pi, 1.0 / self.radius, KERNELS[self.kernel].code
 
     @property
@@ -80,42 +81,21 @@ class HostLoops:
         """Return how many rows of a matrix are in memory at a time, when they are multiplied."""
         return min(ROWS, max(64, PAIRS // max(1, count)))
 
-    def add_up(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        w: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write s at targets x (k, N) to out (3, N), of controls c (k, n) and weights w (3, n)."""
+    def add_up(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """Write s to out (3, N), of targets (k, N), controls (k, n) and weights (3, n)."""
         *lengths, kind = metric
         if kind:
-            compiled.sum_any(x, c, w, *metric, out)
+            compiled.sum_any(*inputs, *metric, out)
         else:
-            compiled.sum_plain(x, c, w, *lengths, out)
+            compiled.sum_plain(*inputs, *lengths, out)
 
-    def fill_matrix(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        across: FloatArray,
-        along: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write G (N, n) to out, as `compiled.fill_matrix`."""
-        compiled.fill_matrix(x, c, across, along, *metric, out)
+    def fill_matrix(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """Write G (N, n) to out, of what `compiled.fill_matrix` takes first."""
+        compiled.fill_matrix(*inputs, *metric, out)
 
-    def multiply(
-        self,
-        x: FloatArray,
-        c: FloatArray,
-        right: FloatArray,
-        metric: tuple[float, float, int],
-        out: FloatArray,
-    ) -> None:
-        """Write phi(|x_a - c_b|) times ``right`` (n, m) to out (N, m)."""
+    def multiply(self, inputs: Inputs, metric: Metric, out: FloatArray) -> None:
+        """Write phi(|x_a - c_b|), of x (k, N) and c (k, n), times a matrix (n, m) to out (N, m)."""
+        x, c, right = inputs
         values = np.empty((x.shape[1], c.shape[1]))
         with compiled.one_at_a_time(values.size):
             compiled.fill_matrix(x, c, x[:0], c[:0], *metric, values)
@@ -154,7 +134,7 @@ def evaluate(
     loops = basis.loops
 
     def add_up(x: FloatArray, out: FloatArray) -> None:
-        loops.add_up(x, c, w, metric, out)
+        loops.add_up((x, c, w), metric, out)
 
     return summed(add_up, targets, c, weights.shape[1], tick, loops)
 
@@ -281,14 +261,9 @@ def matrix(
     for start in range(0, total, size):
         part = slice(start, min(total, start + size))
         with compiled.one_at_a_time((part.stop - part.start) * n):
-            basis.loops.fill_matrix(
-                np.ascontiguousarray(x[:, part]),
-                c,
-                np.ascontiguousarray(across[:, part]),
-                along,
-                basis.metric,
-                out[part],
-            )
+            here = np.ascontiguousarray(x[:, part])
+            inputs = here, c, np.ascontiguousarray(across[:, part]), along
+            basis.loops.fill_matrix(inputs, basis.metric, out[part])
         tick(part.stop / total)
     return out
 

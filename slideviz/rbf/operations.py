@@ -186,7 +186,8 @@ def many(
         for first in range(part.start, part.stop, size):
             here = near[first : min(part.stop, first + size)]
             products = found[: len(here)]
-            loops.multiply(padded_rows(targets[:, here], 4), c, wide, basis.metric, products)
+            x = padded_rows(targets[:, here], 4)
+            loops.multiply((x, c, wide), basis.metric, products)
             place(products, here, out)
 
     with enough_threads(0.0):  # the threads are those of the parts

@@ -301,11 +301,11 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick, arrays: Array
             lower[below, here] = rest.T
         tick((stop / more) ** 2)
     kept = np.concatenate([before.retained, old + np.flatnonzero(~dropped)])
+    lower = arrays.to_host(lower)
     if not dropped.any():
-        return Factor(arrays.to_host(lower), kept, before.dropped)
+        return Factor(lower, kept, before.dropped)
     stay = np.concatenate([np.arange(done), done + np.flatnonzero(~dropped)])
     left_out = np.concatenate([before.dropped, old + np.flatnonzero(dropped)])
-    lower = arrays.to_host(lower)
     return Factor(np.asfortranarray(lower[np.ix_(stay, stay)]), kept, left_out)
 
 
