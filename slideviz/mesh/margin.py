@@ -26,16 +26,18 @@ from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
     LEVELS,
+    add3,
+    cross3,
+    dot3,
     gather,
     write_coefficients,
 )
-from slideviz.mesh.model import NO_NODES, BoolArray, Cells, Signs
+from slideviz.mesh.model import BoolArray, Cells, Signs, largest_coordinate
 from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import njit
 from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
-    from slideviz.mesh.halo import Halo
     from slideviz.mesh.model import FloatArray, Index, IntArray, Mesh
 
 GAP = 2.0**-9
@@ -50,10 +52,8 @@ simple) size of the cell."""
 THIRD = 1 / 3  # a multiplication with it is faster than a division
 
 
-LIMIT = 1 + 4 * GAP
-"""Margins are found up to the least one so far times this, where only the least one is wanted: one
-of another cap may be the part `GAP` larger."""
-FLOOR = 1e-6  # least of these limits, over the largest margin that is looked for
+BOUNDED = np.array([1 / 8, 1 / 4, 1 / 2, 1])
+"""Parts of the largest margin that is looked for, up to which margins are bounded from below."""
 
 
 def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, BoolArray]:
@@ -81,9 +81,6 @@ def margins(
     cells: Cells,
     cap: float,
     signs: Signs | None = None,
-    *,
-    least: bool = False,
-    halo: Halo | None = None,
 ) -> FloatArray:
     """Return the margins (m,) of cells along ``points + s * displacement``, from 0 to ``cap``.
 
@@ -92,23 +89,14 @@ def margins(
     ``points``, ``displacement`` (n, d), and cells of dimension d.
     ``cap``: largest margin that is looked for; positive, finite.
     ``signs`` (m,): 1, or -1 for a cell that is numbered the other way round; without it all are 1.
-    ``least``: whether only the least ones are wanted, up to `GAP`; others may be ``cap``, and those
-    of cells of a ``halo`` are.
     """
-    limit = cap
     found = np.empty(len(cells))
     turns = np.ones(len(cells), np.int8) if signs is None else signs
 
     def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
-        nonlocal limit
-        here = limit
         values = np.empty(len(nodes))
         arrays = points, displacement, nodes, CORNERS[vtk], turns[rows].copy()
-        _write_margins(vtk, *arrays, CUTS[vtk], here, values)
-        if least:
-            values[values >= here] = cap
-            values[halo.cells[rows] if halo else NO_NODES] = cap
-            limit = min(limit, max(LIMIT * float(values.min()), FLOOR * cap))
+        _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
         found[rows] = values
 
     cells.in_parts(of_part)
@@ -181,14 +169,40 @@ def path_margins(mesh: Mesh, reference: Mesh, signs_of: Mesh | None = None) -> F
 def least_margin(before: Mesh, after: Mesh, cap: float, signs: Signs) -> tuple[float, int]:
     """Return the least margin, up to ``cap``, of all cells without the halo's, and its first cell.
 
-    It is that of `margins`, for the cells that may have it.
+    It is that of `margins`, which are found only of cells that may have the least one: of a
+    hexahedron a bound costs less (`_write_bounds`).
     """
-    paths = before.points, after.points - before.points
-    rough = margins(*paths, after.cells, cap, signs, least=True, halo=after.halo)
-    ids = np.flatnonzero(rough <= LIMIT * rough.min(initial=cap))
-    found = margins(*paths, after.cells.take(ids), cap, signs[ids])
-    least = float(found.min(initial=cap))
-    return least, int(ids[found.argmin()]) if least < cap else 0
+    cells = after.cells
+    ends = cap * BOUNDED
+    bounded = np.zeros(len(cells), np.int8)
+    nodes_far = largest_coordinate(before.points)
+    far = np.array([nodes_far, nodes_far + largest_coordinate(after.points)])
+
+    def of_part(vtk: int, rows: Index, nodes: IntArray) -> None:
+        if vtk == 12:
+            values = np.empty(len(nodes), np.int8)
+            turn = signs[rows].copy()
+            _write_bounds(before.points, after.points, nodes, turn, far, ends, values)
+            bounded[rows] = values
+
+    cells.in_parts(of_part)
+    if after.halo is not None:
+        bounded[after.halo.cells] = len(ends)
+    least = cap
+    cell = 0
+    for level, end in enumerate(ends):
+        ids = np.flatnonzero(bounded == level)
+        some = cells.take(ids)
+        nodes = some.nodes
+        here = Cells(some.types, some.offsets, np.searchsorted(nodes, some.connectivity))
+        start = before.points[nodes]
+        found = margins(start, after.points[nodes] - start, here, cap, signs[ids])
+        if len(found) and (found.min(), ids[found.argmin()]) < (least, cell):
+            least = float(found.min())
+            cell = int(ids[found.argmin()])
+        if least < end:
+            break  # all others have larger ones
+    return least, cell
 
 
 def step_safety(
@@ -226,6 +240,108 @@ def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
         if safe.fraction < end:
             break
     return safe
+
+
+@njit
+def _write_bounds(before, after, nodes, turn, far, ends, found):  # type: ignore[no-untyped-def]
+    """Write how many of the ascending ``ends`` the margins of hexahedra surely reach, (m,).
+
+    Of the four edges along each direction take the mean, U + s F, and the largest distance from it,
+    at most r + s q (`_write_modes`). All coefficients of the proof are means of triple products of
+    such edges, so they differ from det(U + s F, V + s G, W + s H) by at most ∏(aᵢ + rᵢ + s qᵢ) -
+    ∏aᵢ with a₁ = |U| + s |F|, which is largest at the end of an interval.
+    ``far`` (2,): the largest coordinates of all nodes, and of all their displacements.
+    """
+    start, motion = np.empty((2, 3, 8, LANES))
+    modes = np.empty((2, 7, 3, LANES))
+    lengths = np.empty((2, 7, LANES))
+    spare = np.empty(LANES)
+    level = np.empty(LANES, np.int8)
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(before, nodes, first, count, start)
+        gather(after, nodes, first, count, motion)
+        for axis in range(3):
+            for j in range(8):
+                for c in range(count):
+                    motion[axis, j, c] -= start[axis, j, c]
+        _write_modes(start, count, modes[0], lengths[0])
+        _write_modes(motion, count, modes[1], lengths[1])
+        level[:count] = 0
+        for k in range(len(ends) - 1, -1, -1):
+            if level[:count].min() > 0:
+                break
+            _write_spare(modes, lengths, turn[first : first + count], far, ends[k], spare)
+            for c in range(count):
+                if 0.0 < spare[c] < np.inf:
+                    level[c] = max(level[c], k + 1)
+        found[first : first + count] = level[:count]
+
+
+@njit
+def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
+    """Write the modes (7, 3, ...) of hexahedra, and their lengths: what edges are sums of.
+
+    The first three are the mean edges U, V and W along each direction. The edges along the first
+    are U ± UV ± UW ± UVW, and so on, with the other modes UV, UW, VW and UVW.
+    """
+    for axis in range(3):
+        for c in range(count):
+            a = at[axis, 1, c] - at[axis, 0, c]
+            b = at[axis, 2, c] - at[axis, 3, c]
+            d = at[axis, 5, c] - at[axis, 4, c]
+            e = at[axis, 6, c] - at[axis, 7, c]
+            v0 = (at[axis, 3, c] - at[axis, 0, c]) + (at[axis, 2, c] - at[axis, 1, c])
+            v1 = (at[axis, 7, c] - at[axis, 4, c]) + (at[axis, 6, c] - at[axis, 5, c])
+            w0 = (at[axis, 4, c] - at[axis, 0, c]) + (at[axis, 5, c] - at[axis, 1, c])
+            w1 = (at[axis, 7, c] - at[axis, 3, c]) + (at[axis, 6, c] - at[axis, 2, c])
+            modes[0, axis, c] = 0.25 * ((a + b) + (d + e))
+            modes[1, axis, c] = 0.25 * (v0 + v1)
+            modes[2, axis, c] = 0.25 * (w0 + w1)
+            modes[3, axis, c] = 0.25 * ((b - a) + (e - d))
+            modes[4, axis, c] = 0.25 * ((d + e) - (a + b))
+            modes[5, axis, c] = 0.25 * (v1 - v0)
+            modes[6, axis, c] = 0.25 * ((e - d) - (b - a))
+    for k in range(7):
+        for c in range(count):
+            mode = modes[k, 0, c], modes[k, 1, c], modes[k, 2, c]
+            lengths[k, c] = np.sqrt(dot3(mode, mode))
+
+
+@njit
+def _write_spare(modes, lengths, turn, far, end, spare):  # type: ignore[no-untyped-def]
+    """Write by how much the coefficients of cells, if positive, surely exceed 0 up to ``end``."""
+    for c in range(len(turn)):
+        u = modes[0, 0, 0, c], modes[0, 0, 1, c], modes[0, 0, 2, c]
+        v = modes[0, 1, 0, c], modes[0, 1, 1, c], modes[0, 1, 2, c]
+        w = modes[0, 2, 0, c], modes[0, 2, 1, c], modes[0, 2, 2, c]
+        f = end * modes[1, 0, 0, c], end * modes[1, 0, 1, c], end * modes[1, 0, 2, c]
+        g = end * modes[1, 1, 0, c], end * modes[1, 1, 1, c], end * modes[1, 1, 2, c]
+        h = end * modes[1, 2, 0, c], end * modes[1, 2, 1, c], end * modes[1, 2, 2, c]
+        uv = cross3(u, v)
+        fg = cross3(f, g)
+        mixed = add3(cross3(u, g), cross3(f, v))
+        one = dot3(uv, h) + dot3(mixed, w)
+        two = dot3(fg, w) + dot3(mixed, h)
+        # Bernstein coefficients of the cubic on the interval.
+        first = turn[c] * dot3(uv, w)
+        second = first + turn[c] * one * THIRD
+        third = first + turn[c] * (2 * one + two) * THIRD
+        last = first + turn[c] * (one + two + dot3(fg, h))
+        low = min(first, second, third, last)
+        a = lengths[0, 0, c] + end * lengths[1, 0, c]
+        b = lengths[0, 1, c] + end * lengths[1, 1, c]
+        d = lengths[0, 2, c] + end * lengths[1, 2, c]
+        uv_ = lengths[0, 3, c] + end * lengths[1, 3, c]
+        uw_ = lengths[0, 4, c] + end * lengths[1, 4, c]
+        vw_ = lengths[0, 5, c] + end * lengths[1, 5, c]
+        uvw = lengths[0, 6, c] + end * lengths[1, 6, c]
+        p = uv_ + uw_ + uvw
+        q = uv_ + vw_ + uvw
+        r = uw_ + vw_ + uvw
+        change = p * (b + q) * (d + r) + a * q * (d + r) + a * b * r
+        size = a + p + b + q + d + r  # no nodes are farther apart
+        spare[c] = low - change - 2 * ROUNDING * (far[0] + end * far[1]) * size * size
 
 
 @njit

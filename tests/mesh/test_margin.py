@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.jacobians import VALID, coefficients
-from slideviz.mesh.margin import GAP, first_root, least_margin, margins
+from slideviz.mesh.margin import BOUNDED, GAP, _write_bounds, first_root, least_margin, margins
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.system.threads import PART, core_limit
@@ -150,17 +150,15 @@ def test_the_least_margin_is_that_of_all_cells_to_the_bit(vtk, scale, flat, offs
             assert least_margin(*part, CAP, signs[some][keep]) == expected
 
 
-def test_rough_margins_are_those_that_may_be_the_least():
+def test_a_bound_never_exceeds_the_margin_of_a_cell():
     mesh, points, motion = random_cells(12, 20_000, seed=4)
-    paths = points, 0.02 * motion
-    found = margins(*paths, mesh.cells, CAP)
-    rough = margins(*paths, mesh.cells, CAP, least=True)
-    told = rough < CAP
-    np.testing.assert_allclose(rough[told], found[told], rtol=GAP)
-    least = found.min()
-    assert told[found <= least * (1 + GAP)].all()
-    assert (found[~told] > least).all()
-    assert 0 < told.sum() < 10_000  # neither all nor none
+    after, levels = points + 0.02 * motion, np.empty(20_000, np.int8)
+    nodes, turn = mesh.cells.by_type[12][1], np.ones(20_000, np.int8)
+    far = np.array([np.abs(points).max(), np.abs(after - points).max()])
+    _write_bounds(points, after, nodes, turn, far, CAP * BOUNDED, levels)
+    found = margins(points, after - points, mesh.cells, CAP)
+    assert (found >= np.append(0.0, CAP * BOUNDED)[levels]).all()
+    assert (np.bincount(levels, minlength=5) > 100).all()  # neither all nor none are bounded
 
 
 @pytest.mark.parametrize(
