@@ -1,4 +1,4 @@
-"""The table of the samples: cases of the thesis (chapter 4) at any size, a passage, an airfoil."""
+"""The table of the samples: cases of the thesis (chapter 4) at any size, and others."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ class Sample:
 
 
 Made = tuple[Mesh | Structured, Case, Displacements | None]
+Make = Callable[[str, int, str, bool], Made]
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SampleKind:
     about: str  # what it is, in words for users
     counts: str  # what its size counts
     size: int  # the default size
-    make: Callable[[str, int, str, bool], Made]
+    make: Make
     """Returns mesh or grid, case and displacement, by name, size and variant, and whether a grid
     is written to its file block by block: it may be larger then."""
     variants: tuple[str, ...] = ("motion",)
@@ -76,6 +77,11 @@ def sample_case(name: str) -> Case:
     return case_of_text(Path(f"{name}.cfg"), text, Case()).change(source=None)
 
 
+def _by_file(mesh_of_size: Callable[[int], Mesh]) -> Make:
+    """Return the function that makes a sample of one variant, whose case is a file."""
+    return lambda name, size, *_: (mesh_of_size(size), sample_case(name), None)
+
+
 def _stator(name: str, size: int, _variant: str, streams: bool) -> Made:
     stack, moved = stator(size, streams)
     return stack, sample_case(name), moved
@@ -99,7 +105,7 @@ SAMPLES: Mapping[str, SampleKind] = {
         "2D: turbine blade in a periodic passage",
         "cells along the inflow",
         36,
-        lambda name, size, *_: (passage_mesh(size), sample_case(name), None),
+        _by_file(passage_mesh),
     ),
     "airfoil": SampleKind(
         "2D: airfoil turned in a far field of 50 chords",
@@ -112,13 +118,13 @@ SAMPLES: Mapping[str, SampleKind] = {
         "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3)",
         "cells, 5000 or 20000",
         20_000,
-        lambda name, size, *_: (row_mesh(size), sample_case(name), None),
+        _by_file(row_mesh),
     ),
     "turbine-row-3d": SampleKind(
         "3D: the vane from hub to shroud, twisted; hexahedra and prisms",
         "cells, about",
         25_000,
-        lambda name, size, *_: (extruded_row(size), sample_case(name), None),
+        _by_file(extruded_row),
     ),
     "stator": SampleKind(
         "3D: stator passage, 41 around, hexahedra (thesis 4.2.3)",
@@ -131,13 +137,13 @@ SAMPLES: Mapping[str, SampleKind] = {
         "3D: centrifugal compressor passage, 13 around, twisted over its span",
         "cells, about",
         12_000,
-        lambda name, size, *_: (impeller_mesh(size), sample_case(name), None),
+        _by_file(impeller_mesh),
     ),
     "wing": SampleKind(
         "3D: swept, tapered wing on a symmetry plane, twisted over its span and bent up",
         "cells, about",
         20_000,
-        lambda name, size, *_: (wing_mesh(size), sample_case(name), None),
+        _by_file(wing_mesh),
     ),
 }
 """Every kind of sample, by name."""
@@ -148,8 +154,7 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
 
     Raises CaseError if there is no such sample or variant, or the size is out of range.
     ``name``: one of ``SAMPLES``.
-    ``size``: cells in each direction; of the passage: cells along its inflow; of the airfoil: cells
-    around it; of turbine rows and stator: all cells. The usual size when left out.
+    ``size``: how many of what ``SAMPLES[name].counts`` says; the usual size when left out.
     ``variant``: one of ``SAMPLES[name].variants``; the first when left out.
     """
     mesh, case, moved = _made(name, size, variant, streams=False)
@@ -194,9 +199,8 @@ def write_sample(
     As SU2's binary (``mesh.su2b``) a stator and the thesis's cases are written block by block, and
     never as a whole in memory.
 
-    Parameters are those of ``sample`` and:
-
     Raises CaseError or MeshError as `sample` does, or if a file exists or cannot be written.
+    Parameters are those of ``sample`` and:
     ``folder``: where to; made if there is none.
     ``overwrite``: whether to replace files that exist.
     ``file_format``: the format of the mesh.
