@@ -1,7 +1,7 @@
 """A section through a mesh as a value, and the functions and words that all shapes share.
 
 A shape is a class: the functions of `Section` that differ by shape are defined in
-`slideviz.sections.plane`, ``cylinder``, ``cone`` and ``span``.
+`slideviz.sections.plane`, ``quadrics`` and ``span``.
 """
 
 from __future__ import annotations
