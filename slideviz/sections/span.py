@@ -111,9 +111,8 @@ class SpanWalls:
     ) -> FloatArray:
         """Return values (n, ...) at meridional coordinates (n, 3), of the zone at each place."""
         if len(self.channels) == 1:
-            return value(0, self._branch(0, coords))
-        places = range(len(self.channels))
-        outside = [self.channels[k].outside(self._branch(k, coords)) for k in places]
+            return value(0, self.field.branch(coords))
+        outside = [one.outside(one.field.branch(coords)) for one in self.channels]
         return self._chosen(np.argmin(outside, axis=0), coords, value)
 
     def _chosen(
@@ -123,10 +122,6 @@ class SpanWalls:
         parts = [value(k, rows[which == k]) for k in range(len(self.channels))]
         order = np.argsort(np.argsort(which, kind="stable"), kind="stable")
         return np.concatenate(parts)[order]
-
-    def _branch(self, k: int, coords: FloatArray) -> FloatArray:
-        """Return meridional coordinates (n, 3), theta within half a turn of the walls' middle."""
-        return self.channels[k].field.branch(coords)
 
     def level(self, coords: FloatArray, span: float) -> FloatArray:
         """Return numbers (n,) that are 0 on a span, and below it negative: about the distance."""
