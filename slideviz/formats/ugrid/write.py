@@ -43,8 +43,7 @@ def require_ugrid(mesh: Mesh, path: Path) -> None:
 def _blocks(mesh: Mesh, order: str) -> Iterator[bytes]:
     whole = f"{order}i4"
     sides = {vtk: (nodes, numbers) for vtk, nodes, numbers in boundary_blocks(mesh)}
-    parts = [sides[vtk][0] for vtk in SIDES if vtk in sides]
-    parts += [sides[vtk][1] for vtk in SIDES if vtk in sides]
+    parts = [sides[vtk] for vtk in SIDES if vtk in sides]
     cells = {vtk: nodes for vtk, (_, nodes) in mesh.cells.by_type.items()}
     if 14 in cells:
         cells[14] = cells[14][:, PYRAMID]
@@ -53,8 +52,10 @@ def _blocks(mesh: Mesh, order: str) -> Iterator[bytes]:
     counts += [len(cells.get(vtk, ())) for vtk in CELLS]
     yield np.array(counts, whole).tobytes()
     yield mesh.points.astype(f"{order}f8").tobytes()
-    for numbers in parts:
-        yield (numbers + (numbers.ndim == 2)).astype(whole).tobytes()
+    for nodes, _ in parts:
+        yield (nodes + 1).astype(whole).tobytes()
+    for _, numbers in parts:
+        yield numbers.astype(whole).tobytes()
     for vtk in CELLS:
         if vtk in cells:
             yield (cells[vtk] + 1).astype(whole).tobytes()
