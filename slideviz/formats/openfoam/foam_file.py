@@ -138,12 +138,8 @@ class FoamFile:
         text = _COMMENT.sub(b" ", self.data[self.begin :]).decode("utf-8", "backslashreplace")
         count, _, body = text.partition("(")
         patches = []
-        name = ""
-        while True:
-            words = _WORDS.match(body := body.lstrip())
-            name = words[0] if words else ""
-            if name in ("", ")"):
-                break
+        while (word := _WORDS.match(body := body.lstrip())) and word[0] != ")":
+            name = word[0]
             inside, _, body = body[len(name) :].lstrip().removeprefix("{").partition("}")
             entries = dict(_ENTRY.findall(inside))
             try:
@@ -181,16 +177,16 @@ def read_foam_file(path: Path) -> FoamFile:
     entries = dict(_ENTRY.findall(header[1].decode("latin-1")))
     arch = entries.get("arch", "")
     order = ">" if "MSB" in arch else "<"
-    sizes = {one: 8 if f"{one}=64" in arch else 4 for one in ("label", "scalar")}
-    sizes["scalar"] = 4 if "scalar=32" in arch else 8
+    label = 8 if "label=64" in arch else 4
+    scalar = 4 if "scalar=32" in arch else 8
     return FoamFile(
         path,
         data,
         header.end(),
         entries.get("format") == "binary",
         entries.get("class", ""),
-        np.dtype(f"{order}i{sizes['label']}"),
-        np.dtype(f"{order}f{sizes['scalar']}"),
+        np.dtype(f"{order}i{label}"),
+        np.dtype(f"{order}f{scalar}"),
     )
 
 
