@@ -362,9 +362,11 @@ class SpanCurves(Curves):
         for _ in range(NEWTON):
             value, slope = self.field.span(out)
             across = np.sum(slope[:, :2] * normal, axis=1)
-            if np.abs(value - span).max(initial=0.0) <= EXACT:
+            # Each point by itself: what others need must not move it by rounding.
+            gap = np.where(np.abs(value - span) <= EXACT, 0.0, value - span)
+            if not gap.any():
                 break
-            off -= (value - span) / np.where(np.abs(across) > 0.0, across, 1.0)
+            off -= gap / np.where(np.abs(across) > 0.0, across, 1.0)
             out[:, :2] = place + off[:, None] * normal
         lost = np.flatnonzero(~(np.abs(value - span) <= OFF))
         if len(lost):

@@ -117,6 +117,14 @@ def test_derivatives_of_curves_agree_with_differences(make):
     assert not field.revolved or np.abs(by[:, :2, 1]).max() == 0.0
 
 
+def test_points_on_curves_do_not_depend_on_other_points():
+    _, _, coords, curves = impeller()
+    plane = curves.plane(coords)
+    others = plane.copy()
+    others[::2, 0] += 0.05
+    assert (curves.coords(plane)[1::2] == curves.coords(others)[1::2]).all()
+
+
 def test_a_contoured_hub_is_followed_along_theta():
     mesh = contoured(passage((6, 12, 8)))
     field = find_span(mesh, "hub", "shroud", AXIS, ORIGIN, PERIOD)
