@@ -110,10 +110,7 @@ def _row(texts: Sequence[str], tip: str, key: object) -> QTreeWidgetItem:
 
 
 class LimitsPanel(Panel):
-    """The limits of the case, met or not at the step that is shown, and the table of its walls.
-
-    ``fly_to``: moves the camera to a cell.
-    """
+    """The limits of the case, met or not at the step that is shown, and the table of its walls."""
 
     def make(self) -> None:
         self.field = TextField()

@@ -343,10 +343,7 @@ class WorstTable(Fitted, QTableView):
 
 
 class WorstPanel(Panel):
-    """The table of the worst cells (`WORST` of them); the marked cell is the current row.
-
-    ``fly_to`` and ``fly_back``: move the camera to a cell; move it back to where it was.
-    """
+    """The table of the worst cells (`WORST` of them); the marked cell is the current row."""
 
     def make(self) -> None:
         self._marked: int | None = None
