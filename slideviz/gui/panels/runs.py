@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from qtpy.QtCore import QAbstractItemModel, QPoint, QSignalBlocker, QSize, Qt, Signal
@@ -23,7 +22,6 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.formats.openfoam_paths import stem_of
 from slideviz.gui.commands import COMPARE, Command, fill_compare
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
@@ -35,7 +33,6 @@ from slideviz.gui.widgets.build import (
     wrapped,
 )
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.theme import icon
 from slideviz.session import changes
 from slideviz.session.runs_words import (
@@ -47,7 +44,7 @@ from slideviz.session.runs_words import (
     table_rows,
 )
 from slideviz.session.state import Run, Session
-from slideviz.system.csv_table import csv_text, write_csv
+from slideviz.system.csv_table import csv_text
 
 RUN, MIN, MEAN, INVERTED = range(4)  # the columns of the list
 NUMBER = Qt.ItemDataRole.UserRole
@@ -247,9 +244,7 @@ class RunTree(QTreeWidget):
         painter.restore()
 
 
-TABLE_FILTERS = "Table (*.csv)"
 OF_ALL = ("copy", "export")  # commands for all runs, whichever row is selected
-
 
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
 
@@ -457,16 +452,8 @@ class RunsPanel(Panel):
 
     def export_table(self, _number: int | None = None) -> None:
         """Ask for a file name and write the table of all runs as CSV."""
-        session = self.session
-        folder = session.path.parent if session.path is not None else Path.home()
-        stem = stem_of(session.path) if session.path is not None else "mesh"
-        ask_and_write(
-            self,
-            "Export the table of runs",
-            folder / f"{stem}_runs.csv",
-            TABLE_FILTERS,
-            lambda path: write_csv(path, table_rows(session.runs)),
-        )
+        name = f"{self.services.files.stem()}_runs.csv"
+        self.export_csv("Export the table of runs", name, table_rows(self.session.runs))
 
 
 # fmt: off
