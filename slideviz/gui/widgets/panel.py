@@ -167,9 +167,8 @@ class Panel(QWidget):
 
     def export_csv(self, title: str, name: str, rows: Iterable[Sequence[object]]) -> None:
         """Ask for a CSV file, and write rows to it."""
-        default = self.services.files.folder() / name
         filters = "Comma-separated values (*.csv)"
-        ask_and_write(self, title, default, filters, lambda path: write_csv(path, rows))
+        ask_and_write(self, title, name, filters, lambda path: write_csv(path, rows))
 
     def take_theme(self, scheme: ColorScheme) -> None:
         """Draw plots again in another theme's colors; subclasses: all else without a palette."""

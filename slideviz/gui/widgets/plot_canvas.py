@@ -23,7 +23,7 @@ from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.gui.responsiveness.timers import LOOK_MS, MOST_REST, REST_MS, REST_TIMES, single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
-from slideviz.gui.widgets.services import folder_of, main_window
+from slideviz.gui.widgets.services import main_window
 from slideviz.plots.figure_io import figure_bytes
 from slideviz.plots.style import PRINT, Style
 from slideviz.system.atomic import write_whole
@@ -237,8 +237,9 @@ class PlotCanvas(QWidget):
     def save(self, name: str, title: str = "Save plot") -> None:
         """Ask for a file, by default of a name, and draw the plot into it."""
         draw_on = self.drawing()
-        default = folder_of(self) / f"{name}.png"
-        ask_and_write(self, title, default, PLOT_FILTERS, lambda path: write_plot(path, draw_on))
+        ask_and_write(
+            self, title, f"{name}.png", PLOT_FILTERS, lambda path: write_plot(path, draw_on)
+        )
 
     # Places ----------------------------------------------------------------------------
     @property
@@ -339,23 +340,21 @@ def write_plot(path: Path, draw_on: Draw) -> None:
 
 
 def ask_and_write(
-    parent: QWidget, title: str, default: Path, filters: str, write: Callable[[Path], None]
+    parent: QWidget, title: str, name: str, filters: str, write: Callable[[Path], None]
 ) -> None:
-    """Ask for a file name and call ``write`` with it; the window shows success or error.
+    """Ask for a file, by default of a name, and call ``write``; the window shows success or error.
 
     Without a window around ``parent``, errors are raised.
     """
-    path = questions.ask_save(parent, title, default, filters)
+    window = main_window(parent)
+    folder = window.files.folder() if window is not None else Path.home()
+    path = questions.ask_save(parent, title, folder / name, filters)
     if path is None:
         return
-    window = main_window(parent)
-    try:
+    if window is None:
         write(path)
-    except (OSError, SlidevizError) as error:
-        if window is None:
-            raise
-        window.banner.show_error(error)
         return
-    if window is not None:
+    with window.banner.showing_errors():
+        write(path)
         window.settings.setValue("folder", str(path.parent))
         window.show_status(f"Saved {path}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSettings
@@ -54,9 +53,3 @@ def main_window(widget: QWidget | None) -> Services | None:
     while widget is not None and not isinstance(widget, Services):
         widget = widget.parentWidget()
     return widget
-
-
-def folder_of(widget: QWidget) -> Path:
-    """Return the folder in which file dialogs start; the home folder without a window."""
-    window = main_window(widget)
-    return window.files.folder() if window is not None else Path.home()
