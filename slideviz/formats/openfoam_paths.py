@@ -83,7 +83,7 @@ def _mesh_path(path: Path) -> Path:
         mesh = folder / "polyMesh"
     elif (constant / REGIONS).is_file() and any(constant.glob("*/polyMesh")):
         return constant / REGIONS
-    elif folder != path or (constant / "polyMesh").is_dir():
+    elif folder != path or constant.is_dir():
         mesh = constant / "polyMesh"
     else:
         return path

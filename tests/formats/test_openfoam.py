@@ -318,6 +318,12 @@ def test_a_missing_file_is_named(tmp_path, name):
         sv.read(case / "constant" / "polyMesh")
 
 
+def test_a_case_without_a_mesh_is_told_what_it_lacks(tmp_path):
+    (tmp_path / "constant").mkdir()
+    with pytest.raises(MeshError, match="constant/polyMesh/points: there is no such file; check"):
+        sv.read(tmp_path)
+
+
 def test_binary_lists_that_lie(tmp_path):
     case = write_mesh(tmp_path, grid((2, 2, 2)), form=Form(binary=True))
     points = case / POLY / "points"
