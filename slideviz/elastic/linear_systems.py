@@ -85,7 +85,8 @@ def solve(
 
     def iterated() -> LinearSolution:
         precondition = while_ticking(preconditioner, tick)
-        found = conjugate_gradients(matrix, precondition, right, tick, scale=scale)
+        with enough_threads(0.0):  # the same bits for any number of threads
+            found = conjugate_gradients(matrix, precondition, right, tick, scale)
         x = start + found.x
         left = _part(precondition(residual(x)), x, scale) / found.smallest
         return replace(found, x=x, error=max(found.error, left))
@@ -171,8 +172,6 @@ def conjugate_gradients(
     precondition: Linear,
     right: FloatArray,
     tick: Tick = no_tick,
-    *,
-    tolerance: float = TOLERANCE,
     scale: float = 0.0,
 ) -> LinearSolution:
     """Solve by preconditioned conjugate gradients.
@@ -185,21 +184,8 @@ def conjugate_gradients(
     ``matrix`` (n, n): in blocks.
     ``precondition``: as ``preconditioner`` of `solve` makes it.
     ``right`` (n,): right-hand side.
-    ``tolerance``: error at which the iteration ends, as a part of the largest displacement.
     ``scale``: the largest displacement that is known.
     """
-    with enough_threads(0.0):  # the same bits for any number of threads
-        return _conjugate_gradients(matrix, precondition, right, tick, tolerance, scale)
-
-
-def _conjugate_gradients(
-    matrix: bsr_array,
-    precondition: Linear,
-    right: FloatArray,
-    tick: Tick,
-    tolerance: float,
-    scale: float,
-) -> LinearSolution:
     x = np.zeros_like(right)
     left = right.copy()
     z = precondition(left)
@@ -210,9 +196,9 @@ def _conjugate_gradients(
     turns = [0.0]
     for _ in range(MAX_ITERATIONS):
         part = _part(z, x, scale)
-        if not energy > 0.0 or part <= tolerance * _smallest(sizes, turns):
+        if not energy > 0.0 or part <= TOLERANCE * _smallest(sizes, turns):
             break
-        done = max(done, np.log(min(part, 1.0)) / np.log(tolerance))
+        done = max(done, np.log(min(part, 1.0)) / np.log(TOLERANCE))
         tick(MAKING + (1.0 - MAKING) * min(1.0, done))
         image = _product(matrix, along)
         curvature = float(along @ image)
