@@ -2,8 +2,8 @@
 
 With the gradient of each component weighted by the cell's stiffness, the Laplacian of a mesh is
 equivalent to its elasticity (Korn's inequality), does not care how cells are turned, and has one
-number where elasticity has d by d. It depends on the undeformed mesh and on which nodes move
-together only, so one hierarchy serves all steps, runs and designs of a mesh.
+number where elasticity has d by d. In relaxation it depends on the undeformed mesh and on which
+nodes move together only, so one hierarchy serves all steps, runs and designs of a mesh.
 
 Levels are made by smoothed aggregation (Vanek, Mandel and Brezina 1996). Components that are held
 at different nodes share aggregates and the finest matrix, and have numbers of their own, side by
@@ -79,7 +79,7 @@ class ElasticBody(Protocol):
 
     @property
     def points(self) -> FloatArray:
-        """Return the undeformed points (n, d)."""
+        """Return the points (n, d) where the body has no stresses."""
 
     @property
     def parts(self) -> Sequence[CellPart]:

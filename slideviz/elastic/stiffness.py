@@ -14,7 +14,7 @@ node: the displacement of node i is
 
 with T_i = R_i P_k: P_k projects on the directions in which the node is free, R_i rotates
 displacements of its representative periodic image into its own. Known nodes have no block of
-unknowns, only g_i. The matrix is symmetric with blocks d by d, as the multigrid solver needs it.
+unknowns, only g_i. The matrix is symmetric with blocks d by d, as the solver takes it.
 """
 
 from __future__ import annotations
