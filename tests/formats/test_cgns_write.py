@@ -210,6 +210,7 @@ def test_the_window_offers_it_and_says_what_other_files_lose(passage, tmp_path):
     assert ".cgns" in formats_for(mesh)
     assert left_out(tmp_path / "a.cgns", mesh) == ""
     assert left_out(tmp_path / "a.su2", mesh) == (
-        "a.su2 does not hold other contents of the CGNS file, such as zones and solutions."
+        "a.su2 does not hold other contents that the CGNS file may have, such as zones and "
+        "solutions."
     )
     assert ".cgns" in formats_for(cube(4))

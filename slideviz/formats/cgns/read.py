@@ -240,7 +240,7 @@ class CgnsForm(Origin):
     """Where the coordinates of a mesh are in the CGNS file it was read from."""
 
     ending = ".cgns"
-    extras = "other contents of the CGNS file, such as zones and solutions"
+    extras = "other contents that the CGNS file may have, such as zones and solutions"
     datasets: tuple[tuple[str, ...], ...]
     """For each zone the paths of the datasets of its coordinates."""
     numbers: tuple[IntArray, ...]
