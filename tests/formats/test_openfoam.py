@@ -224,6 +224,21 @@ def test_a_run_writes_into_a_new_case(tmp_path, monkeypatch, capsys):
     capsys.readouterr()
 
 
+def test_a_file_that_cannot_be_copied_is_told(tmp_path, monkeypatch):
+    case, _ = channel_case(tmp_path)
+    mesh = sv.read(case)
+    real = Path.read_bytes
+
+    def refuses(path):
+        if path.name == "controlDict":
+            raise PermissionError(13, "Permission denied")
+        return real(path)
+
+    monkeypatch.setattr(Path, "read_bytes", refuses)
+    with pytest.raises(MeshError, match="controlDict: cannot be read: no permission; change its"):
+        sv.write(tmp_path / "new.foam", mesh)
+
+
 def test_a_run_writes_into_a_time_or_the_case_itself(tmp_path, capsys):
     case, cfg = channel_case(tmp_path)
     before = contents(case)

@@ -17,6 +17,7 @@ import numpy as np
 from slideviz.errors import path_error
 from slideviz.formats.openfoam.read import PolyMesh
 from slideviz.formats.openfoam_paths import REGIONS, instance_of
+from slideviz.formats.source import open_source
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import FloatArray, Mesh
@@ -39,7 +40,7 @@ def write_polymesh(path: Path, mesh: Mesh, options: WriteOptions) -> None:
         content = _content(target, origin, points)
         for file, place in _copies(target, origin).items():
             make_folder(place.parent)
-            write_blocks(place, [file.read_bytes()], WriteOptions({}, {}))
+            write_blocks(place, [open_source(file)[:]], WriteOptions({}, {}))
         make_folder(target.parent)
         write_blocks(target, [content], options)
 
