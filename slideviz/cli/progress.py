@@ -10,10 +10,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from slideviz.cli.terminal import control
+from slideviz.terms import PHASES
 
 if TYPE_CHECKING:
     from slideviz.solver.deform import Progress
-from slideviz.terms import PHASES
 
 _BEFORE = ("read", "convert", "classify")  # phases in which a run can still be refused
 _EVERY = 0.1

@@ -64,7 +64,7 @@ def why_no_card() -> Message | None:
 
 
 def choose_place(device: Device) -> Place:
-    """Return where to compute; Raises DeformError if a card is asked for, and there is none."""
+    """Return where to compute; raises DeformError if a card is asked for, and there is none."""
     if device == "cpu":
         return "cpu"
     lacking = why_no_card()

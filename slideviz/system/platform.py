@@ -128,7 +128,7 @@ FACILITIES = (
 _PEACE = threading.Lock()  # held while a file is at one place, where there is no `pread`
 _SHARING = (32, 33)  # errors of Windows: a file, or a part of it, is in use
 _SET_DEATH_SIGNAL = 1  # ``PR_SET_PDEATHSIG`` of Linux's ``prctl``
-_NO_QUERY = 0x1000  # ``PROCESS_QUERY_LIMITED_INFORMATION`` of Windows
+_QUERY = 0x1000  # ``PROCESS_QUERY_LIMITED_INFORMATION`` of Windows
 _STILL_ACTIVE = 259  # exit code of a process of Windows that runs
 ENDING_SIGNALS = {signal.SIGINT: "cancelled", signal.SIGTERM: "ended by SIGTERM"}
 """Signals that end any command at any moment, with words for a message; the exit code is 128 plus
@@ -314,7 +314,7 @@ def is_alive(pid: str) -> bool:
 
 def _is_active(pid: int) -> bool:
     kernel = ctypes.windll.kernel32  # type: ignore[attr-defined]
-    process = kernel.OpenProcess(_NO_QUERY, False, pid)
+    process = kernel.OpenProcess(_QUERY, False, pid)
     code = ctypes.c_ulong()
     running = bool(process) and bool(kernel.GetExitCodeProcess(process, ctypes.byref(code)))
     if process:
