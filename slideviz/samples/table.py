@@ -36,7 +36,7 @@ class Sample:
 
 
 Made = tuple[Mesh | Structured, Case, Displacements | None]
-Make = Callable[[str, int, str, bool], Made]
+SampleMaker = Callable[[str, int, str, bool], Made]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class SampleKind:
     about: str  # what it is, in words for users
     counts: str  # what its size counts
     size: int  # the default size
-    make: Make
+    make: SampleMaker
     """Returns mesh or grid, case and displacement, by name, size and variant, and whether a grid
     is written to its file block by block: it may be larger then."""
     variants: tuple[str, ...] = ("motion",)
@@ -77,7 +77,7 @@ def sample_case(name: str) -> Case:
     return case_of_text(Path(f"{name}.cfg"), text, Case()).change(source=None)
 
 
-def _by_file(mesh_of_size: Callable[[int], Mesh]) -> Make:
+def _by_file(mesh_of_size: Callable[[int], Mesh]) -> SampleMaker:
     """Return the function that makes a sample of one variant, whose case is a file."""
     return lambda name, size, *_: (mesh_of_size(size), sample_case(name), None)
 
