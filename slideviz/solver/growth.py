@@ -23,7 +23,7 @@ from slideviz.rbf.problem import Solution
 from slideviz.rbf.rims import Rims
 from slideviz.solver.domain import Domain, find_domain, roles_of_copies
 from slideviz.solver.prescribed import displaced, motion_messages
-from slideviz.solver.remedies import KEEPS_RIMS
+from slideviz.solver.remedies import SLIDE_RIMS
 from slideviz.solver.rims import find_rims, on_walls, rims_key
 from slideviz.solver.setup import Setup
 from slideviz.system.threads import in_parts
@@ -189,7 +189,7 @@ def wall_warnings(setup: Setup, case: Case, mesh: Mesh, points: FloatArray) -> l
     over the span, all nodes of a sliding hub or shroud. ``points`` (n, d): deformed.
     """
     farthest: dict[tuple[str, str], _OffWall] = {}
-    kept = "", KEEPS_RIMS
+    kept = "", f"{SLIDE_RIMS} keeps such nodes on it"
     if case.rims == "slide":
         kept = ", to which it cannot be brought back", "move it less"
     fixed = _fixed_rims(case, mesh, setup)
@@ -237,7 +237,7 @@ def _fixed_rims(case: Case, mesh: Mesh, domain: Domain) -> Rims | None:
 
 def _of_fixed(case: Case) -> tuple[str, str]:
     """Return the end of the sentence on a fixed wall that nodes left, and the remedy."""
-    slides = "" if case.rims == "slide" else ", with RIMS= SLIDE"
+    slides = "" if case.rims == "slide" else f", with {SLIDE_RIMS}"
     return ", which is fixed", f"let that boundary slide{slides}, or move it less"
 
 

@@ -19,7 +19,7 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.solver.steps import Step
 from slideviz.terms import SLIDES
 
-KEEPS_RIMS = "RIMS= SLIDE keeps such nodes on it"  # the remedy where nodes left a wall
+SLIDE_RIMS = "RIMS= SLIDE"  # in the remedy of messages that nodes left a wall
 MOST_NAMES = 2  # most boundaries that a remedy names; of more it has the number
 
 
@@ -53,8 +53,8 @@ def remedies(
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if case.layers != "no" and case.layer_thickness:
         found.append(Remedy("LAYER_THICKNESS= AUTO", "an automatic thickness of the layers"))
-    if step and any("RIMS= SLIDE" in each.remedy for each in messages_of(step.messages)):
-        found.append(Remedy("RIMS= SLIDE", "“stay on walls” for nodes on walls"))
+    if step and any(SLIDE_RIMS in each.remedy for each in messages_of(step.messages)):
+        found.append(Remedy(SLIDE_RIMS, "“stay on walls” for nodes on walls"))
     if step and step.layers:
         given = case.reduction or Reduction()
         yes = "DATA_REDUCTION= YES with " if given.auto else ""
