@@ -192,17 +192,13 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
     check_size(mesh)
-    counted = slice(None) if mesh.halo is None else ~mesh.halo.cells
-    if mesh.whole_cells is not None and METRICS[name].where == "cells":
-        counted = np.diff(mesh.whole_cells, prepend=-1) > 0
     if METRICS[name].compares:
         if reference is None:
             raise CaseError(f"{name} compares with the undeformed mesh; give a reference")
         base = checked_reference(reference, mesh)
         key = name, None if base is mesh else base  # a key must not keep its own mesh alive
         values = _cached(mesh, key, lambda: {key: path_margins(mesh, base)})
-        values = _of_whole(mesh, name, values)
-        return MetricValues(name, values, values, counted)
+        return _of_cells(mesh, name, values)
     signs = reference_of(mesh if reference is None else reference)[1]
     turned = hash(signs.tobytes()) if (signs < 0).any() else 0
     values = _cached(
@@ -211,8 +207,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         lambda: {(each, turned): v for each, v in _FAMILIES[name](mesh, signs).items()},
     )
     if METRICS[name].where == "cells":
-        values = _of_whole(mesh, name, values)
-        return MetricValues(name, values, values, counted)
+        return _of_cells(mesh, name, values)
     place = ("cells", name, turned)
     best = METRICS[name].best
     of_cells = _cached(mesh, place, lambda: {place: _worst_of_nodes(mesh, values, best)})
@@ -265,13 +260,15 @@ def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no
         found[i] = worst
 
 
-def _of_whole(mesh: Mesh, name: Metric, values: FloatArray) -> FloatArray:
-    """Return values (m,) in which each part of a polyhedron has the worst of its parts."""
+def _of_cells(mesh: Mesh, name: Metric, values: FloatArray) -> MetricValues:
+    """Return a metric of cells (m,) in which parts of a polyhedron have the worst of these."""
     if mesh.whole_cells is None:
-        return values
+        counted = slice(None) if mesh.halo is None else ~mesh.halo.cells
+        return MetricValues(name, values, values, counted)
     first = np.diff(mesh.whole_cells, prepend=-1) > 0
     worst = np.minimum if METRICS[name].best == "high" else np.maximum
-    return sealed(worst.reduceat(values, np.flatnonzero(first))[np.cumsum(first) - 1])
+    values = sealed(worst.reduceat(values, np.flatnonzero(first))[np.cumsum(first) - 1])
+    return MetricValues(name, values, values, first)
 
 
 Made = Mapping[Metric, FloatArray]  # metrics that are computed together, with their values
