@@ -161,7 +161,7 @@ def path_error(path: Path, message: str) -> MeshError:
     return MeshError(Message(message, place=(path,)))
 
 
-_ROUNDING = 1e-10  # ratio of a coordinate to the extent below which it is a rounding error of zero
+ROUNDING = 1e-10  # ratio of a number to a scale below which it is a rounding error of zero
 
 
 def point_words(point: Iterable[float], extent: float = 0.0, digits: int = 6) -> str:
@@ -171,7 +171,7 @@ def point_words(point: Iterable[float], extent: float = 0.0, digits: int = 6) ->
     are 0.
     """
     values = tuple(point)
-    least = _ROUNDING * max(extent, *map(abs, values), 0.0)
+    least = ROUNDING * max(extent, *map(abs, values), 0.0)
     return ", ".join(f"{0.0 if abs(v) <= least else v:.{digits}g}" for v in values)
 
 

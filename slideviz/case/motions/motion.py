@@ -14,7 +14,7 @@ import numpy as np
 from slideviz.argument_types import CheckedFields
 from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.words import Word, name_text
-from slideviz.errors import CaseError, Doubt, Message
+from slideviz.errors import ROUNDING, CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
 from slideviz.terms import AXES, Term, Vector
 
@@ -33,8 +33,6 @@ ALL_MOVING = "*"  # what stands for the markers of an empty target
 
 ALONG = 1e-12
 """A direction is along an axis where the cosine of their angle differs from 1 by less than this."""
-NOTHING = 1e-10
-"""A coordinate smaller than this part of the mesh's extent is written as 0: it is rounding."""
 _PREFIXES = {"vector": "", "point": "point_", "axis": "axis_", "factors": "factor_"}
 """Prefixes of the names of components, by field, where they are not the field's name."""
 
@@ -341,7 +339,7 @@ def place_words(point: Point, extent: float = 0.0, form: str = ".4g", its: str =
     """Return a point as text, or ``its centroid``."""
     if isinstance(point, str):
         return f"{its} {point}"
-    return vector_words([v if abs(v) >= NOTHING * extent else 0.0 for v in point], form)
+    return vector_words([v if abs(v) >= ROUNDING * extent else 0.0 for v in point], form)
 
 
 def pronoun(target: Target) -> str:

@@ -19,7 +19,7 @@ from qtpy.QtGui import (
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QStackedWidget, QTableView
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.errors import point_words
+from slideviz.errors import ROUNDING, point_words
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
@@ -30,7 +30,6 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
 )
-from slideviz.gui.widgets.fields import NOTHING
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
@@ -493,7 +492,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     """
     assert session.frame is not None
     info = cell_info(session.frame, cell)
-    least = NOTHING * session.frame.mesh.extent
+    least = ROUNDING * session.frame.mesh.extent
     position = np.where(np.abs(info.position) > least, info.position, 0.0)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"

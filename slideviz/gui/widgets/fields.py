@@ -15,7 +15,7 @@ from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal, SignalInsta
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValidator, QWheelEvent
 from qtpy.QtWidgets import QApplication, QLabel, QLineEdit, QSizePolicy, QSpinBox, QWidget
 
-from slideviz.errors import SlidevizError
+from slideviz.errors import ROUNDING, SlidevizError
 from slideviz.gui.widgets.build import in_row, set_style, wrapped
 from slideviz.gui.widgets.services import main_window
 
@@ -66,12 +66,11 @@ def number_text(value: float) -> str:
 
 
 SHORT = 8  # length of a text up to which a number is shown with all its digits
-NOTHING = 1e-10  # ratio of a number to a scale below which it counts as a rounding error of zero
 
 
 def short_text(value: float, scale: float = 0.0) -> str:
     """Return a number as text: ``0`` if tiny beside ``scale``, all digits if few, else six."""
-    if abs(value) < NOTHING * abs(scale) or value == 0:
+    if abs(value) < ROUNDING * abs(scale) or value == 0:
         return "0"
     exact = number_text(value)
     return exact if len(exact) <= SHORT else f"{float(value):.6g}"
