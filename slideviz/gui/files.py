@@ -315,9 +315,11 @@ class Files(QObject):
 
     def _beside(self, ending: str) -> Path:
         """Return the name of the open case or session, with another ending."""
-        source = self.window.store.session.case.source or self.folder() / self.stem()
-        folder = self.folder() if sample_folder() in source.parents else source.parent
-        return folder / f"{source.stem}{ending}"
+        source = self.window.store.session.case.source
+        folder = self.folder()
+        if source is not None and sample_folder() not in source.parents:
+            folder = source.parent
+        return folder / f"{self.stem()}{ending}"
 
     def save_session(self, then: Callable[[], object] | None = None) -> None:
         """Ask for a file name and start the job that writes the session: case, runs, designs.

@@ -9,11 +9,13 @@ from qtpy.QtWidgets import QFileDialog
 
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.export.picture_options import PictureOptions
+from slideviz.formats.files import write
 from slideviz.gui.files import sample_folder
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.session import changes
 from slideviz.session.design_table import DesignTable
+from tests.builders import square
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
 
@@ -137,6 +139,14 @@ def test_a_session_with_its_mesh_needs_no_other_file(left, answers, tmp_path):
     asked = answers("ask_save", None)
     left.window.files.save_case()
     assert asked[0][1] == tmp_path / "alone.cfg"
+
+
+def test_a_name_with_dots_is_offered_whole(driver, answers, tmp_path):
+    write(tmp_path / "wing.v2.su2", square())
+    driver.open(tmp_path / "wing.v2.su2")
+    asked = answers("ask_save", None)
+    driver.window.files.save_case()
+    assert asked[0][1] == tmp_path / "wing.v2.cfg"
 
 
 def test_a_damaged_file_is_told_and_the_window_stays_as_it_is(left, answers, tmp_path):
