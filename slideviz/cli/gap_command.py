@@ -30,7 +30,7 @@ def main(arguments: Namespace) -> int:
     before = gaps(case, mesh, arguments.between)
     if not before:
         names = dict.fromkeys((*case.markers_with("moving"), *mesh.marker_names))
-        none = "there is no gap at hub or shroud"
+        none = "there is no gap at its ends"
         if mesh.dim == 2:
             none = "tip gaps by span are for 3D meshes"
         raise CaseError(
@@ -68,8 +68,7 @@ def main(arguments: Namespace) -> int:
             why = (
                 "in 2D each distance is one number, not a curve; leave out -o"
                 if mesh.dim == 2
-                else "without hub and shroud there are no curves over the span; set SPAN, or leave "
-                "out -o"
+                else "there are no curves over the span; set SPAN, or leave out -o"
             )
             raise CaseError(f"{mesh_file}: {why}")
         _draw(arguments.output, before, after)

@@ -224,7 +224,7 @@ def _span_between(
     tables = [np.searchsorted(nodes, table) for table in facets]
     if not period < WHOLE and not turn_about_axis(local, tables):
         raise MeshError(
-            f"{mesh.name}: hub {hub!r} and shroud {shroud!r} do not turn about the axis "
+            f"{mesh.name}: {hub!r} and {shroud!r} do not turn about the axis "
             f"{tuple(axis)} through {tuple(origin)}, and a span needs an axis; correct "
             "PERIODIC_AXIS and PERIODIC_ORIGIN, name the periodic sides of a passage, or give the "
             "direction of a straight span by SPAN_AXIS, e.g. SPAN_AXIS= y"

@@ -145,9 +145,9 @@ class Section:
     half_angle_deg: float = 0.0
     """The half angle of the cone; 0 for others."""
     span: float = 0.0
-    """The constant span, 0 at the hub to 1 at the shroud; 0 for other shapes."""
+    """The constant span, 0 at hub or root to 1 at shroud or tip; 0 for other shapes."""
     walls: SpanWalls | None = None
-    """Hub and shroud of a section of constant span: it cuts nothing without."""
+    """The ends of the span, for a section of constant span: it cuts nothing without."""
 
     terms: ClassVar[ShapeTerms]  # names, numbers and words of the shape
     directed: ClassVar[bool] = True
@@ -278,7 +278,7 @@ class Section:
 
     def needs(self, dim: int) -> str:
         """Return in words what a section needs that cannot cut meshes of ``dim`` dimensions."""
-        return "needs a 3D mesh" if dim == 2 else "needs hub and shroud"
+        return "needs a 3D mesh" if dim == 2 else "needs hub and shroud, or root and tip"
 
     def describe(self, dim: int = 3) -> str:
         """Return the section in words: in 2D as a line or a circle."""

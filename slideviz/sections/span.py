@@ -1,8 +1,8 @@
-"""The surface of constant span between two walls, a shape of sections: hub 0, shroud 1.
+"""The surface of constant span between two walls, a shape of sections.
 
-It is laid flat to (m', theta), which keeps angles. The first line of a function says what it is for
-this shape; shapes of arrays are in `slideviz.sections.shape` and
-`slideviz.sections.around_axis.AboutAxis`.
+The span is 0 at hub or root, 1 at shroud or tip. About an axis it is laid flat to (m', theta),
+which keeps angles. The first line of a function says what it is for this shape; shapes of arrays
+are in `slideviz.sections.shape` and `slideviz.sections.around_axis.AboutAxis`.
 """
 
 from __future__ import annotations
@@ -175,7 +175,8 @@ class ConstantSpan(AboutAxis):
         """Return the walls; CaseError where none are known."""
         if self.walls is None:
             raise CaseError(
-                "a section of constant span needs hub and shroud: name them in SPAN or --between"
+                "a section of constant span needs hub and shroud, or root and tip: name them in "
+                "SPAN or --between"
             )
         return self.walls
 
@@ -228,9 +229,8 @@ class ConstantSpan(AboutAxis):
         return self.sized(self.size_terms.usual)
 
     def words(self) -> str:
-        walls = self.walls
-        between = "hub to shroud" if walls is None else walls.words
-        return f"{self.few_words()} from {between}"
+        between = "" if self.walls is None else f" from {self.walls.words}"
+        return f"{self.few_words()}{between}"
 
     def few_words(self) -> str:
         return f"{100.0 * self.span:.6g} % span"

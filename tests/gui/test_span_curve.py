@@ -178,7 +178,7 @@ def test_a_motion_over_the_span_is_dragged_typed_and_undone(editor, driver, qtbo
 @pytest.mark.parametrize(
     ("typed", "rule"),
     [
-        ("0:0, 2:3", "the spans 0, 2 do not ascend from 0 (hub) to 1 (shroud)"),
+        ("0:0, 2:3", "the spans 0, 2 do not ascend from 0 to 1; sort"),
         ("0:0, 1:x", "'x' is not a number"),
         ("abc", "'abc' is not a number"),
         ("0:0, 1", "'0:0, 1' is not a curve over the span; write span:value"),

@@ -111,9 +111,9 @@ def test_periods_about_its_axis_keep_it():
 
 def test_without_walls_it_cuts_nothing():
     assert not can_cut(passage(), HALF)
-    assert HALF.needs(3) == "needs hub and shroud"
+    assert HALF.needs(3) == "needs hub and shroud, or root and tip"
     assert HALF.needs(2) == "needs a 3D mesh"
-    with pytest.raises(CaseError, match="needs hub and shroud: name them in SPAN"):
+    with pytest.raises(CaseError, match="needs hub and shroud, or root and tip: name them in SPAN"):
         HALF.distance(np.zeros((1, 3)))
     with pytest.raises(CaseError, match="the span 1 is not below 1; give a number between 0"):
         replace(HALF, span=1.0)

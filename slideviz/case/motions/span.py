@@ -41,8 +41,8 @@ _SECTIONS = WeakCache()
 class SpanMotion(Motion):
     """Change the sections of a blade, each at its span, by a curve over the span.
 
-    The curve is the monotone cubic through ``values`` at ``spans``, from 0 at the hub to 1 at the
-    shroud, and constant beyond them; a single value holds for the whole span. By ``kind``:
+    The curve is the monotone cubic through ``values`` at ``spans``, from 0 at hub or root to 1
+    at shroud or tip, and constant beyond them; a single one holds for the whole span. By ``kind``:
 
     * ``twist``, ``stagger``: turned about the stacking line, in degrees, from the direction of m
       towards that of growing theta; ``stagger`` has a single value.
@@ -88,8 +88,8 @@ class SpanMotion(Motion):
             )
         if not (spans[0] >= 0.0 and spans[-1] <= 1.0) or (np.diff(spans) <= 0.0).any():
             raise CaseError(
-                f"the spans {', '.join(f'{span:g}' for span in spans)} do not ascend from 0 (hub) "
-                "to 1 (shroud); sort them, each once"
+                f"the spans {', '.join(f'{span:g}' for span in spans)} do not ascend from 0 to "
+                "1; sort them, each once"
             )
         if self.kind == "stagger" and len(spans) > 1:
             raise CaseError("stagger has one angle for the whole span; a curve of them is a twist")

@@ -44,7 +44,7 @@ TIPS = {
     "reach": "Lowest quality against the fraction of the run's motion, and up to where all cells "
     "are proved valid. Drag to scale the motion.",
     "greedy": "Largest error against control nodes, as the greedy selection adds them.",
-    "span": "Quality in layers from hub to shroud, or along an axis.",
+    "span": "Quality in layers over the span, or along an axis.",
     "meridional": "Mean of the cells around the axis, by their place in the plane of z and r.",
     "gaps": "Smallest distance between neighbouring blades by span, and between blades and walls.",
 }

@@ -143,8 +143,8 @@ ROWS: dict[str, FormRow] = {
         {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()},
         {kind: term.tip for kind, term in SPAN_KINDS.items()})),
     "curve": FormRow("Over span", "spans", lambda: CheckedText(
-        str, "Values at parts of the span, from 0 at the hub to 1 at the shroud: 0:0, 0.5:1.5, "
-        "1:4; or one value for all. A smooth curve goes through them.")),
+        str, "Values at parts of the span, from 0 at hub or root to 1 at shroud or tip: 0:0, "
+        "0.5:1.5, 1:4; or one value for all. A smooth curve goes through them.")),
     "about": FormRow("About", "point", _choice(
         "What stays in place while it turns or grows.",
         {what: ABOUT[what] for what in ("centroid", "point")})),
