@@ -25,6 +25,7 @@ from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import first_section, position_range
 from slideviz.session.state import StepFrame
 from tests.builders import box_rules, grid
+from tests.design.test_span_variables import checked_gradient, errors_of_derivatives
 
 SHAPE = (6, 6, 6)
 
@@ -167,26 +168,12 @@ def test_derivatives_agree_with_differences_and_each_other():
     case = case_of(*ALL, roles=roles, sliding="ps", reduction=None)
     design = sv.SpanVariables(mesh, case)
     rng = np.random.default_rng(1)
-    values = design.values * (1.0 + 0.1 * rng.normal(size=len(design.values)))
-    for k in range(len(values)):
-        step = np.zeros(len(values))
-        step[k] = 1e-4 * max(abs(values[k]), 0.01)
-        ahead, back = (design.displacement(values + sign * step) for sign in (1.0, -1.0))
-        exact = design.jvp(values, step)
-        assert np.abs(0.5 * (ahead - back) - exact).max() < 1e-6 * np.abs(exact).max()
-    step, weights = rng.normal(size=len(values)), rng.normal(size=exact.shape)
-    forward = np.vdot(weights, design.jvp(values, step))
-    assert design.vjp(values, weights) @ step == pytest.approx(forward, rel=1e-12)
+    assert all(wrong.max() < 1e-6 for wrong in errors_of_derivatives(design, rng))
     # And through the mesh, whose root slides.
     deformer = sv.Deformer(mesh, case)
     weights = rng.normal(size=mesh.points.shape)
-    gradient = design.vjp(design.values, deformer.vjp(deformer.displacement, weights))
-    step = 1e-3 * step
-    ahead, back = (
-        np.vdot(weights, deformer.deform(design.displacement(design.values + sign * step)))
-        for sign in (1.0, -1.0)
-    )
-    assert gradient @ step == pytest.approx(0.5 * (ahead - back), rel=1e-6)
+    step = 1e-3 * rng.normal(size=len(design.values))
+    gradient = checked_gradient(design, deformer, weights, step)
     tangent = deformer.jvp(deformer.displacement, design.jvp(design.values, step))
     assert np.vdot(weights, tangent) == pytest.approx(gradient @ step, rel=1e-12)
 
