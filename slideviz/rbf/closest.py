@@ -151,8 +151,8 @@ def _on_triangle(x, corners):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _before(a, b):  # type: ignore[no-untyped-def]
-    """Return whether point a comes before b along a direction that no symmetry of a mesh has."""
-    return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
+    """Return whether point a comes before b along `NO_SYMMETRY`."""
+    return dot3(minus3(a, b), NO_SYMMETRY) < 0.0
 
 
 @njit(inline="always")
@@ -162,8 +162,8 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     Where facets meet, the end of one facet ties with a point of the next facet that is 1e-6 of the
     distance away: there the nearer point is taken, however little it is nearer.
     """
-    apart = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
-    return apart <= 4.0 * TIE * gap
+    apart = minus3(a, b)
+    return dot3(apart, apart) <= 4.0 * TIE * gap
 
 
 @njit(inline="always")
