@@ -18,6 +18,7 @@ from slideviz.case.lines import LARGEST, read_text
 from slideviz.cli import run
 from slideviz.errors import CaseError, MeshError, SlidevizError
 from slideviz.formats import files
+from slideviz.formats.openfoam import foam_file
 from slideviz.session import jobs, session_file
 from slideviz.session.design_table import MOST, DesignTable
 from slideviz.system.file_checks import read_json
@@ -60,6 +61,7 @@ def test_the_page_states_the_limits_of_the_code():
     assert (files._SECONDS, files._SECONDS_PER_BYTE) == (20, 20e-6)
     assert (files._MEMORY, files._MEMORY_PER_BYTE) == (8 << 30, 200)
     assert session_file._LARGEST_TEXT == 100_000_000
+    assert (foam_file.UNPACKED, foam_file._SPARE) == (200, 1 << 20)
     assert "private advisories of GitHub" in PAGE
     assert not re.search(r"[\w.]+@[\w.]+", PAGE)
 

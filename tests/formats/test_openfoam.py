@@ -364,6 +364,16 @@ def test_binary_lists_that_lie(tmp_path):
         sv.read(case)
 
 
+@pytest.mark.parametrize("name", ["..", ".", "../../other/constant/solid", "/", "/else", "solid/"])
+def test_regions_of_other_folders_are_not_read(tmp_path, name):
+    regions_case(tmp_path / "other")
+    case = regions_case(tmp_path / "case")
+    file = case / "constant" / "regionProperties"
+    file.write_text(file.read_text().replace("(solid)", f"({name})"))
+    with pytest.raises(MeshError, match="regionProperties: names a region of another folder, "):
+        sv.read(case)
+
+
 def test_a_compressed_file_that_bursts(tmp_path):
     case = write_mesh(tmp_path, grid((2, 2, 2)), form=Form(packed=True))
     path = case / POLY / "faces.gz"

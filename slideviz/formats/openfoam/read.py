@@ -58,6 +58,13 @@ def read_polymesh(path: Path, zone: int | None, progress: Tick) -> Mesh:
     file = read_foam_file(path)
     lists = re.findall(rb"\(([^()]*)\)", file.data[file.begin :])
     names = [name.decode("utf-8", "backslashreplace") for text in lists for name in text.split()]
+    for name in names:
+        if Path(name).name != name or name == "..":
+            raise path_error(
+                path,
+                f"names a region of another folder, {printable(name)!r}, which is not read; put it "
+                "into the same folder",
+            )
     numbers = range(1, len(names) + 1) if zone is None else (zone,)
     if not names or not 1 <= numbers[0] <= len(names):
         raise path_error(path, f"there is no zone {zone or 1}: its regions are {', '.join(names)}")
