@@ -80,7 +80,7 @@ def unit_does_not_matter(deform: Deform, same: float) -> Law:
 def scaled(case: Case) -> Case:
     """Return a case for the mesh in another unit of length."""
     reduction = case.reduction
-    if reduction is not None and reduction != "auto" and hasattr(reduction, "tolerance"):
+    if reduction is not None:
         reduction = replace(reduction, tolerance=SCALE * reduction.tolerance)
     return case.change(
         motions=tuple(map(_scaled, case.motions)),
