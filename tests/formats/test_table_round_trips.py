@@ -180,6 +180,16 @@ def test_names_of_boundaries_that_a_file_cannot_have(tmp_path):
     assert read(tmp_path / "out.msh").marker_names[3] == "in 'side'"
 
 
+@pytest.mark.parametrize("names", [("wall", "wall_2"), ("wall_2", "wall")])
+def test_boundaries_of_several_types_keep_names_that_differ_by_a_number(names, tmp_path):
+    mesh = grid((3, 3, 3), kind="mixed")
+    renamed = zip((*"abcd", *names), mesh.markers, strict=True)
+    mesh = replace(mesh, markers=tuple(Marker(name, one.cells) for name, one in renamed))
+    assert len(mesh.markers[-1].cells.by_type) == 2
+    write(tmp_path / "out.cgns", mesh)
+    assert_same(mesh, read(tmp_path / "out.cgns"), tmp_path / "out.cgns")
+
+
 def test_a_boundary_without_elements_is_left_out_of_a_cgns_file(tmp_path):
     mesh = cube(2, block=False)
     none = Marker("none", Cells.from_types([], []))

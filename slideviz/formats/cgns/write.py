@@ -5,8 +5,6 @@ The nodes are those of the SIDS (CGNS 4), mapped onto HDF5 as in `slideviz.forma
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import h5py
 import numpy as np
 from numpy.typing import NDArray
@@ -35,20 +33,16 @@ def write_tree(tree: h5py.File, mesh: Mesh) -> None:
     grid = _add(zone, "GridCoordinates", "GridCoordinates_t")
     for axis, values in zip("XYZ", mesh.points.T, strict=False):
         _add(grid, f"Coordinate{axis}", "DataArray_t", np.ascontiguousarray(values))
-    first = 1
-    for name, vtk, nodes in _sections("Cells", mesh.cells):
-        first = _add_section(zone, name, vtk, nodes, first)
+    first = _add_sections(zone, "Cells", mesh.cells, 1)
     conditions = _add(zone, "ZoneBC", "ZoneBC_t")
-    taken = {"Zone", "ZoneBC", "ZoneType", "GridCoordinates", *zone}
+    taken = {"Zone", *zone}
     for marker in mesh.markers:
         clean = marker.name.replace("/", "_")[: MOST_LETTERS - 3]
         family = free_name(clean, taken)
         taken.add(family)
         _add(_add(base, family, "Family_t"), "FamilyBC", "FamilyBC_t", "UserDefined")
         start = first
-        for name, vtk, nodes in _sections(family, marker.cells):
-            taken.add(name)
-            first = _add_section(zone, name, vtk, nodes, first)
+        first = _add_sections(zone, family, marker.cells, first)
         if first == start:
             continue
         one = _add(conditions, family, "BC_t", "FamilySpecified")
@@ -57,19 +51,15 @@ def write_tree(tree: h5py.File, mesh: Mesh) -> None:
         _add(one, "FamilyName", "FamilyName_t", family)
 
 
-def _sections(name: str, cells: Cells) -> Iterator[tuple[str, int, NDArray]]:
-    """Yield name, type and nodes of the elements of each type."""
-    for number, (vtk, (_, nodes)) in enumerate(cells.by_type.items(), 1):
-        yield name if number == 1 else f"{name}_{number}", vtk, nodes
-
-
-def _add_section(zone: h5py.Group, name: str, vtk: int, nodes: NDArray, first: int) -> int:
-    """Add elements, numbered from ``first``; return the number of the next."""
-    kind = next(number for number, one in TYPES.items() if one == vtk)
-    section = _add(zone, name, "Elements_t", np.array([kind, 0], "i4"))
-    _add(section, "ElementRange", "IndexRange_t", np.array([first, first + len(nodes) - 1]))
-    _add(section, "ElementConnectivity", "DataArray_t", (nodes + 1).ravel())
-    return first + len(nodes)
+def _add_sections(zone: h5py.Group, name: str, cells: Cells, first: int) -> int:
+    """Add the elements of each type, numbered from ``first``; return the number of the next."""
+    for vtk, (_, nodes) in cells.by_type.items():
+        kind = next(number for number, one in TYPES.items() if one == vtk)
+        section = _add(zone, free_name(name, zone), "Elements_t", np.array([kind, 0], "i4"))
+        _add(section, "ElementRange", "IndexRange_t", np.array([first, first + len(nodes) - 1]))
+        _add(section, "ElementConnectivity", "DataArray_t", (nodes + 1).ravel())
+        first += len(nodes)
+    return first
 
 
 def _add(
