@@ -43,7 +43,6 @@ def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
     Flat walls alone, as those beside a wing, have no axis. ``local`` (n, 3): Cartesian, in the
     frame of the axis. ``walls``: facets (f, 4) of each.
     """
-    flat = [plane_normal(local, facets) is not None for facets in walls]
     for facets in walls:
         vectors = facet_vectors(local, facets)
         middles = local[facets].mean(axis=1)
@@ -53,7 +52,8 @@ def turn_about_axis(local: FloatArray, walls: Sequence[IntArray]) -> bool:
         along_theta = across / np.where(normal > 0.0, normal, 1.0)
         if np.sqrt(np.average(along_theta**2, weights=size)) > TURNED:
             return False
-    return not all(flat) or all(_is_ring(local[np.unique(facets)]) for facets in walls)
+    curved = any(plane_normal(local, facets) is None for facets in walls)
+    return curved or all(_is_ring(local[np.unique(facets)]) for facets in walls)
 
 
 def plane_normal(points: FloatArray, facets: IntArray) -> FloatArray | None:
