@@ -77,7 +77,7 @@ def _ends_of_wing(
     if mesh.dim != 3:
         return None
     points = mesh.points
-    wing = np.concatenate([mesh.marker(name).nodes for name in moving])
+    wing = mesh.nodes_of(moving)
     flat = dict[str, FloatArray]()
     for name in mesh.marker_names:
         if name in (*moving, *periodic) or not np.isin(mesh.marker(name).nodes, wing).any():
