@@ -311,10 +311,8 @@ def _turns(case: Case, mesh: Mesh, field: Span, triangles: IntArray) -> FloatArr
     """
     out = np.zeros(len(mesh.points))
     pairs = periodic_pairs(case, mesh)
-    if pairs:
-        period = abs(field.shift(pairs[0]))
-        if period == 0.0:  # passages repeat along the span
-            return out
+    period = abs(field.shift(pairs[0])) if pairs else 0.0
+    if period != 0.0:  # 0 where passages repeat along the span
         images = [p.nodes if field.shift(p) > 0.0 else p.nodes[:, ::-1] for p in pairs]
         for body in bodies(triangles, np.unique(np.concatenate(images), axis=0)):
             out[triangles[body.facets]] = period * body.turns[:, None]
