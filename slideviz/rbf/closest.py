@@ -12,6 +12,7 @@ from numba import prange
 
 from slideviz.mesh.jacobians import add3, dot3, minus3, row3, scaled3
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
+from slideviz.mesh.nearest import OBLIQUE
 from slideviz.mesh.planes import partition
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.system.jit_cache import njit
@@ -27,7 +28,6 @@ TURNS = 2.0**30
 EDGE = 1e-9
 """A closest point is on the side of a triangle where the opposite corner has at most this part in
 it."""
-NO_SYMMETRY = (1.0, 0.6180339887, 0.4142135624)  # a direction in which points of a mesh differ
 
 
 @njit(inline="always")
@@ -151,8 +151,8 @@ def _on_triangle(x, corners):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _before(a, b):  # type: ignore[no-untyped-def]
-    """Return whether point a comes before b along `NO_SYMMETRY`."""
-    return dot3(minus3(a, b), NO_SYMMETRY) < 0.0
+    """Return whether point a comes before b along `OBLIQUE`."""
+    return dot3(minus3(a, b), OBLIQUE) < 0.0
 
 
 @njit(inline="always")
@@ -381,7 +381,7 @@ def _on_rim(corners: FloatArray, rim: FloatArray) -> BoolArray:
     """
 
     def keys(points: FloatArray) -> FloatArray:
-        return np.asarray(sum(points[..., k] * NO_SYMMETRY[k] for k in range(points.shape[-1])))
+        return np.asarray(sum(points[..., k] * OBLIQUE[k] for k in range(points.shape[-1])))
 
     def among(points: FloatArray, others: FloatArray) -> BoolArray:
         return np.isin(keys(points), keys(others))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, row_dots, row_norms
+from slideviz.mesh.nearest import OBLIQUE
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import (
@@ -111,13 +112,13 @@ def newton(
 def tie_breaker(coords: FloatArray) -> FloatArray:
     """Return a factor for the error of each candidate, (c,), that decides between equal errors.
 
-    It grows from 1 to 1 + TIE along a direction that no symmetry of a mesh is likely to have: no
-    sum of whole multiples of its components is zero, so no two points of a grid get the same.
+    It grows from 1 to 1 + TIE along `OBLIQUE`: no sum of whole multiples of its components is zero,
+    so no two points of a grid get the same.
     ``coords`` (c, d): positions of the candidates in the frame.
     """
     if not len(coords):
         return np.empty(0)
-    along = coords @ np.array([1.0, 0.6180339887, 0.4142135624])[: coords.shape[1]]
+    along = coords @ OBLIQUE[: coords.shape[1]]
     low = along.min()
     high = along.max()
     return 1.0 + TIE * (along - low) / max(high - low, 1e-300)
