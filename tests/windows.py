@@ -1,6 +1,5 @@
 """Windows of tests on a screen."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 from qtpy.QtGui import QGuiApplication
@@ -20,4 +19,4 @@ def come_to_rest() -> None:
 def services(flown: list) -> SimpleNamespace:
     """Return what a panel needs of a window; ``flown`` gets the cells that the view flies to."""
     viewing = SimpleNamespace(fly_to=flown.append, fly_back=lambda: flown.append("back"))
-    return SimpleNamespace(store=Store(), viewing=viewing, files=SimpleNamespace(folder=Path.home))
+    return SimpleNamespace(store=Store(), viewing=viewing)
