@@ -158,9 +158,8 @@ def save_steps(
 def intersection_key(session: Session) -> tuple[object, ...]:
     """Return the values on which the check depends: its result holds while they are the same."""
     case = session.case
-    around = case.around_span, case.interfaces
-    rims = case.rims, case.feature_angle_deg
-    return (session.mesh, case.motions, case.periodic, case.sliding, *around, *rims)
+    around = case.around_span, case.periodic, case.interfaces
+    return session.mesh, case.motions, around, case.sliding, case.rims, case.feature_angle_deg
 
 
 def find_intersection(
