@@ -82,7 +82,7 @@ def test_meshio_reads_the_same(ending, tmp_path):
 
 def test_the_bytes_of_ugrid_have_the_order_that_the_name_says(tmp_path):
     mesh = cube(2, block=False)
-    for ending, order in ((".b8.ugrid", ">"), (".lb8.ugrid", "<")):
+    for ending, order in ((".b8.ugrid", ">"), (".lb8.ugrid", "<"), (".LB8.UGRID", "<")):
         write(tmp_path / f"out{ending}", mesh)
         data = (tmp_path / f"out{ending}").read_bytes()
         assert np.frombuffer(data[:28], f"{order}i4").tolist() == [27, 0, 24, 0, 0, 0, 8]

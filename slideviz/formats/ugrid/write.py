@@ -13,6 +13,7 @@ import numpy as np
 
 from slideviz.errors import path_error
 from slideviz.formats.meshio.write import boundary_blocks
+from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Mesh
@@ -28,7 +29,7 @@ def write_ugrid(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as UGRID, whose boundaries are numbers; raise MeshError if it cannot be."""
     check_mesh(mesh)
     require_ugrid(mesh, path)
-    order = "<" if path.suffixes[-2:-1] == [".lb8"] else ">"
+    order = "<" if ending_of(path) == ".lb8.ugrid" else ">"
     write_blocks(path, _blocks(mesh, order), options)
 
 
