@@ -18,7 +18,7 @@ from pathlib import Path
 from slideviz import __version__
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
-from slideviz.system.atomic import atomic_write
+from slideviz.system.atomic import write_whole
 from slideviz.system.libraries import OPENGL, apt_install, missing_for_window
 from slideviz.system.platform import free_memory
 
@@ -71,8 +71,7 @@ def main(arguments: Namespace) -> int:
     if to_terminal:
         print(text)
     elif arguments.json is not None:
-        with atomic_write(arguments.json, CaseError) as file:
-            file.write(f"{text}\n".encode())
+        write_whole(arguments.json, f"{text}\n", CaseError)
     return DONE
 
 
