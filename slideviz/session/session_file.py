@@ -27,6 +27,8 @@ from slideviz.argument_types import annotations_of, origin_of
 from slideviz.case.cfg import case_of_text, case_text
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, SlidevizError, printable
+from slideviz.formats.openfoam_paths import ENDING as FOAM
+from slideviz.formats.openfoam_paths import ending_of
 from slideviz.mesh.model import Mesh
 from slideviz.session.changes import show_frame
 from slideviz.session.design_table import DesignTable
@@ -125,8 +127,14 @@ def write_session(
     """Write a session file, whole or not at all.
 
     ``copied`` are the files of the case that it is to contain. ``going_on`` is called before each
-    array; what it raises ends the writing. Raises CaseError if the file cannot be written.
+    array; what it raises ends the writing. Raises CaseError if the file cannot be written, and for
+    a copy of a mesh that is several files.
     """
+    for file in copied:
+        if ending_of(file) == FOAM:
+            raise CaseError(
+                f"{file}: a mesh of OpenFOAM is several files; save the session without its mesh"
+            )
     copies = {file: f"files/{k}/{file.name}" for k, file in enumerate(copied)}
     source = session.case.source
     with atomic_write(path, CaseError, source) as out, ZipFile(out, "w", ZIP_STORED) as archive:

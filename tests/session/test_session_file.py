@@ -489,3 +489,11 @@ def test_a_picture_without_a_case_is_told(tmp_path, content):
 def test_a_picture_with_a_wrong_case_is_told(tmp_path):
     refused(picture(tmp_path / "a.png", "STEPS= many"), "STEPS: ")
     refused(picture(tmp_path / "a.png", "STEPS= 3"), "the case in it names no mesh")
+
+
+@pytest.mark.parametrize("name", ["points", "points.gz", "regionProperties"])
+def test_a_mesh_of_several_files_is_not_copied_in_part(left, tmp_path, name):
+    mesh = tmp_path / "constant" / "polyMesh" / name
+    with pytest.raises(CaseError, match="several files; save the session without its mesh"):
+        save(tmp_path / "a.slideviz", left, copied=[mesh])
+    assert not (tmp_path / "a.slideviz").exists()
