@@ -85,6 +85,17 @@ def in_dialog(do):
     QTimer.singleShot(20, reach)
 
 
+def wait_for_another(qtbot, dialog, before):
+    """Wait until a dialog's preview differs from an image; a failure says how far it came."""
+
+    def redrawn():
+        state = (dialog.soon.isActive(), dialog.drawer.busy, dialog.isVisible())
+        again = dialog.picture.pixmap().toImage()
+        assert again != before, f"(to be drawn, drawing, visible): {state}; {again.size()}"
+
+    qtbot.waitUntil(redrawn)
+
+
 def pixels(path):
     with Image.open(path) as image:
         return np.asarray(image.convert("RGBA")), image.info
@@ -127,7 +138,7 @@ def test_the_preview_follows_the_options(renderer, qtbot):
     assert white.width() <= dialog.picture.width()
     dialog.background.show_value("transparent")
     dialog.background.chosen.emit("transparent")
-    qtbot.waitUntil(lambda: dialog.picture.pixmap().toImage() != white)
+    wait_for_another(qtbot, dialog, white)
     assert dialog.picture_options.background == "transparent"
     dialog.reject()
 
@@ -474,7 +485,7 @@ def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
         assert len(ticks) > 15, "the event loop went on"
         before = dialog.picture.pixmap().toImage()
         dialog.options["title"].toggle()
-        qtbot.waitUntil(lambda: dialog.picture.pixmap().toImage() != before)
+        wait_for_another(qtbot, dialog, before)
         return False
 
     in_dialog(look)

@@ -78,7 +78,8 @@ def test_after_relaxation_the_lowest_qualities_are_raised_and_the_mean_stays(ang
     plain, lifted = last(case, mesh), last(case.change(repair="yes"), mesh)
     before, after = (sv.quality(step.mesh, mesh) for step in (plain, lifted))
     assert after.min >= before.min
-    assert after.min > before.min or before.min > 0.95  # where hardly anything is left to raise
+    enough = 0.9 * sv.quality(mesh, mesh).min  # above it hardly anything is left to raise
+    assert after.min > before.min or before.min >= enough
     assert after.mean >= before.mean - LOSS
     changed = (plain.mesh.points != lifted.mesh.points).any(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(changed), lifted.repaired.nodes)
