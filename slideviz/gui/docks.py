@@ -154,7 +154,7 @@ LOW_HEIGHT = 600
 
 TITLE_BAR_HEIGHT = 40  # height in pixels of a screen that is left for the window's title bar
 HEIGHTS = {
-    LEFT: {"boundaries": 240, "motion": 330, "run": 90},
+    LEFT: {"boundaries": 260, "motion": 352, "run": 48},
     RIGHT: {"histogram": 410, "runs": 290},
 }
 """Initial height of the docks on each side, relative to one another."""

@@ -10,19 +10,16 @@ from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
-from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
+from slideviz.gui.widgets.banner import Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import compute_streamed
 from slideviz.session.run_messages import (
-    inverted_words,
     limits_words,
     preview_words,
     remarks_of,
-    remedy_for,
     repair_words,
     run_requirements,
     stopped_words,
@@ -30,7 +27,7 @@ from slideviz.session.run_messages import (
     with_field_labels,
 )
 from slideviz.session.runs_words import method_words
-from slideviz.session.state import Run, Session, StepFrame, result_settings
+from slideviz.session.state import Run, StepFrame, result_settings
 from slideviz.session.store import Store
 from slideviz.session.walls_table import heights_words
 from slideviz.terms import PERIODIC_MODES
@@ -50,10 +47,6 @@ class Running(QObject):
     """The running job was asked to stop."""
     status_changed = Signal(str)
     """A message for the status bar."""
-    worst_wanted = Signal()
-    """The user wants to see the worst cell."""
-    limits_wanted = Signal()
-    """The user wants to see the limits."""
 
     def __init__(self, store: Store, banner: Banner, parent: QObject) -> None:
         super().__init__(parent)
@@ -63,10 +56,6 @@ class Running(QObject):
         self._finish: Callable[[Any], object] | None = None
         self._next: Callable[[], object] | None = None
         self._deforms = self._shows_design = False
-        # The number of the run that the banner is about.
-        self._about: int | None = None
-        banner.shown.connect(self._forget_run)
-        store.listen(self._hide_other)
         self.runner.progressed.connect(self.progressed)
         self.runner.progressed.connect(lambda doing: self.status_changed.emit(doing.text))
         self.runner.yielded.connect(lambda frames: store.change(changes.add_frames, frames))
@@ -222,20 +211,15 @@ class Running(QObject):
         words = stopped_words(run)
         log.info("cancelled%s", f": {words}" if words else "")
         self.status_changed.emit(words or "Cancelled")
-        if run is not None and words:
-            self.banner.show_message(words)
-            self._about = run.number
         self._start_next()
 
     @staticmethod
-    def _log_remarks(run: Run) -> list[str]:
-        """Write the notes and warnings of a run to the log; return its warnings."""
+    def _log_remarks(run: Run) -> None:
+        """Write the notes and warnings of a run to the log."""
         for note in remarks_of(run, "note"):
             log.info("%s", note)
-        warnings = list(remarks_of(run, "warning"))
-        for warning in warnings:
+        for warning in remarks_of(run, "warning"):
             log.warning("%s", warning)
-        return warnings
 
     def _failed(self, error: Exception) -> None:
         if self._deforms and isinstance(error, SlidevizError):
@@ -248,9 +232,8 @@ class Running(QObject):
         self._start_next()
 
     def _run_done(self, _: Any) -> None:
-        """Show the result of a finished run, with its warnings, and write both to the log."""
-        session = self.store.session
-        run = session.runs[-1]
+        """Show the result of a finished run, and write it to the log, with its warnings."""
+        run = self.store.session.runs[-1]
         if run.last is None:
             return
         quality = run.last.quality
@@ -270,35 +253,10 @@ class Running(QObject):
         if words := preview_words(run):
             text += f"; {words}"
         log.info("done: %s", text)
-        warnings = self._log_remarks(run)
-        bad = inverted_words(run)
-        if bad:
-            folding = None if session.outdated else session.folding
-            said = f"{bad}. {remedy_for(run, session.mesh, folding)}"
-            warnings = [said, *(each for each in warnings if each.rstrip(".") not in said)]
-        if missed:
-            warnings.insert(0, f"{missed}: {outcome(run.last.limits)}.")
+        self._log_remarks(run)
         if file is not None:
-            warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)
-        if warnings:
-            again = run.last.step is not None and run.last.step.repaired is None
-            show = {"Repair": self.repair} if bad and again and to_mend(session) else {}
-            show |= {"Show the worst": self.worst_wanted.emit} if bad else {}
-            show |= {"Show the limits": self.limits_wanted.emit} if missed else {}
-            calm = not bad and not missed
-            self.banner.show_message("\n".join(warnings), calm=calm, answers=show or NO_ANSWERS)
-            self._about = run.number
         self.status_changed.emit(f"Done: {text}")
-
-    def _forget_run(self, _: str) -> None:
-        self._about = None
-
-    def _hide_other(self, _: Session, new: Session) -> None:
-        """Hide the banner if it is about a run that is no longer shown."""
-        if self._about not in (None, new.shown):
-            self._about = None
-            self.banner.hide()
 
 
 def _steps_text(frame: StepFrame) -> str:

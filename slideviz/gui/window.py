@@ -44,7 +44,6 @@ from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
 from slideviz.gui.panels.run import RunPanel
-from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.threads import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
@@ -240,6 +239,7 @@ class MainWindow(Services):
         self.motions = panel(MotionPanel)
         self.method = panel(MethodPanel)
         self.run_panel = panel(RunPanel)
+        self.centre.insertWidget(0, self.run_panel.strip)
         self._make_status()
         self.actions_table = Actions(self)
         self._connect()
@@ -278,7 +278,7 @@ class MainWindow(Services):
         self.start.show_recent(self.files.recent())
         self.player = Player(self.store)
         parts = (self.banner, self.recovery_banner, stack, self.player)
-        in_column(*parts, wide=[stack], spacing=0, on=centre)
+        self.centre = in_column(*parts, wide=[stack], spacing=0, on=centre)
         self.setCentralWidget(centre)
 
     def _inputs(self) -> Mapping[Path, str]:
@@ -317,8 +317,6 @@ class MainWindow(Services):
             change.connect(lambda *_: self.sync_actions())
         running.status_changed.connect(self.show_status)
         self.viewing.status_changed.connect(self.show_status)
-        running.worst_wanted.connect(self._show_worst)
-        running.limits_wanted.connect(lambda: self.dock_manager.bring_to_front("limits"))
         panel.requirement_clicked.connect(self.focus_requirement)
         self.dock_manager.panel(DesignsPanel).changed.connect(self.sync_actions)
         self.start.file_wanted.connect(self.files.open_path)
@@ -436,10 +434,6 @@ class MainWindow(Services):
         panel = self.dock_manager.panels[missing.place]
         if isinstance(panel, Panel):
             panel.focus_requirement(missing)
-
-    def _show_worst(self) -> None:
-        self.dock_manager.bring_to_front("worst")
-        self.dock_manager.panel(WorstPanel).show_worst()
 
     def set_theme(self, name: str) -> None:
         """Change to a theme: ``light``, ``dark``, or ``system`` for that of the desktop."""

@@ -323,6 +323,12 @@ def set_case(session: Session, **values: Any) -> Session:
     return set_view(changed, sections=bound)
 
 
+@undoable("settings")
+def set_keys(session: Session, **keys: str) -> Session:
+    """Return the session with other values of some keys of its case, as texts."""
+    return replace(session, case=session.case.set(**keys))
+
+
 def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
     """Return the session with ``sentences`` on the invalid fields of the panel ``place``."""
     # The order of the panels does not count: two of them would change it in turns, for ever.

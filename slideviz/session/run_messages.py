@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from slideviz.case.check import check_case
 from slideviz.case.keys import KEYS
+from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import applies_to
 from slideviz.case.words import counted
-from slideviz.errors import Level, Message, messages_of
+from slideviz.errors import Level, Message, SlidevizError, messages_of
 from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
 from slideviz.session.reach import moves_nothing
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
 from slideviz.solver.layers import height_warnings
-from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
+from slideviz.solver.remedies import MOST_NAMES, Remedy, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
 from slideviz.system.platform import free_memory
+from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import KERNELS
 
 LARGE = 1e9  # bytes of memory from which on there is a message before a run on what it takes
@@ -149,11 +154,8 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> s
     if folding:
         return with_field_labels(f"{folding}.")
     assert mesh is not None
-    beside: tuple[str, ...] = ()
-    if run.last is not None:
-        beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
-    pitch = beyond_pitch(run.case, mesh)
-    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, run.last_step))
+    pitch, found = _advice(run, mesh)
+    helps = "; ".join(remedy.window for remedy in found)
     helps = with_field_labels(f"What may help: {helps}.")
     last = ""
     valid = [frame.step for frame in run.frames if not frame.quality.inverted and frame.step]
@@ -163,8 +165,22 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> s
     return " ".join(filter(None, words))
 
 
+@weak_cache
+def _advice(run: Run, mesh: Mesh) -> tuple[str, tuple[Remedy, ...]]:
+    """Return a sentence if the motion is beyond the pitch, or "", and the remedies of a run."""
+    beside: tuple[str, ...] = ()
+    if run.last is not None:
+        beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
+    pitch = beyond_pitch(run.case, mesh)
+    return pitch, remedies(run.case, beside, pitch, run.last_step)
+
+
 def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
     """Return the warnings of a run, or its notes."""
+    return tuple(with_field_labels(str(message)) for message in _messages_of(run, level))
+
+
+def _messages_of(run: Run, level: Level) -> tuple[Message, ...]:
     if run.last is None or run.last_step is None:
         return ()
     layers = run.last.walls
@@ -173,11 +189,11 @@ def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
         remarks += tuple(
             height_warnings(run.case, layers, run.last.mesh, run.last_step.kept_layers)
         )
-    return tuple(
-        with_field_labels(str(message))
-        for message in messages_of(remarks)
-        if message.level == level
-    )
+    return tuple(message for message in messages_of(remarks) if message.level == level)
+
+
+Settings = tuple[tuple[str, str], ...]
+"""Keys of a case, and other values of them that a message advises."""
 
 
 @dataclass(frozen=True)
@@ -188,6 +204,74 @@ class Requirement:
     place: PanelPlace  # the panel in which it can be met
     marker: str = ""  # the boundary that lacks a motion; empty for other requirements
     motion: int = 0  # the place of the motion that the requirement is about, from 0
+    settings: Settings = ()  # each of which would meet it
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A message in the strip over the view, with what its buttons do."""
+
+    kind: Literal["error", "task", "warning", "note"]  # a task is to be done before a run
+    text: str
+    leads: Requirement | None = None  # where a button leads
+    settings: Settings = ()  # a button makes each of these
+    commands: tuple[str, ...] = ()  # names of commands that help
+
+
+def notices(session: Session, missing: tuple[Requirement, ...]) -> Iterator[Notice]:
+    """Yield the messages of the session, the most urgent first.
+
+    ``missing``: from `run_requirements`.
+    """
+    for requirement in missing:
+        yield Notice("task", requirement.text, requirement, requirement.settings)
+    run = session.run_shown
+    folding = session.folding
+    if folding and not missing and (run is None or session.outdated):
+        text = with_field_labels(f"{folding}.")
+        yield Notice("warning", text, Requirement("", "motion"))
+    if run is not None and run.last is not None and run.end:
+        yield from _notices_of_run(run, session)
+
+
+def _notices_of_run(run: Run, session: Session) -> Iterator[Notice]:
+    """Yield the messages of a run that has ended."""
+    assert run.last is not None
+    told = ""
+    if bad := inverted_words(run):
+        folding = None if session.outdated else session.folding
+        told = f"{bad}. {remedy_for(run, session.mesh, folding)}"
+        again = run.last.step is not None and run.last.step.repaired is None
+        commands = ("repair",) if again and to_mend(session) else ()
+        settings: Settings = ()
+        if session.mesh is not None and not folding:
+            advice = "; ".join(each.keys for each in _advice(run, session.mesh)[1])
+            settings = advised(advice, session.case)
+        yield Notice("error", told, Requirement("", "worst"), settings[:MOST_ADVISED], commands)
+    if missed := limits_words(run):
+        text = f"{missed}: {outcome(run.last.limits)}."
+        yield Notice("error", text, Requirement("", "limits"))
+    if words := stopped_words(run):
+        yield Notice("warning", words)
+    if run.last.file is not None:
+        yield Notice("note", f"The deformed mesh is in {run.last.file}.")
+    for message in (*_messages_of(run, "warning"), *_messages_of(run, "note")):
+        text = with_field_labels(str(message))
+        if text.rstrip(".") not in told:
+            yield Notice(message.level, text, settings=advised(str(message), session.case))
+
+
+MOST_ADVISED = 1  # most settings that are offered against inverted cells
+
+
+def advised(message: str, case: Case) -> Settings:
+    """Return the settings that a message names, if the case has other values."""
+    found = dict[str, str]()
+    for key, value, *_ in _KEY.findall(message):
+        with suppress(SlidevizError):
+            if value and key not in found and case.set(**{key: value}) != case:
+                found[key] = value
+    return tuple(found.items())
 
 
 def run_requirements(session: Session) -> tuple[Requirement, ...]:
@@ -230,8 +314,11 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         text = "Linear elasticity needs all of a mesh in memory, and this one stays in its file."
         requirements.append(Requirement(f"{text} Choose another method.", "method"))
     if not requirements:
-        said = (with_field_labels(str(each)) for each in check_case(case, session.mesh))
-        requirements = [Requirement(text[:1].upper() + text[1:], "boundaries") for text in said]
+        for problem in check_case(case, session.mesh):
+            text = with_field_labels(str(problem))
+            settings = advised(str(problem), case)
+            text = text[:1].upper() + text[1:]
+            requirements.append(Requirement(text, "boundaries", settings=settings))
     if not requirements and session.intersection:
         requirements = [Requirement(session.intersection, "motion")]
     return tuple(requirements)

@@ -365,7 +365,7 @@ IN_FILE = (
 )
 """The message where something cannot be done with a mesh too large for memory."""
 
-PanelPlace = Literal["open", "boundaries", "motion", "method", "curves"]
+PanelPlace = Literal["open", "boundaries", "motion", "method", "curves", "worst", "limits"]
 """The panel where a requirement of a run is met, or that has more about its end; "open" is the
 dialog that opens a file."""
 

@@ -4,6 +4,7 @@ import shutil
 import threading
 import weakref
 from functools import partial
+from html import unescape
 
 import pytest
 
@@ -325,6 +326,17 @@ class Driver:
     @property
     def session(self):
         return self.window.store.session
+
+    @property
+    def told(self):
+        """The messages listed in the strip over the view, a line for each."""
+        rows = self.window.run_panel.strip.rows
+        return "\n".join(unescape(row.text.text()) for row in rows)
+
+    def answer(self, text):
+        """Click the button of a message in the strip over the view."""
+        rows = self.window.run_panel.strip.rows
+        next(row.answers[text] for row in rows if text in row.answers).click()
 
     def activate(self):
         """Make the window the active one, as a window manager does when a dialog closes."""

@@ -1,10 +1,8 @@
 """The limits of the case are checked in the background, on the step that is shown."""
 
 from dataclasses import replace
-from html import unescape
 
 import pytest
-from qtpy.QtWidgets import QPushButton
 
 from slideviz.case.limits import outcome
 from slideviz.color_scheme import SELECTED_COLOR
@@ -54,7 +52,7 @@ def test_the_end_of_a_run_says_which_limits_are_missed(with_runs):
     column = next(one for one in COLUMNS if one.title == "limits")
     assert column.value(run) == outcome(run.last.limits) == f"min >= 0.999: {low.actual:.6g}"
     window.running._run_done(None)
-    assert f"1 limit is not met: {column.value(run)}." in unescape(window.banner.text.text())
-    (button,) = [one for one in window.banner.findChildren(QPushButton) if "limits" in one.text()]
-    shown.click(button)
+    assert shown.told == f"1 limit is not met: {column.value(run)}."
+    assert window.run_panel.strip.count.text() == "1 error ▴"
+    shown.answer("Show the limits")
     assert window.dock_manager.by_name["limits"].isVisible()

@@ -145,7 +145,7 @@ def test_a_design_is_shown_only_when_it_is_whole_and_computed_once(window, passa
     assert 0 < made < 400
     said = f"Design 2 was cancelled after step {made} of 400: the mesh has"
     assert status.text().startswith(said)
-    assert window.banner.text.text().startswith(said)
+    assert driver.told.startswith(said)
     assert window.player.step_text.text() == f"Step {made} of 400"
     assert len(window.store.session.runs) == 2
     # It has another number where a row before it is removed; and a name of the user's.

@@ -175,8 +175,8 @@ def test_a_run_goes_from_file_to_file(stator, folder, tmp_path, answers):
     cut = Cutter.of(whole).cut(step.mesh.points, stator.session.view.sections[0])
     one = window.scene.sections.drawn["section:0"]
     np.testing.assert_array_equal(one.frame.mesh.numbering.cells[one.polygons.cells], cut.cells)
-    assert window.banner.text.text() == f"The deformed mesh is in {output}."
-    assert not window.banner.isHidden()
+    assert stator.told == f"Note: The deformed mesh is in {output}."
+    assert window.run_panel.strip.count.text() == "1 note ▾"
     assert not stator.session.unsaved_mesh  # it is in its file
 
 

@@ -30,7 +30,7 @@ def test_a_folded_run_is_mended_by_the_button_of_its_message(driver, window, tmp
     assert window.dock_manager.panel(CurvesPanel).kind.currentData() == "reach"
     assert not window.dock_manager.panel(CurvesPanel).area.shows_text
     assert COMMANDS["repair"].enabled(CommandState(driver.session))
-    window.banner.answers["Repair"].click()
+    driver.answer("Repair")
     driver.settle()
     run = driver.session.run_shown
     assert run.number == 2

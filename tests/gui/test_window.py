@@ -738,7 +738,7 @@ def test_cancel_keeps_the_steps_that_are_done(ready, answers, tmp_path):
     words = f"step {count - 1} of 2000"
     told = f"Run 1 was cancelled after {words}: the mesh has {100 * (count - 1) / 2000:.3g} % of"
     assert window.statusBar().currentMessage().startswith(told)
-    assert window.banner.text.text().startswith(told)
+    assert ready.told.startswith(told)
     assert window.player.step_text.text().lower() == words
     assert window.windowTitle() == f"*passage.cfg – {words} – slideviz"
     assert window.run_panel.text.text().startswith(f"Stopped after {words}")
@@ -823,7 +823,7 @@ def test_large_numbers_have_separators_in_the_status_bar(ready, monkeypatch):
     assert "1,911 inverted" in ready.window.statusBar().currentMessage()
 
 
-def test_the_banner_says_nothing_twice(ready):
+def test_the_strip_says_nothing_twice(ready):
     from slideviz.session.jobs import intersection_key, set_intersection
 
     doubt = Doubt("airfoil goes through itself near (0, 0)", "move it less")
@@ -832,7 +832,7 @@ def test_the_banner_says_nothing_twice(ready):
     key = intersection_key(ready.session)
     window.store.change(set_intersection, ("", doubt), key)
     window.running._run_done(None)
-    told = window.banner.text.text()
+    told = ready.told
     assert told.startswith("38 inverted cells. airfoil goes through itself")
     assert told.count("goes through itself") == 1
     assert told.count("another warning") == 1
@@ -840,10 +840,12 @@ def test_the_banner_says_nothing_twice(ready):
 
 def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     run_ = ended_badly(ready)
-    panel, banner = ready.window.run_panel, ready.window.banner
+    panel, banner = ready.window.run_panel, ready.window.run_panel.strip.rows[0]
     assert "Done: 38 inverted cells" in panel.text.text()
     assert panel.text.property("bad")
-    assert "more steps" in panel.text.toolTip()
+    assert "more steps" in banner.text.text()
+    assert panel.strip.count.text() == "1 error ▴"
+    assert banner.isVisible()
     assert banner.property("calm") is False
     assert "38 inverted cells. What may help: " in banner.text.text()
     assert "inverted" in "".join(end_parts(run_))
@@ -859,45 +861,71 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     run(ready, 1)
     assert DONE in panel.text.text()
     assert not panel.text.property("bad")
-    assert not banner.isVisible()
+    assert not panel.strip.rows
+    assert not panel.strip.count.isVisible()
+    banner = ready.window.banner
+    banner.ask("a question", {"Yes": lambda: None})
     banner.show_message("something else")
     assert not banner.answers
 
 
-def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):
+def test_the_strip_is_not_about_a_run_that_is_no_longer_shown(ready):
     run(ready, 1)
     ended_badly(ready)
     window = ready.window
     first, last = (one.number for one in ready.session.runs)
     window.store.change(changes.set_view, frame=0)
-    assert window.banner.isVisible()
+    assert "38 inverted cells" in ready.told
     window.store.change(changes.show_run, first)
-    assert not window.banner.isVisible()
-    # What it says of other things stays.
+    assert not ready.told
+    # What the banner says of other things stays.
     window.store.change(changes.show_run, last)
     window.banner.show_message("something else")
     window.store.change(changes.show_run, first)
     assert window.banner.isVisible()
 
 
-def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(ready, caplog):
+def test_what_is_harmless_is_counted_and_listed_when_asked_for(ready, caplog):
     caplog.set_level("INFO")
     said = note("24 nodes are not control nodes, so this does no harm")
     ended_badly(ready, [said], inverted=0)
-    assert not ready.window.banner.isVisible()
+    strip = ready.window.run_panel.strip
+    assert not strip.rows[0].isVisible()
     assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
     assert "24 nodes are not control nodes" in describe_run(ready.session.runs[-1])
-    text = ready.window.run_panel.text
-    assert DONE in text.text()
-    assert text.text().endswith(" times as far.</a> <a href='notes'>1 note</a>")
-    assert "24 nodes are not control nodes" in text.toolTip()
-    text.linkActivated.emit("notes")
-    assert ready.window.banner.text.text() == f"Note: {said}"
-    ready.window.banner.hide()
+    assert DONE in strip.text.text()
+    assert strip.text.text().endswith(" times as far.</a>")
+    assert strip.count.text() == "1 note ▾"
+    ready.click(strip.count)
+    assert strip.rows[0].isVisible()
+    assert ready.told == f"Note: {said}"
     ended_badly(ready, [said, "the solver stopped early"], inverted=0)
-    assert ready.window.banner.isVisible()
-    assert ready.window.banner.property("calm")
-    assert ready.window.banner.text.text() == "the solver stopped early"
+    assert strip.count.text() == "1 warning, 1 note ▾"
+    assert all(row.property("calm") for row in strip.rows)
+    assert ready.told == f"the solver stopped early\nNote: {said}"
+
+
+def test_buttons_of_messages_make_the_settings_that_they_advise(ready):
+    off = Message("node 3 has left HUB", "RIMS= SLIDE keeps such nodes on it")
+    ended_badly(ready, [off])
+    store = ready.window.store
+    ready.answer("Nodes on walls “stay on walls”")
+    assert ready.session.case.rims == "slide"
+    assert store.can_undo == "settings"
+    assert not any("stay on walls" in text for row in strip_rows(ready) for text in row.answers)
+    store.undo()
+    assert ready.session.case.rims == "free"
+    store.change(changes.set_case, relax="yes", method="idw")
+    (task,) = strip_rows(ready)[:1]
+    assert set(task.answers) == {
+        "Relaxation “automatic”",
+        "Method “RBF interpolation”",
+        "Show the boundaries",
+    }
+
+
+def strip_rows(driver):
+    return driver.window.run_panel.strip.rows
 
 
 def test_what_is_no_file_is_told_without_a_question_about_unsaved_work(ran, tmp_path):
@@ -958,7 +986,7 @@ def test_closing_while_running_stops_the_run_and_asks_for_its_mesh(ready, monkey
     )
     assert window.isVisible()
     assert ready.session.run_shown.end == "cancelled"
-    assert f"cancelled after step {count} of 2000" in window.banner.text.text()
+    assert f"cancelled after step {count} of 2000" in ready.told
     assert f"cancelled after step {count} of 2000" in window.statusBar().currentMessage()
     assert window.close()
 

@@ -1,17 +1,19 @@
-"""The run panel: run, requirements, progress, cancel."""
+"""The run panel, run and cancel, and its strip over the view: progress, result, messages."""
 
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
+from functools import partial
 
-from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import QPushButton, QSizePolicy
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QPushButton
 
+from slideviz.case.words import counted
 from slideviz.color_scheme import ColorScheme
-from slideviz.errors import Message
 from slideviz.gui.commands import COMMANDS, Command
+from slideviz.gui.widgets.banner import Answers, MessageStrip
 from slideviz.gui.widgets.build import (
-    LinkLabel,
     QuietBar,
     in_column,
     in_row,
@@ -26,29 +28,31 @@ from slideviz.session import changes
 from slideviz.session.jobs import JobProgress
 from slideviz.session.reach import reach_run
 from slideviz.session.run_messages import (
+    Notice,
     Requirement,
     end_parts,
     exact_cost,
     inverted_words,
     limits_words,
+    notices,
     path_ending,
-    remarks_of,
-    remedy_for,
     run_requirements,
     with_field_labels,
 )
-from slideviz.session.state import Preview, Run, Session
+from slideviz.session.state import Preview, Session
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
 SETTINGS = "settings"
-NOTES = "notes"
 REACH = "reach"
-"""Targets of links in the text: take the settings of the shown run, show its notes, show the curve
-of how far its motion may go."""
+"""Targets of links in the text: take the settings of the shown run, show the curve of how far its
+motion may go."""
 
 
 class RunPanel(Panel):
-    """The panel to run and cancel, with a line of text: progress, result or what is missing."""
+    """The panel to run and cancel.
+
+    Its ``strip`` is over the view: progress, result or what is missing, and all messages.
+    """
 
     requirement_clicked = Signal(object)  # a missing `Requirement`, to be led to where it is met
 
@@ -56,14 +60,12 @@ class RunPanel(Panel):
         self._busy = self._progress_text = ""
         self._compiling = False
         self._missing: tuple[Requirement, ...] = ()
+        self._listed: tuple[Notice, ...] = ()
         self._cost = ""
-        self._remedy: tuple[Run | None, Message | None, str] = (None, None, "")
         self.run = self._button(COMMANDS["run"], "#ffffff")
         self.cancel = self._button(COMMANDS["cancel"], "#3b4652")
-        self.text = LinkLabel()
-        self.text.setMinimumHeight(34)
-        # A long sentence wraps; it must not make all panels on this side wider.
-        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.strip = MessageStrip()
+        self.text = self.strip.text
         self.text.linkActivated.connect(self._link)
         self.bar = QuietBar()
         self.bar.setRange(0, 1000)
@@ -72,13 +74,19 @@ class RunPanel(Panel):
         policy = self.bar.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.bar.setSizePolicy(policy)
-        row = in_row(self.run, self.cancel, self.text, wide=[self.text])
-        # The panel is the lowest one, and grows upwards: so a line more does not move the button.
-        for widget in (self.run, self.cancel, self.text):
-            row.setAlignment(widget, Qt.AlignmentFlag.AlignBottom)
-        in_column(row, self.bar, spacing=5, on=self, margins=6)
+        row = in_row(self.run, self.cancel, self.bar, wide=[self.bar])
+        in_column(row, on=self, margins=6)
         # Some checks go through the mesh: they are not repeated if only the view changed.
         self.follow(_checked, self._check)
+        self.follow(
+            lambda session: (
+                _checked(session),
+                session.run_shown,
+                session.folding,
+                session.outdated,
+            ),
+            self._list_messages,
+        )
         self.follow()
 
     def _button(self, command: Command, color: str) -> QPushButton:
@@ -94,7 +102,35 @@ class RunPanel(Panel):
         self._missing = run_requirements(session)
         self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
 
+    def _list_messages(self, session: Session) -> None:
+        """List the messages of the session, with their buttons, unless the text has all of it."""
+        listed = tuple(notices(session, self._missing))
+        if listed == self._listed:
+            return
+        self._listed = listed
+        if len(listed) == 1 and listed[0].kind == "task" and not listed[0].settings:
+            listed = ()
+        kinds = dict.fromkeys(one.kind for one in listed)
+        count = [counted(sum(one.kind == kind for one in listed), kind) for kind in kinds]
+        rows = [(_named(one), one.kind != "error", self._answers(one)) for one in listed]
+        self.strip.show_rows(", ".join(count), rows)
+
+    def _answers(self, notice: Notice) -> Answers:
+        """Return what the buttons of a message do."""
+        answers: dict[str, Callable[[], object]] = {}
+        for name in notice.commands:
+            command = COMMANDS[name]
+            answers[command.title.replace("&", "")] = partial(command.do, self.services)
+        for key, value in notice.settings:
+            put = partial(self.change, changes.set_keys, **{key: value})
+            answers[with_field_labels(f"{key}= {value}")] = put
+        if notice.leads is not None:
+            lead = partial(self.requirement_clicked.emit, notice.leads)
+            answers[f"Show the {notice.leads.place}"] = lead
+        return answers
+
     def sync(self, session: Session) -> None:
+        self.strip.setVisible(session.mesh is not None or bool(self._busy))
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
         self.bar.setVisible(bool(self._busy or session.preview))
@@ -106,11 +142,8 @@ class RunPanel(Panel):
         self.bar.setValue(0)
         if self._missing:
             first = self._missing[0]
-            more = len(self._missing) - 1
             text = html.escape(_shortened(first.text))
-            self.text.setText(
-                f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
-            )
+            self.text.setText(f"<a href='{first.place}'>{text}</a>")
             tip = "\n".join(missing.text for missing in self._missing)
             self.text.setToolTip(wrapped(tip))
             self.run.setToolTip(wrapped(tip))
@@ -144,19 +177,11 @@ class RunPanel(Panel):
             if reach_run(session):
                 reach = f"<a href='{REACH}'>{reach}</a>"
             text = text + reach
-            notes = remarks_of(run, "note")
-            count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
-            link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
-            self.text.setText((f"<b>{text}</b>" if bad else text) + link)
-            if bad and self._remedy[:2] != (run, session.folding):
-                # The boundaries beside its cells are searched once.
-                remedy = remedy_for(run, session.mesh, session.folding)
-                self._remedy = (run, session.folding, remedy)
-            lines = [self._remedy[2], *notes] if bad else list(notes)
+            self.text.setText(f"<b>{text}</b>" if bad else text)
             if run.safe is not None:
                 words = run.safe.words
-                lines.append(f"{words[:1].upper()}{words[1:]}{path_ending(run)}.")
-            self.text.setToolTip(wrapped("\n".join(lines)))
+                tip = f"{words[:1].upper()}{words[1:]}{path_ending(run)}."
+                self.text.setToolTip(wrapped(tip))
         elif run is session.runs[-1] and run.panels != session.case:
             self._show_ready("Settings changed since the last run.", session)
         else:
@@ -177,12 +202,7 @@ class RunPanel(Panel):
         self.text.setToolTip(wrapped(full))
 
     def _link(self, target: str) -> None:
-        if target == NOTES:
-            run = self.session.run_shown
-            if run is not None:
-                text = "\n".join(f"Note: {note}" for note in remarks_of(run, "note"))
-                self.services.banner.show_message(text)
-        elif target == REACH:
+        if target == REACH:
             self.requirement_clicked.emit(Requirement("", "curves"))
         elif target == SETTINGS:
             self.change(changes.adopt_settings, self.session.shown)
@@ -230,6 +250,10 @@ class RunPanel(Panel):
     def show_cancelling(self) -> None:
         self.cancel.setEnabled(False)
         self.text.setText("Cancelling…")
+
+
+def _named(notice: Notice) -> str:
+    return f"Note: {notice.text}" if notice.kind == "note" else notice.text
 
 
 def _checked(session: Session) -> object:

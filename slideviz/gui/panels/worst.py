@@ -47,7 +47,7 @@ from slideviz.session.inspect import (
     worst_cells,
 )
 from slideviz.session.motions import machine_pair
-from slideviz.session.run_messages import to_mend
+from slideviz.session.run_messages import Requirement, to_mend
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy
 
@@ -445,7 +445,8 @@ class WorstPanel(Panel):
         self.change(changes.mark_cell, cell)
         self.services.viewing.fly_to(cell)
 
-    def show_worst(self) -> None:
+    def focus_requirement(self, _missing: Requirement) -> None:
+        """Fly to the worst cell of the last step."""
         self.change(changes.show_frame, len(self.session.frames) - 1)
         self._fill(self.session)
         if self.model.worst is not None:

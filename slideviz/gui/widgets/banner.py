@@ -1,4 +1,4 @@
-"""The banner above the view: a message or a question that stays until it is closed.
+"""The strip above the view, and below it the banner: a message that stays until it is closed.
 
 Its colors are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#banner``).
 """
@@ -6,23 +6,28 @@ Its colors are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#bann
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import MappingProxyType
 
-from qtpy.QtCore import Qt, Signal
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import (
     QApplication,
+    QBoxLayout,
     QDialog,
     QDialogButtonBox,
     QFrame,
     QPlainTextEdit,
     QPushButton,
+    QSizePolicy,
     QWidget,
 )
 
 from slideviz.errors import OUT_OF_MEMORY, SlidevizError
 from slideviz.gui.widgets.build import (
+    Fitted,
+    LinkLabel,
+    PanelScroll,
     dialog_buttons,
     in_column,
     in_row,
@@ -56,11 +61,8 @@ class DetailsDialog(QDialog):
         self.setLayout(in_column(self.text, buttons))
 
 
-class Banner(QFrame):
+class Banner(Fitted, QFrame):
     """A message across the top of the view that stays until it is closed."""
-
-    shown = Signal(str)
-    """The text of a message, when it is shown."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -75,10 +77,13 @@ class Banner(QFrame):
             "Copy the message with its trace, versions and platform.",
             lambda: QApplication.clipboard().setText(self._full),
         )
-        close = tool_button("Close the message", self._closed, text="✕")
-        self._row = in_row(self.text, self.details, self.copy, close, wide=[self.text])
-        self._row.setContentsMargins(10, 6, 6, 6)
-        self.setLayout(self._row)
+        self.close_button = tool_button("Close the message", self._closed, text="✕")
+        row = in_row(self.text, self.details, self.copy, self.close_button, wide=[self.text])
+        self._row = in_row(None, spacing=6)
+        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._whole.setContentsMargins(10, 6, 6, 6)
+        self._whole.addLayout(row, 1)
+        self._whole.addLayout(self._row)
         self.answers: dict[str, QPushButton] = {}
         self._later: Callable[[], object] | None = None
         self.hide()
@@ -101,7 +106,6 @@ class Banner(QFrame):
         self.details.setVisible(bool(self._full))
         self.copy.setVisible(bool(full))
         self.show()
-        self.shown.emit(text)
 
     def show_error(self, error: BaseException) -> None:
         """Show the message of an error; of an unexpected one, the trace is behind “Details”."""
@@ -145,7 +149,14 @@ class Banner(QFrame):
         for name, function in answers.items():
             button = push_button(name, "", lambda _=False, function=function: function())
             self.answers[name] = button
-            self._row.insertWidget(self._row.count() - 1, button)
+            self._row.addWidget(button)
+        self.fit()
+
+    def fit(self) -> None:
+        """Put the buttons below the message where they would take half of its room."""
+        below = 2 * self._row.sizeHint().width() > self.width()
+        kind = QBoxLayout.Direction
+        self._whole.setDirection(kind.TopToBottom if below else kind.LeftToRight)
 
     def _closed(self) -> None:
         later = self._later
@@ -161,3 +172,65 @@ class Banner(QFrame):
     def _show_details(self) -> None:
         self.dialog = DetailsDialog(self, self._full)
         self.dialog.open()
+
+
+MOST_HEIGHT = 132  # greatest height in pixels of the list of messages, which scrolls beyond
+
+
+class MessageStrip(Fitted, QFrame):
+    """The strip over the view: words on the session; its messages, counted at the end, and listed.
+
+    Each message of the list is a `Banner` in ``rows``, with its buttons.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("strip")
+        self.text = LinkLabel()
+        # A long sentence wraps; it must not make the window wider.
+        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.count = tool_button("Show or hide the messages.", self.toggle, name="messages")
+        self.rows: list[Banner] = []
+        self._list = QWidget()
+        self._column = in_column(on=self._list, spacing=0)
+        self._area = PanelScroll(self._list)
+        row = in_row(self.text, self.count, wide=[self.text])
+        row.setContentsMargins(10, 2, 4, 2)
+        in_column(row, self._area, spacing=0, on=self)
+        self.show_rows("", ())
+
+    def show_rows(self, words: str, rows: Sequence[tuple[str, bool, Answers]]) -> None:
+        """List messages, each with its text, whether it is calm, and its buttons.
+
+        ``words``: how many there are. The list opens by itself for one that is not calm.
+        """
+        for old in self.rows:
+            self._column.removeWidget(old)
+            old.hide()
+            old.deleteLater()
+        self.rows = []
+        for text, calm, answers in rows:
+            banner = Banner()
+            banner.close_button.hide()
+            banner.show_message(text, calm=calm, answers=answers)
+            self._column.addWidget(banner)
+            self.rows.append(banner)
+        self._words = words
+        self.count.setVisible(bool(words))
+        alarm = not all(calm for _, calm, _ in rows)
+        set_style(self.count, "bad", alarm)
+        self._open(alarm)
+
+    def toggle(self) -> None:
+        """Show the list, or hide it."""
+        self._open(self._area.isHidden())
+
+    def _open(self, is_open: bool) -> None:
+        self._area.setVisible(is_open)
+        self.count.setText(f"{self._words} {'▴' if is_open else '▾'}")
+        self.fit()
+
+    def fit(self) -> None:
+        """Give the list the height of its messages, up to `MOST_HEIGHT`."""
+        high = sum(row.heightForWidth(self.width()) for row in self.rows)
+        self._area.setFixedHeight(min(high, MOST_HEIGHT))
