@@ -13,6 +13,7 @@ TWO_PARTS = ".ugrid"
 """The last part of an ending that has another one before it."""
 REGIONS = "regionProperties"
 _NAMES = ("points", "points.gz", REGIONS)
+_CONTROL = Path("system/controlDict")  # a case has it, also before it has a mesh
 
 
 def ending_of(path: Path) -> str:
@@ -40,6 +41,11 @@ def case_folder(path: Path) -> Path:
     return instance_of(path.absolute())[0].parent
 
 
+def folder_of(path: Path) -> Path:
+    """Return the folder where a user looks for a mesh file: of OpenFOAM that of its case."""
+    return case_folder(path) if path.name in _NAMES else path.parent
+
+
 def stem_of(path: Path) -> str:
     """Return the name of a mesh file without its ending; of OpenFOAM that of its case."""
     if path.name in _NAMES:
@@ -61,6 +67,15 @@ def is_time(folder: Path) -> bool:
     return folder.name.replace(".", "", 1).isdecimal() and (folder.parent / "constant").is_dir()
 
 
+def _is_constant(folder: Path) -> bool:
+    return folder.name == "constant" and (folder.parent / _CONTROL).is_file()
+
+
+def lacks_mesh(path: Path) -> bool:
+    """Return whether a mesh's ``points`` would be in a case that has no mesh."""
+    return path.name in _NAMES and not path.parent.exists() and case_folder(path).is_dir()
+
+
 def mesh_path(path: Path) -> Path:
     """Return the file that stands for a mesh, which need not exist; other paths as they are.
 
@@ -79,11 +94,11 @@ def _mesh_path(path: Path) -> Path:
     constant = folder / "constant"
     if folder.name == "polyMesh" and folder.is_dir():
         mesh = folder
-    elif (folder / "polyMesh").is_dir() or is_time(folder):
+    elif (folder / "polyMesh").is_dir() or is_time(folder) or _is_constant(folder):
         mesh = folder / "polyMesh"
     elif (constant / REGIONS).is_file() and any(constant.glob("*/polyMesh")):
         return constant / REGIONS
-    elif folder != path or constant.is_dir():
+    elif folder != path or constant.is_dir() or (folder / _CONTROL).is_file():
         mesh = constant / "polyMesh"
     else:
         return path

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from slideviz.errors import MeshError, path_error
+from slideviz.formats.openfoam_paths import lacks_mesh
 from slideviz.system.platform import read_at
 
 KEPT_BYTES = 1 << 26
@@ -97,6 +98,9 @@ def _reopened(path: Path, stamp: tuple[int, int]) -> Source:
 
 def unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
     """Return the error, with its remedy, for a file that cannot be opened or read."""
+    if isinstance(problem, FileNotFoundError) and lacks_mesh(path):
+        remedy = "make one first, e.g. with blockMesh, and open the case again"
+        return path_error(path.parent, f"this case of OpenFOAM has no mesh; {remedy}")
     if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
         return path_error(path, "there is no such file; check the name and the folder")
     if isinstance(problem, IsADirectoryError):

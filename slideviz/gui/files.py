@@ -16,7 +16,7 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 from slideviz.errors import SlidevizError
 from slideviz.formats.files import is_source
 from slideviz.formats.losses import left_out
-from slideviz.formats.openfoam_paths import mesh_path, shown_name, stem_of
+from slideviz.formats.openfoam_paths import folder_of, mesh_path, shown_name, stem_of
 from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
@@ -69,7 +69,7 @@ class Files(QObject):
         """Put a file at the top of the recent ones."""
         every = [path, *(other for other in self.recent() if other != path)][:RECENT]
         self.settings.setValue("recent", [str(each) for each in every])
-        self.settings.setValue("folder", str(path.parent))
+        self.settings.setValue("folder", str(folder_of(path)))
 
     def folder(self) -> Path:
         """Return the folder in which file dialogs start: that of the last file, if it exists.
@@ -88,7 +88,7 @@ class Files(QObject):
         folder = self.folder()
         here = session.case.source or session.path
         if here is not None and here.parent.is_dir() and sample_folder() not in here.parents:
-            folder = here.parent
+            folder = folder_of(here)
         if path := questions.ask_open(self.window, folder):
             self.open_path(path)
 

@@ -335,7 +335,7 @@ def test_a_missing_file_is_named(tmp_path, name):
 
 def test_a_case_without_a_mesh_is_told_what_it_lacks(tmp_path):
     (tmp_path / "constant").mkdir()
-    with pytest.raises(MeshError, match="constant/polyMesh/points: there is no such file; check"):
+    with pytest.raises(MeshError, match="polyMesh: this case of OpenFOAM has no mesh; make one"):
         sv.read(tmp_path)
 
 

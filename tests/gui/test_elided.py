@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QListWidget
+from qtpy.QtCore import QEvent, QPoint, Qt
+from qtpy.QtGui import QHelpEvent
+from qtpy.QtWidgets import QApplication, QListWidget, QToolTip
 
-from slideviz.gui.widgets.build import ElidedLabel, elide_items
+from slideviz.gui.widgets.build import Choice, ElidedLabel, elide_items
 
 WORDS = "size-skew: min 0.8218, mean 0.9302; 1,608 cells cut"
 
@@ -61,3 +62,19 @@ def test_items_of_a_list_end_where_it_does(qtbot):
     assert box.horizontalScrollBar().maximum() == 0
     assert box.visualItemRect(box.item(0)).width() == box.viewport().width()
     assert box.sizeHintForRow(0) > 10, "as high as before"
+
+
+@pytest.mark.parametrize("wide", [60, 400])
+def test_a_list_that_is_too_narrow_shows_its_text_in_the_tooltip(qtbot, wide):
+    choice = Choice({"a": "symmetry <1> of the wing"}, "The root.")
+    choice.resize(wide, 24)
+    qtbot.addWidget(choice)
+    with qtbot.waitExposed(choice):
+        choice.show()
+    choice.resize(wide, 24)
+    place = QPoint(5, 5)
+    help_ = QHelpEvent(QEvent.Type.ToolTip, place, choice.mapToGlobal(place))
+    QApplication.sendEvent(choice, help_)
+    whole = "symmetry &lt;1&gt; of the wing<br>The root."
+    assert QToolTip.text() == (whole if wide < 100 else "The root.")
+    QToolTip.hideText()

@@ -1,9 +1,11 @@
 """A case of OpenFOAM is opened by its folder in the window, and saved as another case."""
 
 import numpy as np
+import pytest
 
 import slideviz as sv
 from slideviz.case.motion_words import mesh_words
+from slideviz.errors import MeshError
 from slideviz.gui.widgets import questions
 from tests.polymesh_files import honeycomb_case, write_polymesh
 
@@ -19,6 +21,10 @@ def test_a_case_is_opened_by_its_folder_and_saved_as_another(driver, answers, tm
     assert session.guesses["ends"].reason == "its patch is of that type"
     assert session.case.roles["ends"] == "sliding"
     assert driver.window.files.stem() == "honeycomb"
+    assert driver.window.files.folder() == tmp_path / "honeycomb"
+    asked = answers("ask_open", None)
+    driver.window.files.ask_and_open()
+    assert asked[0][0] == tmp_path / "honeycomb"
     assert driver.window.windowTitle() == "honeycomb – slideviz"
     assert len(session.mesh.cells) > len(cells)
     words = " ".join(mesh_words(session.mesh))
@@ -33,3 +39,16 @@ def test_a_case_is_opened_by_its_folder_and_saved_as_another(driver, answers, tm
     assert (tmp_path / "new/constant/polyMesh/faces").read_bytes() == (
         folder / "faces"
     ).read_bytes()
+
+
+@pytest.mark.parametrize("opened", ["", "constant", "0"])
+def test_a_case_without_a_mesh_says_so(driver, tmp_path, opened):
+    case = tmp_path / "case"
+    for name in ("constant", "0", "system"):
+        (case / name).mkdir(parents=True)
+    (case / "system" / "controlDict").touch()
+    driver.window.files.open_path(case / opened)
+    told = driver.window.banner.text.text()
+    assert "polyMesh: this case of OpenFOAM has no mesh; make one first" in told
+    with pytest.raises(MeshError, match="this case of OpenFOAM has no mesh; make one first"):
+        sv.read(case / opened)

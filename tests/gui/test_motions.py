@@ -248,6 +248,7 @@ def test_a_wing_is_twisted_between_its_root_and_tip(driver, tmp_path):
     root, tip = form.walls.ends
     assert (root.currentData(), tip.currentData()) == ("symmetry", "wing")
     assert form.walls.title.text() == "Root, tip"
+    assert [end.shown for end in (root, tip, form.walls.along)] == ["symmetry", "wing", "auto"]
     mesh = driver.session.mesh
     moved = window.scene.motion_ghosts["wing"] - mesh.points[mesh.marker("wing").nodes]
     assert np.abs(moved[:, 1]).max() == 0.0

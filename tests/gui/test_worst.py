@@ -275,6 +275,9 @@ def test_a_cell_in_the_middle_of_the_mesh_is_at_zero(full):
     frames = (replace(session.runs[-1].last, mesh=mesh.with_points(moved)),)
     full.store.put(replace(session, runs=(replace(session.runs[-1], frames=frames),)))
     assert info_text(full.store.session, cell).split("<br>")[2] == "x 0&nbsp; y 0"
+    index = full.model.index(full.model.row_of(cell), 0)
+    tip = full.model.data(index, Qt.ItemDataRole.ToolTipRole)
+    assert tip == "quadrilateral at x, y = 0, 0"
 
 
 def test_places_of_a_wheel_are_told_about_its_axis(full):

@@ -184,6 +184,8 @@ class WorstModel(QAbstractTableModel):
     def __init__(self) -> None:
         super().__init__()
         self.worst: WorstCells | None = None
+        self.extent = 0.0
+        """That of the mesh, in its length unit."""
         self.columns = EMPTY
         self.order = NONE
         """(n,): the index in ``worst`` of the cell in each row."""
@@ -243,7 +245,7 @@ class WorstModel(QAbstractTableModel):
         worst = self.worst
         if role == Qt.ItemDataRole.ToolTipRole:
             place = worst.positions[at]
-            where = point_words(place, digits=8)
+            where = point_words(place, self.extent, digits=8)
             return f"{worst.kinds[at]} at {'x, y, z'[: 3 * len(place) - 2]} = {where}"
         alarming = role == Qt.ItemDataRole.ForegroundRole and index.column() == QUALITY
         return QBrush(QColor(alarm())) if alarming and worst.inverted[at] else None
@@ -413,6 +415,7 @@ class WorstPanel(Panel):
         worst = worst_cells(session.frames, at, what)
         title = f"{COLOR_BY[what].axis}, of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
+        self.model.extent = session.frame.mesh.extent
         self.model.show(worst, machine_pair(session))
         self.table.setColumnHidden(SINCE, what not in SIZE_SKEW)  # others are not followed
 

@@ -22,6 +22,7 @@ from qtpy.QtGui import (
     QFont,
     QFontDatabase,
     QFontMetrics,
+    QHelpEvent,
     QPainter,
     QPaintEvent,
     QResizeEvent,
@@ -550,6 +551,14 @@ class Choice(QComboBox):
         elided = Qt.TextElideMode.ElideRight
         option.currentText = self.fontMetrics().elidedText(option.currentText, elided, room)
         return option
+
+    def event(self, event: QEvent) -> bool:
+        """Show the whole text above the tooltip, where the box is too narrow for it."""
+        if isinstance(event, QHelpEvent) and self.shown not in ("", self.currentText()):
+            parts = (html.escape(self.currentText()), self.toolTip())
+            QToolTip.showText(event.globalPos(), "<br>".join(filter(None, parts)), self)
+            return True
+        return super().event(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)

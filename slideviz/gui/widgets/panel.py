@@ -181,6 +181,7 @@ class Panel(QWidget):
 
 WALLS = {"Hub": "0, the hub or root", "Shroud": "1, the shroud or tip"}
 """Each with the span there, in words."""
+ARROW = 36  # width in pixels of a drop-down list beside its text
 OF_MACHINE = "Hub, shroud"
 OF_WING = "Root, tip"
 
@@ -205,12 +206,12 @@ class SpanWalls(Panel):
         self.along.chosen.connect(
             lambda text: self.change(changes.set_case, span_axis=KEYS["SPAN_AXIS"].kind.read(text))
         )
-        fields = (*self.ends, self.along)
-        for field in fields:
-            field.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        row = in_row(*fields, wide=fields, spacing=4)
-        row.setContentsMargins(0, 0, 0, 0)
-        self.setLayout(row)
+        for end in self.ends:
+            end.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.along.setMinimumContentsLength(4)  # the names beside it need the room
+        self._row = in_row(*self.ends, self.along, wide=self.ends, spacing=4)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self.setLayout(self._row)
         self.title = QLabel(OF_MACHINE)
         self._by_name: tuple[str, str] | None = None
         self._blade: tuple[str, ...] = ()
@@ -242,13 +243,16 @@ class SpanWalls(Panel):
             span = names.get(span[0], span[0]), names.get(span[1], span[1])
             span = span if {*span} <= {*names.values()} else None  # of another zone
         along = KEYS["SPAN_AXIS"].kind.write(case.span_axis)
-        words = {text: f"along {text}" for text in (*"xyz", along)}
+        words = {text: text for text in (*"xyz", along)}
         self.along.offer(words | {"AUTO": "auto"})
         self.along.show_value(along)
         for k, end in enumerate(self.ends):
             end.offer({name: name for name in names.values()})
             end.setCurrentIndex(-1)
             end.show_value((span or self._by_name or ("", ""))[k])
+            # A longer name has more of the room.
+            text = end.currentText() or end.placeholderText()
+            self._row.setStretch(k, end.fontMetrics().horizontalAdvance(text) + ARROW)
         tip = self.ends[1].currentData()
         is_wing = case.span_axis is not None or case.roles.get(tip) == "moving"
         self.title.setText(OF_WING if is_wing else OF_MACHINE)
