@@ -1,7 +1,8 @@
 """The types of arguments, checked by their annotations where a program calls slideviz.
 
 ``check_types`` is a decorator for functions, ``check_fields`` the ``__post_init__`` of dataclasses.
-A check takes microseconds: neither belongs into inner loops.
+A check takes microseconds: neither belongs into inner loops. ``record`` is the decorator of values
+with arrays.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set, Sized
 from contextlib import suppress
+from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from functools import cache, wraps
 from inspect import get_annotations
@@ -24,6 +26,7 @@ from typing import (
     ParamSpec,
     TypeVar,
     Union,
+    dataclass_transform,
     get_args,
     get_origin,
 )
@@ -122,6 +125,16 @@ def check_fields(value: Any) -> None:
         known = field.metadata
         if known and chosen not in (*known, field.default):
             raise CaseError(f"{name}: {not_one_of(chosen, known)}")
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
+def record(kind: type[Result]) -> type[Result]:
+    """Return a class as a frozen dataclass whose values are equal only to themselves.
+
+    Values with arrays are such: arrays have no single answer to ``==``, and a value is a key of the
+    caches of what was computed from it (`slideviz.system.weak_cache`).
+    """
+    return dataclass(frozen=True, eq=False)(kind)
 
 
 class CheckedFields:

@@ -2,13 +2,14 @@
 
 import inspect
 import re
+from dataclasses import FrozenInstanceError, replace
 from inspect import get_annotations
 
 import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.argument_types import CheckedFields, annotations_of
+from slideviz.argument_types import CheckedFields, annotations_of, record
 from slideviz.case.motions.kinds import KINDS
 from slideviz.design.sweeps.table import read_designs
 from slideviz.errors import ArgumentError, MeshError
@@ -166,3 +167,17 @@ def test_texts_that_are_no_format_are_named():
     ):
         with pytest.raises(MeshError, match=r"a: file_format 'x' is not one of su2 \| su2b"):
             call()
+
+
+def test_a_record_is_frozen_and_equal_only_to_itself():
+    @record
+    class Pair:
+        one: int
+        two: int = 2
+
+    pair = Pair(1)
+    assert pair == pair != Pair(1)
+    assert {pair: 3}[pair] == 3
+    assert repr(replace(pair, one=3)).endswith("Pair(one=3, two=2)")
+    with pytest.raises(FrozenInstanceError):
+        pair.one = 2

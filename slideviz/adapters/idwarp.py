@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.design.deformer import Deformer
 from slideviz.errors import CaseError
@@ -29,7 +29,7 @@ COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SolverSurface:
     """The nodes of a solver's surface, as nodes of a mesh."""
 

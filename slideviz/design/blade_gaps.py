@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.case.model import Case
 from slideviz.case.zone_cases import zone_cases
 from slideviz.errors import CaseError
@@ -39,7 +39,7 @@ RIM = 0.1  # the nodes of a blade within this span of its end are its tip
 TOUCHING = "they touch (distance 0)"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Gap:
     """The smallest distance between two boundaries, overall and by place; in the mesh's unit."""
 

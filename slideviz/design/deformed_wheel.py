@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.model import Case
 from slideviz.case.zone_cases import zone_cases
@@ -32,7 +32,7 @@ Count = int | Literal["all"]
 """A number of passages: "all" for a whole turn."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WheelQuality:
     """A wheel that was written, and the quality of its cells: that of its passages."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.case.displacement import Displacements
 from slideviz.case.keys import automatic_radius
 from slideviz.case.model import Case
@@ -156,7 +156,7 @@ def warn_of_errors(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Checks:
     """The checks of a design."""
 
@@ -284,7 +284,7 @@ Work = Callable[["Deformer", Array], Array]
 """Returns the points (..., n_z, d) of a zone from its deformer and displacements (..., m_z, d)."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ZoneDesign:
     """The deformer of a zone, as a part of that of all zones."""
 
@@ -372,7 +372,7 @@ def zone_designs(
     return tuple(designs)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class KnownNodeMap:
     """The map from the displacement of the moving nodes to that of the known nodes."""
 
@@ -494,7 +494,7 @@ CONSTRAINTS = ("min", "mean", "margin")
 """The numbers of a mesh that have derivatives: names of `slideviz.case.limits.NUMBERS`."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Constraint:
     """A number of a deformed mesh, with exact derivatives by the design."""
 

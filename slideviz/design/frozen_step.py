@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from dataclasses import field as made_by
+from dataclasses import replace
 from functools import partial
 from itertools import count
 from typing import Any
@@ -20,6 +20,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve_triangular
 from scipy.sparse import csr_array
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.words import wrong_by
 from slideviz.errors import ConditionWarning, DeformError
@@ -201,7 +202,7 @@ class WithPolynomial:
         return out
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LeastSquares:
     """Solves a singular symmetric system of constant rank: least squares, least norm."""
 
@@ -524,7 +525,7 @@ def _at(names: IntArray, wanted: IntArray) -> IntArray:
     return np.array([place[tuple(name)] for name in wanted.tolist()], np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FrozenCorrection:
     """Which nodes take over the errors of which boundary nodes."""
 
@@ -590,7 +591,7 @@ reduction only those of derivatives, for points have a tolerance that is larger 
 _SILENT = PhaseTimer(lambda _phase, _fraction: None)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepState:
     """The state of a deformation after some steps."""
 
@@ -605,7 +606,7 @@ class StepState:
         return np.asarray(getattr(self.solution, name) if self.solution else 0.0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ChoiceCache:
     """A store of objects that are made once, by name."""
 
@@ -618,7 +619,7 @@ class ChoiceCache:
         return self.items[name]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FrozenStep:
     """One step with its choices."""
 

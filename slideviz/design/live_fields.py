@@ -8,11 +8,12 @@ translation, rotation and scale of it; of other motions each number has a field.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import qr
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.moving_nodes import moving_nodes
@@ -35,7 +36,7 @@ NUDGE = 1e-4  # change of a number by which the displacement per unit is found
 ROUNDING = 1e-9  # part of a displacement below which it depends on others
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LiveFields:
     """The displacements of all nodes that make up those by the motions of a case."""
 

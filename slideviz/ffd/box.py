@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 from slideviz.terms import FfdSystem
@@ -170,7 +171,7 @@ CORNERS = np.array(
 """SU2's order of the corners, by their (u, v, w)."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Embedding:
     """Nodes in a box, with their weights of the control points (I, J, K)."""
 
@@ -198,7 +199,7 @@ class Embedding:
         return csr_array(np.einsum("mi,mj,mk->mijk", u, v, w).reshape(len(u), -1))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Box:
     """A box for free-form deformation."""
 

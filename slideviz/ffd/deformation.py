@@ -15,6 +15,7 @@ from itertools import product
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CARTESIAN, Box, Embedding
 from slideviz.ffd.kinds import Move, Shift, Twist
@@ -159,7 +160,7 @@ class Limits:
     intersect themselves."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DrivenMove:
     """A link between a design variable and a move of a box."""
 

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.ffd.box import Box, points_at
 from slideviz.mesh.model import FloatArray
 
@@ -37,7 +38,7 @@ class Move(Protocol):
         """Return the derivative (I, J, K, 3) of the moved points along ``rates`` of the points."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Shift:
     """The change ``unit`` (I, J, K, 3) times the amount."""
 
@@ -61,7 +62,7 @@ class Shift:
         return rates
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Turn:
     """A rotation of the control points ``chosen`` (I, J, K) bool about a line.
 
@@ -110,7 +111,7 @@ class Turn:
         return across, np.cross(axis, across)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Twist:
     """A rotation of control points about y, through the point where a segment meets a plane.
 

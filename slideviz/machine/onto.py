@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots, row_norms
 from slideviz.mesh.topology import (
     distinct_edges,
@@ -61,7 +62,7 @@ class Wall(NamedTuple):
     nearest: Nearest
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Target:
     """A surface to lay a boundary onto, its normals oriented alike: all inwards, or all outwards.
 
@@ -72,7 +73,7 @@ class Target:
     edges: Nearest | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Laid:
     """A boundary laid onto a target surface."""
 

@@ -9,11 +9,11 @@ Piyavskii, 1972; B. O. Shubert, 1972).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, row_norms
@@ -110,7 +110,7 @@ def turned(corners: FloatArray, turn: Turn, by: int) -> FloatArray:
     return turn(corners.reshape(-1, corners.shape[2]), by).reshape(corners.shape)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Body:
     """A blade: connected facets, put together over the periodic sides where these cut it."""
 

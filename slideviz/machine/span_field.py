@@ -25,12 +25,13 @@ a hole in them is closed by triangles between the nodes of its rim.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.machine.span import Curves, Distances, Span, facets_of
 from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
@@ -59,7 +60,7 @@ ON_AXIS = 1e-9  # a point nearer to the axis, as a part of the largest radius, h
 WHOLE = 2.0 * np.pi  # the period of a mesh that repeats by no rotation
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SpanField(Span):
     """The normalised span between two walls, and meridional coordinates about the axis."""
 

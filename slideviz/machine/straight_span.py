@@ -10,10 +10,9 @@ where the span is along x, y or z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.machine.span import Curves, Distances, Span, facets_of
 from slideviz.machine.wall import plane_normal, turn_about_axis
@@ -28,7 +27,7 @@ EXACT = 1e-12  # components of a wall's unit normal below this are rounding
 Triple = tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StraightSpan(Span):
     """The span along a direction, and the lengths (m, h, t)."""
 
@@ -87,7 +86,7 @@ class StraightSpan(Span):
         return [(h - self.low, up, 0.0 * h), (self.high - h, -up, 0.0 * h)]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StraightCurves(Curves):
     """Straight lines along m: m' and m are both the length from ``start``."""
 

@@ -7,12 +7,12 @@ does not grow. A node of the second side in copy k is the node of the first side
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.table import ZoneContent
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
@@ -20,7 +20,7 @@ from slideviz.mesh.model import NO_NODES, Cells, FloatArray, IntArray, Marker, M
 from slideviz.mesh.periodic import TOLERANCE, Pair
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Wheel:
     """Passages of a wheel, whose nodes, cells and boundaries are made when they are asked for."""
 

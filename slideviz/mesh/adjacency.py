@@ -6,11 +6,10 @@ cell ``c`` has the number ``first[c] + k``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, IntArray, offsets_of, sealed
 from slideviz.system.jit_cache import njit
@@ -30,7 +29,7 @@ for _row in ELEMENTS.values():
         SIDE_NODES[_row.vtk, _k, : len(_local)] = _local
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sides:
     """The sides of all cells."""
 
@@ -39,7 +38,7 @@ class Sides:
     """(s,) int32: the cell that shares the side, or `NONE` or `SEVERAL`."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CellsAround:
     """The cells that each node belongs to, in ascending order."""
 

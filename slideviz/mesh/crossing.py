@@ -12,13 +12,13 @@ the other's surface, and those of the other are distorted until its remaining no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import Cells, column_bounds, ranges, sorted_nodes
 from slideviz.mesh.planes import FacetSimplices, Planes, line_normals, normals
 from slideviz.system.threads import ordered_map
@@ -43,7 +43,7 @@ Hit = tuple["FloatArray", int, int]
 """A point (d,), and the indices of the two facets (or line and simplex) that cross there."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Crossing:
     """A place where the moved boundary goes through another."""
 

@@ -11,10 +11,9 @@ piece: so the sharp trailing edge of a profile that is one closed marker is foun
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import (
     DEFAULT_FEATURE_ANGLE_DEG,
     BoolArray,
@@ -28,7 +27,7 @@ from slideviz.mesh.topology import TINY, Boundary, corner_vectors, facet_vectors
 from slideviz.system.jit_cache import njit
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Fans:
     """Groups of smoothly joined facets of one marker around one node."""
 

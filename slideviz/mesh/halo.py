@@ -9,10 +9,10 @@ with every cell and every element of a boundary that has one of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import (
     NO_NODES,
     BoolArray,
@@ -30,7 +30,7 @@ FITS = 1e-5
 """Largest distance between a receiver and its donor's image, as a part of the mesh's extent."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RigidMotion:
     """A rigid motion ``x -> rotation x + shift``: rotation (d, d) and shift (d,)."""
 
@@ -42,7 +42,7 @@ class RigidMotion:
         return points @ self.rotation.T + self.shift
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Halo:
     """The halo of a mesh: copies of nodes, and the cells beyond the periodic sides."""
 

@@ -7,13 +7,12 @@ definitions. A cell's value of a metric of nodes is the worst of its nodes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from threading import Lock
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh import dual_loops, face_loops, shape_loops
 from slideviz.mesh.adjacency import SIDE_NODES, SIDES, cells_around, sides_of
@@ -49,7 +48,7 @@ _OUTER = WeakCache()
 _CACHED = 1 << 26  # most numbers in the cache, besides those of the mesh used last
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MetricValues:
     """The values of one metric for a mesh."""
 

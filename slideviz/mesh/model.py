@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slideviz.argument_types import check_fields, check_types
+from slideviz.argument_types import check_fields, check_types, record
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS, SIZES
 from slideviz.system.threads import in_parts
@@ -215,7 +215,7 @@ class Cells:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Marker:
     """A named boundary: its elements, of one dimension less than the mesh."""
 
@@ -231,7 +231,7 @@ class Marker:
         return self.cells.nodes
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Part:
     """Where the points and cells of a part of a mesh are in the whole mesh."""
 
@@ -244,7 +244,7 @@ class Part:
     """`n_points`, `n_cells`: numbers of points and cells of the whole mesh."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ZoneInterface:
     """A boundary whose nodes coincide with nodes of ``other`` in another zone."""
 
@@ -262,7 +262,7 @@ class ZoneInterface:
         return f"an interface with {self.other} of zone {self.zone} ({count} nodes in common)"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Origin:
     """What a mesh keeps of its file besides points, cells and boundaries, to write it back.
 
@@ -286,7 +286,7 @@ class Origin:
     """The cells of the file where cells of the mesh may be parts of these; None: they are not."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ZonePart:
     """Where a zone is in a mesh (`Mesh.parts`)."""
 

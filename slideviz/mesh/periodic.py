@@ -7,12 +7,13 @@ found by the nodes. `slideviz.rbf.images` has the sets of nodes that are images 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from operator import itemgetter
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, Message, point_words
 from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
@@ -42,7 +43,7 @@ _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 """Axes of rotation that `find_pairs` tries, in that order."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pair:
     """Two markers that are images of each other."""
 

@@ -8,12 +8,12 @@ between their centres finds far too many; boxes adapt to each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import NO_NODES, BoolArray, column_bounds
@@ -31,7 +31,7 @@ ANGLE = 1e-6
 """Largest angle, in radians, between a simplex and a direction that counts as lying in it."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacetSimplices:
     """The lines (2D) or triangles (3D) that facets are divided into, in the order of the facets."""
 
@@ -97,7 +97,7 @@ class FacetSimplices:
         return np.unique(self.nodes[:, pairs].reshape(-1, 2), axis=0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class BoxTree:
     """A complete binary tree over axis-parallel boxes, the *items*."""
 
@@ -274,7 +274,7 @@ def _find_near(tree, query, margin, nodes, nodes_of_items, pairs):  # type: igno
     return count
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Planes:
     """The planes of a surface's simplices at given points of its nodes, with a search tree."""
 

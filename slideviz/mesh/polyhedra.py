@@ -6,14 +6,13 @@ valid and star-shaped. Its metrics of faces are those of its true faces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray, row_dots, row_norms
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Faces:
     """The faces of all cells, those between two cells first; in 2D edges."""
 
@@ -129,7 +128,7 @@ class Faces:
         return found[0], found[1], found[2]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Polyhedra:
     """The cells of a file, some of which are several cells of the mesh."""
 

@@ -8,13 +8,13 @@ corner Jacobians over that of the undeformed cell. ``f_skew`` is that of `slidev
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import (
@@ -67,7 +67,7 @@ FINE = 10_000
 """Intervals of 0 to 1 in which cells are counted by quality; bars of a histogram join some."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class QualityTotals:
     """Counts and size-skew qualities of all cells of a mesh, summed up."""
 
@@ -163,7 +163,7 @@ def lowest(
     return ids
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Quality:
     """Quality of every cell of a mesh, in the order of the cells."""
 

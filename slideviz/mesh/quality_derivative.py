@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, coords_of, corners
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 FOLDED_AT_ONCE = 4096  # inverted cells whose coefficients (up to 27 each) are in memory at a time
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class QualityDerivative:
     """The smooth minimum and the mean of the quality, and their derivatives by the points.
 
@@ -265,7 +265,7 @@ NEGLIGIBLE = 1e-20
 """Share of a cell in the smooth minimum of the margins below which it is left out."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SmoothMargin:
     """The smooth minimum of the margins of all cells, and its derivative by the points.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.topology import distinct_edges, edge_keys, facet_edges, single_edges
@@ -150,7 +151,7 @@ def is_closed(surfaces: Sequence[Surface]) -> bool:
     return bool((np.unique(keys, return_counts=True)[1] == 2).all())
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Surface:
     """One boundary, ready to be drawn."""
 

@@ -6,11 +6,12 @@ A *facet* is one element of a marker.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
@@ -31,7 +32,7 @@ from slideviz.system.threads import in_parts
 TINY = float(np.finfo(float).tiny)  # smallest normal float: a divisor in place of 0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Boundary:
     """The facets of all markers, nodes ordered so that normals point out of the cells."""
 

@@ -32,12 +32,12 @@ Sources: AIAA drag prediction workshops 4 to 7, gridding guidelines (growth, equ
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, record
 from slideviz.errors import MeshError
 from slideviz.mesh.adjacency import cells_around
 from slideviz.mesh.cached_boundary import boundary_of
@@ -71,7 +71,7 @@ for _row in ELEMENTS.values():
         _LINKED[_row.vtk, _other] |= 1 << _one
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Columns:
     """The columns of nodes that leave boundaries of a mesh, and facets that have none."""
 
@@ -433,7 +433,7 @@ def _middles(points: FloatArray, facets: IntArray) -> FloatArray:
     return np.sum(points[facets] * real / width, axis=1)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Walls:
     """The layers of cells at the boundaries of a mesh, and how they changed."""
 

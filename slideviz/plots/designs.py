@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.mesh.model import FloatArray, IntArray
@@ -37,7 +37,7 @@ _HIGHEST = 0.35
 in inches; largest height of a legend above the axes, relative to the figure."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DesignCurve:
     """A result of the designs that differ in one column only, against that column."""
 

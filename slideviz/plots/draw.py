@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.ticker import NullLocator
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepRun:
     """Quality after each step of a run."""
 
@@ -32,7 +33,7 @@ class StepRun:
     series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class GreedyRun:
     """The convergence of a greedy selection, cycle by cycle."""
 

@@ -7,7 +7,6 @@ dashes, so that they can be told apart over the bars, over each other, and in gr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from matplotlib.legend_handler import HandlerBase
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import NullLocator
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 
@@ -30,7 +30,7 @@ _PALER = 0.45  # part of the background's color mixed into bars, so that lines o
 _SWATCH = 5  # number of colors that represent the bars in a legend
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class QualityRun:
     """Qualities of the cells of one mesh."""
 
@@ -40,7 +40,7 @@ class QualityRun:
     series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Distribution:
     """The number of cells of one mesh in intervals of a value."""
 
@@ -60,7 +60,7 @@ class Distribution:
         return cls(np.bincount(places, minlength=count), edges, len(values) - len(right))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Bars:
     """A distribution drawn as bars: its label, and a color per bar (or a list of one for all)."""
 
@@ -69,7 +69,7 @@ class Bars:
     colors: Sequence[Any] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Outline:
     """A distribution drawn as an outline, with its label and series number.
 

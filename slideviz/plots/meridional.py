@@ -6,12 +6,12 @@ A place is a bin of span and of length along the passage, in which all cells aro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.plots.section_paint import Paint
@@ -27,7 +27,7 @@ LARGE = 95.0  # bins are as large as this percentage of the cells, so that most 
 MOST_BINS = 120  # most bins in each direction
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeridionalBins:
     """Cells of a zone by meridional place: k bins from hub to shroud, and l along the passage."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT, Style, add_legend, style_axes
@@ -27,7 +27,7 @@ _FOLDED = 0.3
 """Opacity of the areas below a curve, and of the marks of inverted cells."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Curve:
     """The values of the cells along a section of a 2D mesh, sorted by position."""
 
@@ -63,7 +63,7 @@ def labels_of(section: Section, paint: Paint) -> tuple[str, str]:
     return section.in_plane.position_label().full, QUANTITIES[paint.label].axis
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CurveRow:
     """A curve of a plot with its name and series number."""
 

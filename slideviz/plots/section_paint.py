@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, cast
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.metrics import rated_metric
@@ -31,7 +32,7 @@ def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
     return np.where(np.isinf(values), values, np.clip(values, *limits))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Paint:
     """A value for every cell of a mesh, with limits and color map."""
 

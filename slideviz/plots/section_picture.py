@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import PAPER
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -214,7 +215,7 @@ class SectionStyle:
         return self.dpi or self.size[0] / float(np.clip(self.size[0] / 200.0, 5.0, 10.0))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SectionInRun:
     """The cut of a section in one run."""
 

@@ -7,11 +7,11 @@ cell belongs to the layer in which its middle (the mean of its nodes) lies.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import SlidevizError
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MOST_LAYERS = 40  # most layers, if their number is not given
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Profile:
     """Quality in layers from one end of the span to the other."""
 

@@ -10,10 +10,10 @@ Periodic images are classified as one node, with the fans of all of them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh import topology
 from slideviz.mesh.fans import Fans, components
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, ranges, row_dots
@@ -38,7 +38,7 @@ IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
 """Cosine of that angle: fans at a smaller angle are in one plane."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FansAround:
     """All fans, with what decides which of them are one surface."""
 
@@ -172,7 +172,7 @@ round off true corners of the domain. Which boundaries are one surface is also d
 change them together."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Classes:
     """The nodes of a mesh by class: moving, fixed, sliding on edges or on surfaces, internal."""
 

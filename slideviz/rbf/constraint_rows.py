@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import NoReturn
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import NodeError
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray
@@ -39,7 +39,7 @@ ALIGNED = 1e-10
 boundaries, far below any angle that a mesh could mean."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ConstraintRows:
     """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``."""
 

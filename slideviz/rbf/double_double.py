@@ -8,12 +8,12 @@ the data, a sum of ordinary products has lost nine digits; this one has not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from dataclasses import field as made_by
 
 import numpy as np
 from numba import prange
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import _K, one_at_a_time
 from slideviz.rbf.evaluate import Basis, Tick, no_tick
@@ -273,7 +273,7 @@ def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
             x[c, i], xl[c, i] = _over(s, sl, u[i, i], ul[i, i])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Residuals:
     """Computes residuals of an interpolation system with twice the digits of a float64."""
 
@@ -333,7 +333,7 @@ class Residuals:
         return found, rest
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DoubleFactor:
     """The double-double factor U = ``upper`` + ``low`` (n, n) of a system G = U^T U."""
 

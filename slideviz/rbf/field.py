@@ -6,13 +6,13 @@ parts, and in any order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, column_bounds, row_norms
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
 from slideviz.system.jit_cache import njit
@@ -43,7 +43,7 @@ def share(q: FloatArray) -> FloatArray:
     return (1.0 - q) ** 4 * (4.0 * q + 1.0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Vicinity:
     """The boxes of a grid that come near to points: in all others no search for these is needed."""
 
@@ -85,7 +85,7 @@ def _look_up(places, low, size, counts, marked, found):  # type: ignore[no-untyp
         found[i] = inside and marked[box if inside else 0]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Correction:
     """The boundary correction: spreads errors at boundary nodes to the nodes near them (Eq. 2.30).
 
@@ -182,7 +182,7 @@ class Correction:
         return row, source, weight
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RadialField:
     """A sum of radial functions and, for some kernels, a linear polynomial, with its correction."""
 

@@ -19,10 +19,10 @@ Distances are computed from *features*, a few numbers for each node:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.mesh.periodic import Pair
@@ -181,7 +181,7 @@ SECTORS = 1 << 12
 """Number of sectors into which the circle is divided to find the largest one without nodes."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Frame:
     """The coordinates and the distance of the interpolation, and the maps from and to points."""
 

@@ -9,11 +9,11 @@ checked: images must have moved alike. Periodic pairs are found in `slideviz.mes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import NodeError, point_words
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import (
@@ -74,7 +74,7 @@ def find_images(
     return representative
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ImageDisplacements:
     """Copies the displacements of given nodes to their periodic images."""
 

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import point_words
 from slideviz.mesh.model import (
     BoolArray,
@@ -99,7 +100,7 @@ def smooth(t: FloatArray) -> FloatArray:
     return t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Wall:
     """A connected wall with layers."""
 
@@ -118,7 +119,7 @@ Reached = tuple[IntArray, FloatArray, FloatArray, FloatArray]
 """Points (z,) in the zone of a wall, their distances from it, shares and weights."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WallNodes:
     """The nodes of all walls, once for each side, and the sources: these and their images."""
 
@@ -492,7 +493,7 @@ class KeptLayers:
         return {"walls": walls, "nodes": self.nodes}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LayerZone:
     """Nodes that go with walls, and how."""
 

@@ -5,10 +5,11 @@ Shapes: r rows of c candidates, m right-hand sides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, row_dots, row_norms
 from slideviz.mesh.nearest import OBLIQUE
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
@@ -205,7 +206,7 @@ class LevelLimit:
         return self._losses >= LOSSES or self._spent > self.budget
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Candidates:
     """The nodes that may be chosen, with their constraint rows; rows of one node are neighbours."""
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
@@ -80,7 +81,7 @@ class FrozenChoices(Protocol):
         """Project displacements (..., m, d) of sliding nodes (m,) onto the facets chosen before."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Problem:
     """What the interpolation of one step needs, in the working frame.
 
@@ -170,7 +171,7 @@ class Problem:
         return before.control[:0] if full else before.control
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CarriedError:
     """The errors that the interpolants of all previous steps left at boundary nodes."""
 
@@ -204,7 +205,7 @@ class Relaxed:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Solution:
     """The result of one step: displacements, control nodes and errors."""
 
@@ -246,7 +247,7 @@ class Solution:
     sliding one or two; empty where a method has no such systems."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Interpolant:
     """A sum of radial functions and, for some kernels, a linear polynomial (Eq. 2.1)."""
 

@@ -18,10 +18,10 @@ and is the derivative of the projection (`projection_matrices`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.fans import Fans, components
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_dots, row_norms
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
@@ -109,7 +109,7 @@ ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)
 """A number for each role of a marker, to compare arrays of roles."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Tracks:
     """The tracks (curves and surfaces on which nodes slide), and the track of each sliding node."""
 

@@ -15,11 +15,11 @@ so that refinement with them adds noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, FloatArray, row_dots
 from slideviz.rbf.double_double import DoubleFactor, Residuals, supports
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
@@ -63,7 +63,7 @@ nearly coincide, for the preconditioner does not see them."""
 CHECKS = 60  # number of points between control nodes at each of four distances (`check_points`)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Refined:
     """A refined solution."""
 
@@ -76,7 +76,7 @@ class Refined:
     exact: bool  # whether the system was factorised with twice the digits
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class System:
     """An interpolation system with its factor, to estimate errors and to refine solutions."""
 

@@ -10,12 +10,12 @@ go with it nearly as they are, and what is far from all walls has the motion tha
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate, row_dots, row_norms
 from slideviz.mesh.topology import TINY, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
@@ -45,7 +45,7 @@ BULGE = 0.25
 normals at its ends: twice the 1/8 of an arc, since normals at nodes are estimates."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FlatWall:
     """A plane, in 2D a line, which goes on beyond its boundary."""
 
@@ -66,7 +66,7 @@ class FlatWall:
         return positions - ((positions - self.point) @ self.normal)[:, None] * self.normal
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CurvedWall:
     """Facets that go on flat beyond the rim."""
 
@@ -104,7 +104,7 @@ RimWall = FlatWall | CurvedWall
 """A smooth surface, in 2D a curve, that nodes of a rim are on."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FrozenRim:
     """Where a rim is at a reference, and its closest points on the walls, linear around it."""
 
@@ -118,7 +118,7 @@ Keep = Callable[[Callable[[], FrozenRim]], FrozenRim]
 """Returns what its argument returned when it was called first."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Bodies:
     """The connected moving boundaries that have rims, as a graph; periodic images are one place."""
 
@@ -181,7 +181,7 @@ class Bodies:
         return out
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Rims:
     """The rims of all moving nodes, in a frame.
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve
 from threadpoolctl import ThreadpoolController
 
+from slideviz.argument_types import record
 from slideviz.errors import DeformError
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
@@ -29,7 +29,7 @@ RANK = 1e-10
 QR is at most this part of the largest one."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Saddle:
     """Solution of a system with a polynomial (Eq. 2.4)."""
 
@@ -162,7 +162,7 @@ def enough_threads(flops: float) -> AbstractContextManager[object]:
     return _libraries().limit(limits=1, user_api="blas")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Factor:
     """The Cholesky factor L of the ``retained`` rows and columns of a system G (n, n)."""
 

@@ -9,13 +9,13 @@ values and derivatives.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ Link = tuple[Any, Linear, Linear]
 the argument to those of the result, and from adjoints of the result to those of the argument."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Variable:
     """The result of an operation on a tape."""
 

@@ -8,10 +8,9 @@ grid is the same at all spans between them. The case twists and leans the blade 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.samples.passage import (
@@ -55,7 +54,7 @@ def _meridional(place: FloatArray, span: FloatArray) -> FloatArray:
     return walls[0] + span[:, None] * (walls[1] - walls[0])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Impeller(Stack):
     """A `Stack` of one plane (1, m, 2), of place and theta, between hub and shroud."""
 

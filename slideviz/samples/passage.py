@@ -21,6 +21,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, row_dots
 
@@ -191,7 +192,7 @@ _EDGES = np.array(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Grid:
     """The node numbers of O-grid and channel, which do not depend on the shape of the blade."""
 

@@ -12,13 +12,13 @@ rest. The displacement moves the blade as an optimiser might: twist, lean and bu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
@@ -166,7 +166,7 @@ def stator(size: int, streams: bool) -> tuple[Stack, Displacements]:
     return stack, stator_displacement(nodes, stack.points(nodes))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Stack:
     """A `Structured` grid of smoothed grids at three radii, stacked between hub and shroud."""
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from slideviz.argument_types import record
 from slideviz.case.cfg import case_of_text, write_case
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
@@ -24,7 +25,7 @@ from slideviz.system.atomic import atomic_write, make_folder
 from slideviz.terms import FileFormat
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sample:
     """A mesh and a case that deforms it."""
 

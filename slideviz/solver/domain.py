@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.spans import periodic_pairs
 from slideviz.errors import MeshError, Message, Remark, note
@@ -26,7 +27,7 @@ from slideviz.rbf.tape import value
 from slideviz.terms import Role
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Domain:
     """A mesh with the roles of its boundaries: all that is computed before a motion is known."""
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
@@ -127,7 +128,7 @@ def overshoot_of_rest(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Farthest:
     """The node of a mesh that went farthest."""
 

@@ -7,10 +7,9 @@ cells are a third as high as long; where they are h from the beginning, the zone
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.errors import point_words
 from slideviz.mesh.elements import ELEMENTS
@@ -53,7 +52,7 @@ def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> Layer
     return find_zone(wall_nodes(frame, domain.coords, known, walls), nodes, targets, slides)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Room:
     """The corners of cells beside the layers that walls hold."""
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 
+from slideviz.argument_types import record
 from slideviz.case.check import check_case, motion_doubts
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone
@@ -22,7 +22,7 @@ NOT_STREAMED = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Prepared:
     """A case, and the mesh that it fits."""
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes, same
@@ -83,7 +84,7 @@ def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
     return min(TOLERANCE, APART * mismatch / mesh.extent)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class BoundaryConditions:
     """What is prescribed: nodes of known displacement, and that displacement."""
 

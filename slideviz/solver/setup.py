@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property, partial, reduce
 from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.baselines.idw import Weights, deform_idw
 from slideviz.case.check import file_before_motions, idle_settings, motion_doubts
 from slideviz.case.displacement import Displacements
@@ -193,7 +194,7 @@ def loose_warnings(
     return [sentence]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Setup(Domain):
     """A domain, its prescribed displacements, and the data that are the same in all steps."""
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.motions.box import moved_boxes
 from slideviz.case.words import wrong_by
@@ -85,7 +86,7 @@ class _Finding:
     others: list[Remark]  # what is said of every step
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _State:
     """A deformation after some of its steps; the next one begins here."""
 
@@ -98,7 +99,7 @@ class _State:
     inverted: int = 0  # inverted cells, where steps are halved
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Stepping:
     """A deformation that can be made in any number of steps."""
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import Remark, SlidevizError
 from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.margin import chain as chained_safety
@@ -79,7 +80,7 @@ class Trial:
     inverted: int  # inverted cells of the result
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeshRepair:
     """A mesh after repair, and what was mended."""
 
@@ -196,7 +197,7 @@ def by(rule: Callable[[list[Any]], Any], *, new: bool = False) -> dict[str, Any]
     return {"joined": rule, "new": new}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Step:
     """The mesh after one step.
 
@@ -325,7 +326,7 @@ class Step:
         return () if self.check_limits is None else self.check_limits(self.mesh)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RunResult:
     """The outcome of a run, in memory or from file to file."""
 

@@ -6,12 +6,13 @@ The skin is the boundary and the cells at it: the only part of the mesh that is 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import DeformError, MeshError, UnsoundError, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.rbf.frames import on_axis
@@ -24,7 +25,7 @@ from slideviz.solver.stepping import cartesian, shifted
 from slideviz.solver.steps import MeshRepair, Step
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class InteriorDisplacer:
     """Displaces any nodes of a mesh, by the steps of its skin."""
 

@@ -14,12 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, Message
 from slideviz.formats.su2b.read import read_markers
 from slideviz.mesh.margin import SafeFraction, step_safety
@@ -191,7 +192,7 @@ def measure_mesh(
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeasuredBlock:
     """The quality of a block of cells, undeformed and deformed, without its meshes."""
 

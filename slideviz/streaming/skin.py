@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, printable
 from slideviz.formats.su2.lines import boxes_elsewhere
 from slideviz.formats.su2.text import Text
@@ -168,7 +169,7 @@ def _ticking(results: Iterator[T], tick: Tick, count: int) -> Iterator[T]:
         yield result
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _BoundaryCells:
     """Cells of a block of the file that may have a side on the boundary."""
 

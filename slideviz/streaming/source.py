@@ -10,13 +10,14 @@ import mmap
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zones
 from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
@@ -38,7 +39,7 @@ they are at most so many times as many as its cells."""
 Zone = tuple[Path, int | None]  # a file and the number of a zone in it, all where it is None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CellBlock:
     """Some cells of a mesh with their points."""
 
@@ -132,7 +133,7 @@ def cut_cells(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MemorySource:
     """A mesh in memory: one block."""
 
@@ -162,7 +163,7 @@ class MemorySource:
         return np.asarray(self.mesh.cells.types[ids])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PointTable:
     """The points of a zone of an SU2 binary mesh, or of a file with the same layout."""
 
@@ -210,7 +211,7 @@ class PointTable:
         os.fsync(file)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ZoneSource:
     """A zone of a mesh in an SU2 binary file, of which one block is in memory at a time."""
 
@@ -277,7 +278,7 @@ class ZoneSource:
                 yield self.with_points(block).take(which)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FileSource:
     """A mesh in an SU2 binary file: one zone, or all of them as one mesh."""
 

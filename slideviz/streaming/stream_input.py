@@ -9,9 +9,9 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.errors import MeshError, printable
 from slideviz.formats.binary_copy import binary_layouts, write_layouts
@@ -112,7 +112,7 @@ COPIED = 0.8
 """Parts of the time for reading a text after which its lines are found, and its copy is made."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StreamInput:
     """A mesh to be streamed, in an SU2 binary file."""
 

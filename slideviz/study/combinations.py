@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from slideviz import terms
+from slideviz.argument_types import record
 from slideviz.case.check import check_case
 from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case
@@ -170,7 +171,7 @@ class Combination:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Result:
     """The result of a combination: quality, errors and time."""
 
@@ -194,7 +195,7 @@ class Result:
     limits: str = ""  # whether the limits of the case are met (`slideviz.case.limits.outcome`)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CombinationRow:
     """A combination with its result, or with the reason why there is none."""
 
@@ -216,7 +217,7 @@ def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[Combina
         yield row
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Shared:
     first: Combination
     setup: Setup | None  # None of a mesh of several zones, each of which has its own

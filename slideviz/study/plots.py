@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.spans import periodic_pairs
 from slideviz.errors import CaseError, MeshError
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 Span = Literal["r", "x", "y", "z"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacetLine:
     """A line in a facet: its name, its number ``series`` (which sets its look), and its result."""
 
@@ -48,7 +49,7 @@ class FacetLine:
     result: Result
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Facet:
     """Lines that are drawn in one plot; ``title`` is empty where there is one facet only."""
 

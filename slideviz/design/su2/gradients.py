@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import starmap
 from pathlib import Path
@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from slideviz.argument_types import record
 from slideviz.case.lines import read_text
 from slideviz.case.motions.airfoil import normals_at
 from slideviz.case.words import is_number
@@ -118,7 +119,7 @@ SAME = 1e-6
 is of other points."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sensitivities:
     """Derivatives of an objective with respect to the points of a mesh."""
 
@@ -131,7 +132,7 @@ class Sensitivities:
     ordered: bool = True
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Matched:
     """Sensitivities in the order of a mesh's points."""
 
@@ -415,7 +416,7 @@ INSUFFICIENT = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Gradients:
     """Gradients of an objective at a design."""
 

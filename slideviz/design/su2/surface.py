@@ -17,6 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.keys import ffd_contradictions
 from slideviz.case.lines import read_text
@@ -84,7 +85,7 @@ UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
 OFF_CHORD = 0.05  # how far its ends may be from there without a warning
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Displacer:
     """Displaces the moving nodes by the design variables of one group; without a group none."""
 
@@ -121,7 +122,7 @@ class Displacer:
         return {}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MovedNodes:
     """Moving nodes of a mesh: what the formulas depend on."""
 
@@ -608,7 +609,7 @@ def _words(held: Planes) -> str:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MovedBoxes(Displacer):
     """FFD boxes that a design deforms."""
 
@@ -994,7 +995,7 @@ RIGID = ("TRANSLATION", "ROTATION", "SCALE")
 """Kinds of variables that move boundaries as a rigid body, or scale them."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ZoneDisplacers(Displacer):
     """The displacers of zones with a configuration each, as one."""
 
@@ -1064,7 +1065,7 @@ DISPLACERS: dict[Group, Callable[[Su2Config, Mesh, IntArray], Displacer]] = {
 """What moves the nodes, by the group of the first design variable."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MovingSurface:
     """The moving boundaries of a configuration, and its design."""
 

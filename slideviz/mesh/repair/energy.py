@@ -13,10 +13,9 @@ weighted by volume, thin cells of boundary layers would be given up for large on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.jacobian_slopes import pull_proof
 from slideviz.mesh.jacobians import (
     CORNER_AT,
@@ -39,7 +38,7 @@ LEAST_SINE = 0.01
 """Least Jacobian of a target's corner over the product of its edges; flatter ones are opened."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Targets:
     """Cells of one type, and the shapes that the energy compares them with."""
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, sealed
 
 Project = Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]
@@ -15,7 +16,7 @@ their points (k, d). Returns the points on the boundary (k, d), images where the
 the maps T (k, d, d) there."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Freedom:
     """Which nodes may move, and how: ``x_i = x_i⁰ + T_i q_b``, q_b the unknowns of its block.
 

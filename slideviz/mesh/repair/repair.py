@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobian_slopes import write_slopes
 from slideviz.mesh.jacobians import CORNERS, INVERTED, VALID
@@ -87,7 +88,7 @@ Report = Callable[[float], object]
 """Called with the fraction that is done; what it raises ends the repair."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Impossible:
     """A cell that no motion of free nodes mends."""
 
@@ -96,7 +97,7 @@ class Impossible:
     layered: bool  # whether some of these are nodes of layers
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Region:
     """Cells of a mesh, with what their repair needs."""
 
@@ -122,7 +123,7 @@ class Regions(Protocol):
         """Take the points (n, d) of the nodes of a region, some of which were moved."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Repaired:
     """A mesh after repair."""
 
@@ -137,7 +138,7 @@ class Repaired:
     impossible: tuple[Impossible, ...]  # the cells that cannot be mended; they are in bad_after
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Work:
     """What all patches have in common."""
 
