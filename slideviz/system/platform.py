@@ -1,7 +1,7 @@
 """All that differs between operating systems: what is used where it exists, and what else happens.
 
-`FACILITIES` is the table. Everything else in slideviz calls the functions here, and none of the
-names in it (``tests/system/test_platform.py``).
+The table is on the page of systems (``docs/reference/systems.md``). Everything else in slideviz
+calls the functions here, and none of the names in it (``tests/system/test_platform.py``).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,103 +27,6 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-
-class Facility(NamedTuple):
-    """Something that not every operating system has."""
-
-    names: tuple[str, ...]  # of the functions, constants, modules or files
-    use: str  # what it is used for
-    elsewhere: str  # what happens without it
-
-
-FACILITIES = (
-    Facility(
-        ("O_NOFOLLOW",),
-        "temporary files are never opened through a symbolic link",
-        "a test just before finds links",
-    ),
-    Facility(
-        ("pread", "pwrite"),
-        "threads read and write parts of one file at once",
-        "one after the other",
-    ),
-    Facility(
-        ("O_DSYNC",),
-        "written parts of a streamed mesh reach the disk at once",
-        "they do so with the end of the file",
-    ),
-    Facility(("copy_file_range",), "the system copies parts of files", "they are read and written"),
-    Facility(
-        ("posix_fallocate",),
-        "a full disk is noticed when a temporary file is made",
-        "it may be noticed only while the file is filled",
-    ),
-    Facility(
-        ("MADV_DONTNEED",), "pages of temporary files are given back", "the system does it itself"
-    ),
-    Facility(
-        ("fchmod",),
-        "a file that is replaced keeps its permissions",
-        "only its write protection, if any",
-    ),
-    Facility(
-        ("removing an open file",),
-        "a signal that ends a command leaves no draft",
-        "a draft that is open stays until the next command writes to its folder",
-    ),
-    Facility(
-        ("replacing an open file",),
-        "a file that is open, as a large mesh in the window, can be replaced",
-        "it cannot, and the message says so",
-    ),
-    Facility(
-        ("resource", "SIGXCPU"),
-        "readers of other formats have limits of memory and processor time",
-        "only of time on the clock, three times as long",
-    ),
-    Facility(
-        ("prctl",),
-        "a reader ends when slideviz is killed",
-        "it ends when it has read the file",
-    ),
-    Facility(
-        ("sched_getaffinity", "sched_setaffinity"),
-        "as many threads as cores this process may use",
-        "as many as the machine has",
-    ),
-    Facility(
-        ("setpriority",),
-        "threads that compute have a lower priority than the window",
-        "they have the same",
-    ),
-    Facility(
-        ("malloc_trim",), "freed memory is given back to the system", "it is kept for later use"
-    ),
-    Facility(
-        ("/proc/meminfo",),
-        "what needs more memory than there is free is refused",
-        "it ends when memory runs out",
-    ),
-    Facility(
-        ("/proc/self/ns/pid",),
-        "drafts of dead processes of another container are kept apart",
-        "there are no such containers",
-    ),
-    Facility(
-        ("pthread_sigmask", "sigwait"),
-        "processes of a sweep remove their drafts when they are ended",
-        "the next command that writes there does",
-    ),
-    Facility(
-        ("SIGHUP",), "the end of a terminal ends a command cleanly", "there is no such signal"
-    ),
-    Facility(
-        ("X11", "AF_UNIX"),
-        "without a screen the window says so, and pictures are drawn by EGL",
-        "there always is a screen",
-    ),
-)
-"""What slideviz uses of Linux, and what happens on systems without it."""
 
 _PEACE = threading.Lock()  # held while a file is at one place, where there is no `pread`
 _SHARING = (32, 33)  # errors of Windows: a file, or a part of it, is in use
