@@ -7,9 +7,15 @@ order (thesis Eq. 2.39 to 2.42 and Table 2.3). A triangle and a tetrahedron need
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from slideviz.system.tables import table_beside
+
+Nodes = Sequence[Sequence[int]]
+"""Local nodes of the sides, edges or corners of an element type."""
 
 
 @dataclass(frozen=True)
@@ -23,79 +29,23 @@ class ElementType:
     n_nodes: int
     dim: int
     """`n_nodes`, `dim`: number of nodes, dimension (0 for a vertex to 3)."""
-    facets: tuple[tuple[int, ...], ...] = ()
+    facets: Nodes = ()
     """Local nodes of each side (dimension ``dim - 1``), with outward normal."""
-    edges: tuple[tuple[int, int], ...] = ()
+    edges: Nodes = ()
     """Local nodes of each edge."""
-    corners: tuple[tuple[int, ...], ...] = ()
+    corners: Nodes = ()
     """``(k, a, b[, c])``: local nodes of the corner and its neighbours, right-handed; empty for
     vertex and line."""
 
 
-_ROWS = (
-    ElementType(1, "vertex", 1, 0),
-    ElementType(3, "line", 2, 1, ((0,), (1,)), ((0, 1),)),
-    ElementType(
-        5, "triangle", 3, 2, ((0, 1), (1, 2), (2, 0)), ((0, 1), (1, 2), (2, 0)), ((0, 1, 2),)
-    ),
-    ElementType(
-        9,
-        "quadrilateral",
-        4,
-        2,
-        ((0, 1), (1, 2), (2, 3), (3, 0)),
-        ((0, 1), (1, 2), (2, 3), (3, 0)),
-        ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
-    ),
-    ElementType(
-        10,
-        "tetrahedron",
-        4,
-        3,
-        ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
-        ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-        ((0, 1, 2, 3),),
-    ),
-    ElementType(
-        12,
-        "hexahedron",
-        8,
-        3,
-        ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-        (
-            *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
-            *((0, 4), (1, 5), (2, 6), (3, 7)),
-        ),
-        (
-            *((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7)),
-            *((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
-        ),
-    ),
-    ElementType(
-        13,
-        "prism",
-        6,
-        3,
-        ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-        ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
-        ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
-    ),
-    ElementType(
-        14,
-        "pyramid",
-        5,
-        3,
-        ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-        ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
-        ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
-    ),
-)
-
-ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}  # element type by VTK identifier
+ELEMENTS: dict[int, ElementType] = {
+    row["vtk"]: ElementType(name=name, **row) for name, row in table_beside(__file__).items()
+}
+"""Element type by VTK identifier; the table is ``elements.toml``."""
 
 SIZES = np.zeros(256, np.int64)
 DIMS = np.zeros(256, np.int64)
 """Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""
-for _row in _ROWS:
+for _row in ELEMENTS.values():
     SIZES[_row.vtk] = _row.n_nodes
     DIMS[_row.vtk] = _row.dim

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import ELEMENTS, Nodes
 from slideviz.mesh.jacobians import LANES, add3, column3, cross3, dot3, edge, gather
 from slideviz.mesh.model import IntArray
 from slideviz.system.jit_cache import njit
@@ -24,7 +24,7 @@ SHAPES: tuple[Metric, ...] = (
 """The metrics that `write_shapes` writes, in that order."""
 
 
-def _filled(rows: tuple[tuple[int, ...], ...], width: int) -> IntArray:
+def _filled(rows: Nodes, width: int) -> IntArray:
     return np.array([[*row, *[-1] * (width - len(row))] for row in rows])
 
 

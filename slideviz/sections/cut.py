@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -316,7 +316,7 @@ def _loops(row: ElementType, pattern: int) -> list[list[int]]:
 
 
 def _joints(
-    side: tuple[int, ...], pattern: int, edge_of: dict[frozenset[int], int]
+    side: Sequence[int], pattern: int, edge_of: dict[frozenset[int], int]
 ) -> list[tuple[int, int]]:
     """Return the pairs of cut edges of a side: before and after each run of negative nodes."""
     negative = [bool(pattern >> node & 1) for node in side]
