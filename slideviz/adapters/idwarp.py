@@ -23,7 +23,7 @@ from slideviz.design.deformer import Deformer
 from slideviz.errors import CaseError
 from slideviz.formats.cgns.read import CgnsForm
 from slideviz.formats.files import read, write
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 
 COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""
@@ -90,18 +90,18 @@ class SolverSurface:
             )
         moved = given - self.start
         out = self.means(moved)
-        off = _lengths(np.where(self.held, 0.0, moved - self.spread(out)))
+        off = row_norms(np.where(self.held, 0.0, moved - self.spread(out)))
         if off.max(initial=0.0) > self.tolerance:
             raise CaseError(
                 f"node {int(off.argmax())} of the surface is there several times, with coordinates "
                 f"that are {off.max():g} from their mean; copies of a node must move alike"
             )
-        off = np.minimum(_lengths(moved), _lengths(given - now)) * self.held[:, 0]
+        off = np.minimum(row_norms(moved), row_norms(given - now)) * self.held[:, 0]
         if off.max(initial=0.0) > self.tolerance:
             worst = int(off.argmax())
             raise CaseError(
                 f"node {worst} of the surface, at {self.start[worst].tolist()}, was moved by "
-                f"{_lengths(moved)[worst]:g}, but its boundary is not a moving one in the case; "
+                f"{row_norms(moved)[worst]:g}, but its boundary is not a moving one in the case; "
                 "give it the role moving, or leave the node"
             )
         return out
@@ -127,10 +127,6 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
             "roles"
         )
     return surface
-
-
-def _lengths(vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 _OURS = ("gridFile", "case", "displacements")

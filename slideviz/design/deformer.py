@@ -38,6 +38,9 @@ from slideviz.mesh.model import (
     Mesh,
     frozen_array,
     largest_coordinate,
+    largest_norm,
+    row_norms,
+    row_numbers,
 )
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.mesh.quality import quality
@@ -200,7 +203,7 @@ class Checks:
         for k, target in enumerate(targets):
             if not np.isfinite(far[k]):
                 raise DeformError(f"step {index}: coordinates became infinite; use more steps")
-            largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
+            largest = part * largest_norm(target)
             reach = max(largest, part * self.least)
             if far[k] > GROWTH * reach or lost[k] > HOPELESS * largest:
                 solution = Solution(
@@ -243,7 +246,7 @@ class Checks:
         for index, facets in self.facets.items():
             at = flat(coords[..., sliding[label == index], :])
             guess = np.tile(facets, len(at) // len(facets))
-            gap = np.linalg.norm(tracks.tracks[index].nearest(at, guess)[0] - at, axis=1)
+            gap = row_norms(tracks.tracks[index].nearest(at, guess)[0] - at)
             off = np.maximum(off, gap.reshape(*off.shape, -1).max(axis=-1))
         return off
 
@@ -255,7 +258,7 @@ class Checks:
         """
         if self.setup.reduction is not None:
             return np.full(designs.shape[:-2], self.setup.reduction.tolerance)
-        largest = np.linalg.norm(designs, axis=-1).max(axis=-1, initial=0.0)
+        largest = row_norms(designs).max(axis=-1, initial=0.0)
         return AUTO_TOLERANCE * largest + ROUNDING * self.mesh.extent
 
 
@@ -275,7 +278,7 @@ def usual_edge(setup: Setup) -> float:
     facets = setup.boundary.facets
     facets = facets[np.isin(facets, setup.classes.moving).all(axis=1)]
     ends = setup.coords[np.roll(facets, -1, axis=1)] - setup.coords[facets]
-    gaps = np.linalg.norm(ends, axis=-1)
+    gaps = row_norms(ends)
     gaps = gaps[gaps > 0.0]
     return float(np.median(gaps)) if len(gaps) else 0.0
 
@@ -422,7 +425,7 @@ class KnownNodeMap:
             shift = vectors[..., self.others, :]
             follow = difference_from(setup.frame, mesh.points[self.nodes[self.others]], shift)
             gap = np.abs(value(follow) - moved[..., self.followed, :])
-            largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
+            largest = row_norms(moved).max(axis=-1, initial=0.0)
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
             if (gap.max(axis=(-1, -2)) > allowed).any():
                 self._refuse(vectors)
@@ -435,7 +438,7 @@ class KnownNodeMap:
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)
             there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
-            largest = float(np.linalg.norm(there, axis=1).max(initial=0.0))
+            largest = largest_norm(there)
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
             ImageDisplacements(moved.nodes, there, setup.classes.representative).require_alike(
                 allowed
@@ -456,8 +459,7 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
     turn = None
     if mesh.halo is not None:
         turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
-        row = np.full(len(mesh.points), -1)
-        row[mesh.halo.receivers] = np.arange(len(mesh.halo.receivers))
+        row = row_numbers(len(mesh.points), mesh.halo.receivers)
         copies = row[nodes] >= 0
         given[copies] = mesh.halo.donors[row[nodes[copies]]]
         turn[copies] = mesh.halo.rotations[row[nodes[copies]]]

@@ -24,7 +24,7 @@ from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.words import wrong_by
 from slideviz.errors import ConditionWarning, DeformError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate, row_numbers
 from slideviz.rbf import tape
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
@@ -828,8 +828,7 @@ class _Run:
         d = self._setup.coords.shape[1]
         if halo is None:
             return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, d, d))
-        row = np.full(len(setup.coords), -1)
-        row[nodes] = np.arange(len(nodes))
+        row = row_numbers(len(setup.coords), nodes)
         copy = row[halo.receivers]
         origin = row[halo.donors]
         both = (copy >= 0) & (origin >= 0)

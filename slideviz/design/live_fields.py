@@ -19,7 +19,7 @@ from slideviz.case.motions.motion import Motion, applies_to
 from slideviz.case.moving_nodes import moving_nodes
 from slideviz.design.deformer import Deformer, facets_of
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, row_norms
 from slideviz.solver.deform import Progress
 from slideviz.solver.setup import Setup
 from slideviz.system.grouping import grouped
@@ -175,7 +175,7 @@ def nudged(motion: Motion) -> Iterator[Motion]:
 
 def independent(rows: FloatArray) -> FloatArray:
     """Return orthogonal rows (r, q) of length 1 that span the same as rows (k, q)."""
-    lengths = np.linalg.norm(rows, axis=1)
+    lengths = row_norms(rows)
     rows = rows[lengths > 0.0] / lengths[lengths > 0.0, None]
     if not len(rows):
         raise DeformError("the motions move nothing, and have no numbers that could")
@@ -185,7 +185,7 @@ def independent(rows: FloatArray) -> FloatArray:
 
 def factor_of(vectors: FloatArray, points: FloatArray) -> float:
     """Return the factor of displacements (m, d) of ``points`` with which control nodes suffice."""
-    lengths = np.linalg.norm(vectors, axis=1)
+    lengths = row_norms(vectors)
     size = np.ptp(points[lengths > 0.0], axis=0).max()
     return float(TURN * size / 3.0 / lengths.max())
 

@@ -19,7 +19,7 @@ from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CARTESIAN, Box, Embedding
 from slideviz.ffd.kinds import Move, Shift, Twist
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, row_norms
 
 INSIDE = 1e-8
 """A parametric coordinate may be so far outside of [0, 1]: a point on a side is inside."""
@@ -112,7 +112,7 @@ def _newton(
     """Return Newton's end from ``uvw`` (m, 3), and its distance (m,) over the size of the box."""
     uvw = uvw.copy()
     remaining = points - box.at(uvw)
-    gap = np.linalg.norm(remaining / size, axis=1)
+    gap = row_norms(remaining / size)
     going = np.flatnonzero(gap > MET)
     for _ in range(STEPS):
         if not len(going):
@@ -124,7 +124,7 @@ def _newton(
             rows = going[~better]
             trial = np.clip(uvw[rows] + scale[~better, None] * step[~better], -REACH, 1.0 + REACH)
             there = points[rows] - box.at(trial)
-            left = np.linalg.norm(there / size, axis=1)
+            left = row_norms(there / size)
             good = left < gap[rows]
             uvw[rows[good]] = trial[good]
             remaining[rows[good]] = there[good]
@@ -387,7 +387,7 @@ class BoxDeformation:
     def _bound(self, box: Box) -> None:
         """Scale the displacement of a box back to the bound, as SU2 does: by one more pass."""
         nodes = self._embedded[box.name].nodes
-        lengths = np.linalg.norm(self.nodes[nodes], axis=1)
+        lengths = row_norms(self.nodes[nodes])
         bound = self.limits.bound
         largest = float(lengths.max(initial=0.0))
         if largest <= bound:

@@ -20,6 +20,7 @@ from slideviz.mesh.model import (
     FloatArray,
     IntArray,
     frozen_array,
+    mask_of,
     row_dots,
     sealed,
 )
@@ -91,8 +92,7 @@ def find_fans(
     total = int(fan.max(initial=-1)) + 1
     first = np.empty(total, np.int64)
     first[fan[::-1]] = np.arange(len(fan))[::-1]
-    is_first = np.zeros(len(fan), bool)
-    is_first[first] = True
+    is_first = mask_of(len(fan), first)
     fan = (np.cumsum(is_first) - 1)[first][fan]
     fan_node = np.empty(total, np.int64)
     fan_marker = np.empty(total, np.int64)

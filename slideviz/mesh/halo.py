@@ -22,7 +22,9 @@ from slideviz.mesh.model import (
     Marker,
     Mesh,
     frozen_array,
+    mask_of,
     row_norms,
+    row_numbers,
 )
 from slideviz.system.weak_cache import weak_cache
 
@@ -72,12 +74,6 @@ class Halo:
         out[self.receivers[rows]] = np.where(moved == 0, start, start + moved)
         return out
 
-    def outer_mask(self, count: int) -> BoolArray:
-        """Return a mask (count,) of the outer receivers; ``count`` is the number of nodes."""
-        mask = np.zeros(count, bool)
-        mask[self.outer] = True
-        return mask
-
     def describe(self) -> str:
         """Return the size of the halo in words."""
         sides = ", ".join(f"{copy} of {origin}" for copy, origin in self.sides)
@@ -106,8 +102,7 @@ def make_halo(
     sides = _sides(mesh, receivers, donors)
     inner = [mesh.marker(copy).nodes for copy, _ in sides]
     outer = np.setdiff1d(receivers, np.concatenate([*inner, NO_NODES]))
-    beyond = np.zeros(len(mesh.points), bool)
-    beyond[outer] = True
+    beyond = mask_of(len(mesh.points), outer)
     mismatch = np.empty(len(receivers))
     for index, motion in enumerate(motions):
         some = which == index
@@ -132,8 +127,7 @@ def _rooted(
 
     ``mismatch`` (h,) is summed along the chains, in place.
     """
-    row = np.full(count, -1)
-    row[receivers] = np.arange(len(receivers))
+    row = row_numbers(count, receivers)
     donors = donors.copy()
     rotations = rotations.copy()
     for _ in range(3):  # as many as there are periods at most
@@ -153,8 +147,7 @@ def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str
     """
     donor = np.arange(len(mesh.points))
     donor[receivers] = donors
-    copied = np.zeros(len(mesh.points), bool)
-    copied[receivers] = True
+    copied = mask_of(len(mesh.points), receivers)
     marker_of: dict[tuple[int, ...], str] = {}
     for marker in mesh.markers:
         for _, nodes in marker.cells.by_type.values():
@@ -187,7 +180,7 @@ def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
 
 @weak_cache
 def _inside(mesh: Mesh, halo: Halo) -> tuple[Mesh, IntArray]:
-    beyond = halo.outer_mask(len(mesh.points))
+    beyond = mask_of(len(mesh.points), halo.outer)
     markers = tuple(
         Marker(marker.name, marker.cells.take(~_touching(marker.cells, beyond)))
         for marker in mesh.markers

@@ -46,6 +46,16 @@ def row_norms(vectors: FloatArray) -> FloatArray:
     return lengths
 
 
+def largest_norm(vectors: FloatArray) -> float:
+    """Return the length of the longest row of an array, 0 without rows."""
+    return float(row_norms(vectors).max(initial=0.0))
+
+
+def largest_size(values: FloatArray) -> float:
+    """Return the largest absolute value of an array, 0 of an empty one."""
+    return float(np.abs(values).max(initial=0.0))
+
+
 def row_dots(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the scalar products (m,) of the rows of two arrays (m, d)."""
     return np.einsum("md,md->m", one, other)
@@ -61,6 +71,26 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
 
 
 NO_NODES: IntArray = np.empty(0, np.int64)  # and no rows, no cells
+
+
+def mask_of(count: int, chosen: NDArray | slice) -> BoolArray:
+    """Return the mask (count,) of the rows whose numbers, or mask, are ``chosen``."""
+    mask = np.zeros(count, bool)
+    mask[chosen] = True
+    return mask
+
+
+def row_numbers(count: int, chosen: IntArray) -> IntArray:
+    """Return the place in ``chosen`` of each of ``count`` numbers, -1 of those not in it."""
+    places = np.full(count, -1)
+    places[chosen] = np.arange(len(chosen))
+    return places
+
+
+def run_begins(rows: NDArray) -> BoolArray:
+    """Return the mask (n,) of rows (n, ...) that differ from the row before, and of the first."""
+    new = rows[1:] != rows[:-1]
+    return np.r_[True, new.any(axis=tuple(range(1, new.ndim)))][: len(rows)]
 
 
 def offsets_of(sizes: ArrayLike) -> IntArray:
@@ -87,8 +117,7 @@ def largest_coordinate(points: FloatArray) -> float:
 
 def sorted_nodes(nodes: IntArray) -> IntArray:
     """Return the nodes that an array of any shape contains, ascending, each once: (u,)."""
-    used = np.zeros(nodes.max(initial=-1) + 1, bool)
-    used[nodes] = True
+    used = mask_of(nodes.max(initial=-1) + 1, nodes)
     return np.flatnonzero(used)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray, ranges
+from slideviz.mesh.model import FloatArray, IntArray, largest_size, ranges
 from slideviz.system.threads import cores
 
 
@@ -89,7 +89,7 @@ def _margin(seen: FloatArray, apart: float) -> float:
 
     The length of ``OBLIQUE`` and rounding are included.
     """
-    return 2.0 * apart + 1e-14 * float(np.abs(seen).max(initial=0.0))
+    return 2.0 * apart + 1e-14 * largest_size(seen)
 
 
 def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray, IntArray] | None:

@@ -16,7 +16,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import NO_NODES, BoolArray, column_bounds
+from slideviz.mesh.model import NO_NODES, BoolArray, column_bounds, mask_of
 from slideviz.system.jit_cache import njit
 
 if TYPE_CHECKING:
@@ -71,10 +71,10 @@ class FacetSimplices:
 
     def without(self, nodes: IntArray) -> FacetSimplices:
         """Return the simplices without those of facets that have any of ``nodes`` (k,)."""
-        marked = np.zeros(max(self.nodes.max(initial=0), nodes.max(initial=0)) + 1, bool)
-        marked[nodes] = True
-        held = np.zeros(int(self.facet.max(initial=0)) + 1, bool)
-        held[self.facet[marked[self.nodes].any(axis=1)]] = True
+        marked = mask_of(max(self.nodes.max(initial=0), nodes.max(initial=0)) + 1, nodes)
+        held = mask_of(
+            int(self.facet.max(initial=0)) + 1, self.facet[marked[self.nodes].any(axis=1)]
+        )
         return self.keep(~held[self.facet])
 
     def within(self, points: FloatArray, other: FacetSimplices, margin: float) -> FacetSimplices:

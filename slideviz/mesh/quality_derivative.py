@@ -23,7 +23,16 @@ from slideviz.argument_types import record
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, INVERTED, coefficients, coords_of, corners
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, Signs, frozen_array, sealed
+from slideviz.mesh.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    Signs,
+    frozen_array,
+    mask_of,
+    sealed,
+)
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
 from slideviz.system.threads import PART, cores, in_parts, ordered_map
@@ -82,8 +91,7 @@ def derivative_of(
     """
     _check_exponent(p)
     _check(mesh, found, sums)
-    counted = np.zeros(len(found), bool)
-    counted[found.counted] = True
+    counted = mask_of(len(found), found.counted)
     folded = counted & (found.status == INVERTED)
     counted &= ~folded
     gradients = np.zeros((2, *mesh.points.shape))

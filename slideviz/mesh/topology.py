@@ -22,7 +22,9 @@ from slideviz.mesh.model import (
     IntArray,
     Mesh,
     frozen_array,
+    mask_of,
     row_dots,
+    run_begins,
     sorted_nodes,
 )
 from slideviz.mesh.nearest import row_groups, sorted_in_rows
@@ -58,8 +60,7 @@ class Boundary:
     def around(self, markers: Collection[str]) -> Boundary:
         """Return the facets of markers, and those of others that share a node with them."""
         wanted = np.isin(self.marker, [self.names.index(name) for name in markers])
-        near = np.zeros(int(self.facets.max(initial=-1)) + 1, bool)
-        near[self.facets[wanted]] = True
+        near = mask_of(int(self.facets.max(initial=-1)) + 1, self.facets[wanted])
         kept = np.asarray(near[self.facets].any(axis=1))
         joints = kept[self.joints].all(axis=1)
         return replace(
@@ -128,8 +129,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     compared, so that the cost grows with the boundary, not with the volume. Raises MeshError if a
     facet is not a side of any cell.
     """
-    on_boundary = np.zeros(len(mesh.points), bool)
-    on_boundary[facets.ravel()] = True
+    on_boundary = mask_of(len(mesh.points), facets.ravel())
     sides = []
     cells = []
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
@@ -305,9 +305,9 @@ def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
         facet = facet[real]
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
-    starts = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]])
+    starts = np.flatnonzero(run_begins(keys))
     sizes = np.diff(np.r_[starts, len(keys)])
-    first = starts[sizes == 2] if len(keys) else NO_NODES
+    first = starts[sizes == 2]
     joints = np.stack([facet[order[first]], facet[order[first + 1]]], axis=1)
     shared = keys[first]
     return joints, np.stack([shared] if dim == 2 else np.divmod(shared, above), axis=1)

@@ -50,6 +50,7 @@ from slideviz.mesh.model import (
     checked_reference,
     row_dots,
     row_norms,
+    run_begins,
     sealed,
 )
 from slideviz.mesh.topology import Boundary, facet_vectors, unit
@@ -179,7 +180,7 @@ def find_columns(
     # Of the chains with one first edge the longest, and of these the first, is the column.
     order = np.lexsort((-length, chains[:, 1], chains[:, 0]))
     edges = chains[order, :2]
-    new = np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)][: len(edges)]
+    new = run_begins(edges)
     number = np.empty(len(order), np.int64)
     number[order] = np.cumsum(new) - 1
     nodes = chains[order[new]]
@@ -400,7 +401,7 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     first = row_dots(edge, normal[: len(nodes)])
     along = row_norms(edge - first[:, None] * normal[: len(nodes)])
     angle = np.degrees(np.arctan2(first, along))
-    length = np.linalg.norm(edge, axis=1)
+    length = row_norms(edge)
     below = length.copy()
     growth = np.full(len(nodes), np.nan)
     equal = (length > 0).astype(float)
@@ -408,7 +409,7 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
         for k in range(1, nodes.shape[1] - 1):
             there = np.flatnonzero(nodes[:, k + 1] >= 0)
             edge = points[nodes[there, k + 1]] - points[nodes[there, k]]
-            above = np.linalg.norm(edge, axis=1)
+            above = row_norms(edge)
             step = np.exp(np.abs(np.log(above / below[there])))
             growth[there] = np.fmax(growth[there], step)
             if k < LAYERS:

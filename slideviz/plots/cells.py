@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, Locator
 from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
 from slideviz.color_scheme import INVERTED_COLOR, PAPER
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, row_norms
 from slideviz.plots.ticks import bar_ticks
 from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
@@ -77,7 +77,7 @@ def draw_cells(
         shapes.update_scalarmappable()
     if lit:
         normal = _normals(cells)
-        length = np.linalg.norm(normal, axis=1)
+        length = row_norms(normal)
         facing = np.abs(normal[:, 2]) / np.where(length > 0, length, 1.0)
         shaded = np.array(shapes.get_facecolor())
         shaded[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing)[:, None]
@@ -95,7 +95,7 @@ def _thickness(axes: Any, cells: Polygons) -> FloatArray:
     low, high = axes.get_xlim()
     points_per_length = 72.0 * axes.bbox.width / axes.figure.dpi / (high - low)
     box = np.subtract(*reversed(boxes_of(cells)))
-    sizes = np.maximum(np.linalg.norm(box, axis=1), 1e-300)
+    sizes = np.maximum(row_norms(box), 1e-300)
     thickness: FloatArray = np.abs(_normals(cells)[:, 2]) / sizes * points_per_length
     return thickness
 

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, run_begins
 from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def convergence(axes: Axes, runs: Sequence[GreedyRun], style: Style = PRINT) -> 
     tolerances: set[float] = set()
     for run in runs:
         shown = run.error > 0
-        first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
+        first = run_begins(run.level)
         line = style.line(run.series)
         begins = np.flatnonzero(first[shown])
         line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()

@@ -11,7 +11,7 @@ from slideviz.argument_types import record
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.metrics import rated_metric
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import walls
 from slideviz.plots.ticks import rounded_out
@@ -169,7 +169,7 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
         raise CaseError(
             "the displacement is measured from the undeformed mesh; give that mesh as reference"
         )
-    length = np.linalg.norm(mesh.points - reference.points, axis=1)
+    length = row_norms(mesh.points - reference.points)
     cells = mesh.cells
     total = np.add.reduceat(length[cells.connectivity], cells.offsets[:-1])
     values = total / np.diff(cells.offsets)

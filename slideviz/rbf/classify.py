@@ -16,7 +16,16 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.mesh import topology
 from slideviz.mesh.fans import Fans, components
-from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, ranges, row_dots
+from slideviz.mesh.model import (
+    NO_NODES,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    mask_of,
+    ranges,
+    row_dots,
+    run_begins,
+)
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.tape import (
     Array,
@@ -55,13 +64,6 @@ class FansAround:
     continue beyond the periodic boundary, ``merge`` for fans of one node."""
 
 
-def nodes_with(at: IntArray, chosen: BoolArray, total: int) -> BoolArray:
-    """Return a mask (total,) of the nodes of the chosen fans."""
-    mask = np.zeros(total, bool)
-    mask[at[chosen]] = True
-    return mask
-
-
 def slide_rows(around: FansAround, active: BoolArray) -> tuple[IntArray, IntArray]:
     """Return rows (r, 2) of a fan and its cluster within its node, and the nodes of full rank (f,).
 
@@ -73,7 +75,7 @@ def slide_rows(around: FansAround, active: BoolArray) -> tuple[IntArray, IntArra
     chosen = _one_sided(around, chosen)
     node = around.node[chosen]
     cluster = np.zeros(len(chosen), np.int64)
-    starts = np.flatnonzero(np.r_[True, node[1:] != node[:-1]])
+    starts = np.flatnonzero(run_begins(node))
     size = np.diff(np.r_[starts, len(node)])
     several = np.flatnonzero(np.repeat(size > 1, size))
     if not len(several):
@@ -138,8 +140,7 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     # At each image a surface continues in at most one fan, of the same role, at the smallest angle.
     some = np.flatnonzero(one_role & images)
     some = some[np.lexsort((-alike[some], own[j[some]], i[some]))]
-    image = np.stack([i[some], own[j[some]]])
-    best = some[np.r_[True, (image[:, 1:] != image[:, :-1]).any(axis=0)][: len(some)]]
+    best = some[run_begins(np.stack([i[some], own[j[some]]], axis=1))]
     goes_on = np.zeros(len(i), bool)
     goes_on[best] = alike[best] > around.smooth
     linked = one_role & ~images & (alike > around.merge)
@@ -244,8 +245,8 @@ def classify(
     at = representative[fans.fan_node]
     effect = _effects(fan_role, at, sliding, periodic)
     total = len(representative)
-    moving = nodes_with(at, effect == "moving", total)
-    fixed = nodes_with(at, effect == "fixed", total) & ~moving
+    moving = mask_of(total, at[effect == "moving"])
+    fixed = mask_of(total, at[effect == "fixed"]) & ~moving
     active = (effect == "slide") & ~(moving | fixed)[at]
     smooth, merge = np.cos(np.radians(feature_angle_deg * np.array([1.0, MERGE_FRACTION])))
     around = FansAround(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
@@ -254,7 +255,7 @@ def classify(
         # Vertices are held: nodes that would be fixed if the periodic markers slid, too.
         watched = active | ((fan_role == "periodic") & ~(moving | fixed)[at])
         _, held = slide_rows(around, watched)
-        touched = nodes_with(at, active, total)
+        touched = mask_of(total, at[active])
         extra = np.concatenate([extra, held[touched[held]]])
     fixed[extra] = True
     keep = ~fixed[at[rows[:, 0]]]
@@ -278,8 +279,7 @@ def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) ->
     effect[fan_role == "sliding"] = slide
     effect[fan_role == "periodic"] = slide if periodic in ("none", "periodic") else "free"
     # The border of an internal marker is where it meets a marker of another role.
-    other = np.zeros(int(at.max(initial=-1)) + 1, bool)
-    other[at[fan_role != "internal"]] = True
+    other = mask_of(int(at.max(initial=-1)) + 1, at[fan_role != "internal"])
     internal = fan_role == "internal"
     effect[internal] = np.where(other[at[internal]], slide, "free")
     return effect

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.errors import NodeError
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, run_begins
 from slideviz.rbf.problem import Problem
 from slideviz.rbf.tape import (
     Array,
@@ -97,7 +97,7 @@ def sliding_rows(problem: Problem) -> ConstraintRows:
     normals = take(normals, order)
     right = take(right, order)
     representative = problem.same_as[nodes]
-    starts = np.flatnonzero(np.r_[True, representative[1:] != representative[:-1]])
+    starts = np.flatnonzero(run_begins(representative))
     count = np.diff(np.r_[starts, len(nodes)])
     mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
     keep = np.ones(len(nodes), bool)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, row_dots
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, largest_size, row_dots, run_begins
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Tick, matrix
@@ -165,7 +165,7 @@ class ExactFit(Fit):
         system = System(
             self._problem.basis, self._place(rows.only(part)), self._factors[int(part[0])]
         )
-        largest = float(np.abs(rows.data).max(initial=0.0))
+        largest = largest_size(rows.data)
         trials = [(right, found, largest)]
         if self._problem.lasting:
             rough = system.rough_data()
@@ -209,8 +209,7 @@ def row_keys(rows: ConstraintRows) -> IntArray:
     The row's node, and its place among the rows of that node, from 0.
     """
     place = np.arange(len(rows.nodes))
-    starts = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]][: len(place)]
-    first = np.maximum.accumulate(np.where(starts, place, 0)) if len(place) else place
+    first = np.maximum.accumulate(np.where(run_begins(rows.nodes), place, 0))
     return np.stack([rows.nodes, place - first], axis=1)
 
 
@@ -259,7 +258,7 @@ def saddle_error_estimate(problem: Problem, rows: ConstraintRows, found: Interpo
 
     As a part of the largest displacement; 0 where it is below `TRUSTED`.
     """
-    largest = float(np.abs(rows.data).max(initial=0.0))
+    largest = largest_size(rows.data)
     met = value(found.at(problem, rows.nodes))
     if rows.directions is not None:
         met = row_dots(met, rows.directions)[:, None]

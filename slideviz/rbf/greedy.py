@@ -31,7 +31,7 @@ from time import perf_counter
 
 import numpy as np
 
-from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, mask_of
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.exact import Fit, row_keys
 from slideviz.rbf.kernels import PLAIN
@@ -196,8 +196,7 @@ class GreedyFit(Fit):
         """Set ``dropped``: nodes the guard left out although their error is above the tolerance."""
         level = self._level
         among = self._among
-        chosen = np.zeros(len(level.excluded), bool)
-        chosen[level.chosen] = True
+        chosen = mask_of(len(level.excluded), level.chosen)
         excluded = (among.has_row(level.excluded) & ~among.has_row(chosen)) | level.singular
         over = errors > self._settings.tolerance
         self.dropped = np.unique(among.rows.nodes[among.first[over & excluded]])

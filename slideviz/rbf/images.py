@@ -21,6 +21,7 @@ from slideviz.mesh.model import (
     IntArray,
     column_bounds,
     largest_coordinate,
+    mask_of,
     row_dots,
     row_norms,
 )
@@ -58,8 +59,7 @@ def find_images(
     if not pairs:
         return np.arange(count)
     links = np.concatenate([pair.nodes for pair in pairs])
-    paired = np.zeros(count, bool)
-    paired[links] = True
+    paired = mask_of(count, links)
     near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
     # Nearly all nodes have no image, which a search without bound takes long to find out.
     gap, at = nearest(coords[nodes], coords[nodes] + frame.shift(), 2.0 * near, 2.0 * near)

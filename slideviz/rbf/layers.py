@@ -40,6 +40,8 @@ from slideviz.mesh.model import (
     ranges,
     row_dots,
     row_norms,
+    row_numbers,
+    run_begins,
 )
 from slideviz.mesh.topology import TINY, corner_vectors, distinct_edges, facet_edges
 from slideviz.mesh.topology import unit as unit_rows
@@ -406,8 +408,7 @@ def wall_nodes(
     ``coords`` (n, d): undeformed, in the frame.
     ``known`` (a,): the nodes whose displacement is known: all of the walls' among them.
     """
-    place = np.full(len(coords), -1)
-    place[known] = np.arange(len(known))
+    place = row_numbers(len(coords), known)
     shifts = [0, -1, 1] if np.any(frame.shift()) else [0]
     nodes = []
     facets = []
@@ -420,7 +421,7 @@ def wall_nodes(
         keys, local = np.unique(wall.facets * most + wall.sides, return_inverse=True)
         some = keys // most
         local = local.reshape(wall.facets.shape)
-        heads = np.flatnonzero(np.r_[True, some[1:] != some[:-1]])
+        heads = np.flatnonzero(run_begins(some))
         if wall.moves:
             facets.append(first + local)
         images = np.concatenate([begin + k * len(some) + local for k in range(len(shifts))])

@@ -10,7 +10,16 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, row_dots, row_norms
+from slideviz.mesh.model import (
+    NO_NODES,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    mask_of,
+    row_dots,
+    row_norms,
+    run_begins,
+)
 from slideviz.mesh.nearest import OBLIQUE
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
@@ -221,10 +230,10 @@ class Candidates:
     @classmethod
     def of(cls, problem: Problem, rows: ConstraintRows) -> Candidates:
         """Return the candidates of ``rows``, which must be sorted by position."""
-        new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
+        new = run_begins(rows.nodes)
         first = np.flatnonzero(new)
         ranked = tie_breaker(value(problem.coords)[rows.nodes[first]])
-        return cls(rows, blocks(rows), np.cumsum(new, dtype=np.int64) - 1, first, ranked)
+        return cls(rows, blocks(rows), np.cumsum(new) - 1, first, ranked)
 
     def with_rows(self, problem: Problem, more: ConstraintRows) -> Candidates:
         """Return these candidates followed by those of ``more``; rows keep their numbers."""
@@ -244,9 +253,7 @@ class Candidates:
 
     def has_row(self, which: BoolArray) -> BoolArray:
         """Return a mask (c,) of the candidates that have a row in the mask ``which`` (r,)."""
-        found = np.zeros(len(self.first), bool)
-        found[self.candidate[which]] = True
-        return found
+        return mask_of(len(self.first), self.candidate[which])
 
 
 class GrowingFactor:

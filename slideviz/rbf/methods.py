@@ -20,7 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, largest_coordinate, row_norms
+from slideviz.mesh.model import (
+    NO_NODES,
+    FloatArray,
+    IntArray,
+    largest_coordinate,
+    row_norms,
+    row_numbers,
+)
 from slideviz.rbf.constraint_rows import AGREE, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit, Fit
@@ -117,8 +124,7 @@ def direct_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
 
 def within(problem: Problem, nodes: IntArray, free: Array) -> Array:
     """Return displacements ``free`` (..., m, d) of sliding nodes less their part along normals."""
-    row = np.full(len(problem.same_as), -1)
-    row[nodes] = np.arange(len(nodes))
+    row = row_numbers(len(problem.same_as), nodes)
     at = row[problem.normal_nodes]
     normals = take(problem.normals, np.flatnonzero(at >= 0))
     at = at[at >= 0]
@@ -232,7 +238,7 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     ``nodes`` and ``errors`` (b,), (b, d): boundary nodes with known displacement, and the errors
     there, in the frame.
     """
-    largest = float(row_norms(errors).max(initial=0.0))
+    largest = largest_norm(errors)
     if largest <= NEGLIGIBLE * problem.basis.radius:
         return None
     radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest

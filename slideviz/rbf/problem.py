@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, mask_of
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
 from slideviz.rbf.operations import columns, radial_sum, terms
@@ -147,8 +147,10 @@ class Problem:
         nodes = np.unique(self.same_as[nodes])
         label = np.zeros(len(self.same_as), np.int64)
         label[nodes] = connected(self.basis, self.place(nodes))
-        moves = np.zeros(int(label.max(initial=0)) + 1, bool)
-        moves[label[self.same_as[self.known[value(self.values).any(axis=1)]]]] = True
+        moves = mask_of(
+            int(label.max(initial=0)) + 1,
+            label[self.same_as[self.known[value(self.values).any(axis=1)]]],
+        )
         return label, moves if moves.any() and not self.basis.tailed else np.ones_like(moves)
 
     def carried_error(self, nodes: IntArray) -> Array:

@@ -23,7 +23,15 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.mesh.fans import Fans, components
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_dots, row_norms
+from slideviz.mesh.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    largest_norm,
+    mask_of,
+    row_dots,
+    row_norms,
+)
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
@@ -124,7 +132,7 @@ class Tracks:
         out = 0.0
         for index, track in enumerate(self.tracks):
             at = coords[self.of_node == index]
-            out = max(out, float(np.linalg.norm(track.query(at) - at, axis=1).max(initial=0.0)))
+            out = max(out, largest_norm(track.query(at) - at))
         return out
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
@@ -167,8 +175,7 @@ def find_tracks(
     of_node = np.full(classes.total, -1, np.int64)
     simplices: list[tuple[FloatArray, FloatArray]] = []
     curved = False
-    moving = np.zeros(classes.total, bool)
-    moving[classes.moving] = True
+    moving = mask_of(classes.total, classes.moving)
     across = across_period(boundary, classes.representative, roles) if shift is not None else None
     vectors = corner_vectors(place(boundary.facets))
     labels = surface_labels(boundary, vectors, roles, feature_angle_deg, across)
@@ -202,8 +209,9 @@ def across_period(
     boundary: Boundary, representative: IntArray, roles: Mapping[str, str]
 ) -> IntArray:
     """Return pairs (j, 2) of facets, not of periodic markers, that meet only by images."""
-    glued = np.zeros(len(representative), bool)
-    glued[representative[representative != np.arange(len(representative))]] = True
+    glued = mask_of(
+        len(representative), representative[representative != np.arange(len(representative))]
+    )
     across = glued[representative[boundary.facets]].any(axis=1)
     across &= _role_numbers(boundary, roles) != ROLE_NUMBER["periodic"]
     facets = np.flatnonzero(across)
@@ -315,8 +323,7 @@ def _edge_chains(
     mine = representative[classes.cluster_node] == classes.cluster_node
     mine = mine[classes.row_cluster]
     cluster[classes.row_fan[mine]] = classes.row_cluster[mine]
-    is_edge = np.zeros(fans.node.max(initial=0) + 1, bool)
-    is_edge[classes.edge] = True
+    is_edge = mask_of(fans.node.max(initial=0) + 1, classes.edge)
     order = np.flatnonzero(is_edge[fans.node])
     key = fans.facet[order] * len(is_edge) + fans.node[order]
     order = order[np.argsort(key)]

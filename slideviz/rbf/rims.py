@@ -16,7 +16,14 @@ from typing import Any
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate, row_dots, row_norms
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    largest_coordinate,
+    largest_size,
+    row_dots,
+    row_norms,
+)
 from slideviz.mesh.topology import TINY, unit, vertex_normals
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
@@ -335,7 +342,7 @@ def bulge_of(coords: FloatArray, facets: IntArray) -> float:
     first = at_nodes[np.searchsorted(nodes, one)]
     second = at_nodes[np.searchsorted(nodes, two)]
     off = row_dots(coords[two] - coords[one], second - first)
-    return BULGE * float(np.abs(off).max(initial=0.0))
+    return BULGE * largest_size(off)
 
 
 def side_weights(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatArray]:

@@ -15,7 +15,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, mask_of
 from slideviz.mesh.nearest import near_duplicates
 from slideviz.mesh.periodic import Pair, turned_too
 from slideviz.mesh.topology import Boundary
@@ -112,8 +112,7 @@ def _deformed(domain: Domain, mesh: Mesh) -> Domain:
 
 
 def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
-    moving = np.zeros(classes.total, bool)
-    moving[classes.moving] = True
+    moving = mask_of(classes.total, classes.moving)
     away = ~np.any(moving[boundary.facets[fans.facet]], axis=1)
     others = np.bincount(fans.fan, away, len(fans.fan_node)) > 0.0
     keep = away | ~others[fans.fan]

@@ -19,7 +19,14 @@ from slideviz.case.model import Case
 from slideviz.case.moving_nodes import ROUNDING, moving_nodes
 from slideviz.case.spans import span_ends
 from slideviz.errors import Message, point_words
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    Mesh,
+    largest_coordinate,
+    largest_norm,
+    row_norms,
+)
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.rims import Rims
 from slideviz.solver.domain import Domain, find_domain, roles_of_copies
@@ -88,7 +95,7 @@ def unsoundness(
     if farthest <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     shift = moved - setup.coords
-    length = np.linalg.norm(shift, axis=1)
+    length = row_norms(shift)
     # Sliding nodes are compared with moving boundaries only: they are data for all other nodes.
     reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
     slid = setup.classes.sliding
@@ -148,7 +155,7 @@ def farthest_node(
     length = np.empty(len(before))
 
     def measure(part: slice) -> None:
-        length[part] = np.linalg.norm(after[part] - before[part], axis=1)
+        length[part] = row_norms(after[part] - before[part])
 
     in_parts(measure, len(before))
     k = int(np.argmax(length))
@@ -162,7 +169,7 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     ``found``: of the whole mesh.
     """
     nodes = np.concatenate([setup.known, setup.classes.sliding])
-    most = float(np.linalg.norm(after[nodes] - mesh.points[nodes], axis=1).max(initial=0.0))
+    most = largest_norm(after[nodes] - mesh.points[nodes])
     if not found.length > STRAY * most > 0.0:
         return []
     where = point_words(found.point, mesh.extent)
@@ -332,12 +339,12 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
     for index in range(len(setup.boundary.names)):
         nodes = np.unique(setup.boundary.facets[setup.boundary.marker == index])
         nodes = nodes[chosen[nodes]]
-        farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
+        farthest = row_norms(shift[nodes]).max(initial=0.0)
         if len(nodes) > 1 and farthest <= TAKEN * largest:
             at = setup.coords[nodes]
             moved = shift[nodes]
-            size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
-            strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)
+            size = row_norms(at - at.mean(axis=0)).max()
+            strains.append(row_norms(moved - moved.mean(axis=0)).max() / size)
     return max(largest, float(max(strains)) * float(np.ptp(setup.coords, axis=0).max()))
 
 
@@ -351,7 +358,7 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     near = cKDTree(at).query(at, k=min(2, len(nodes)))
     gaps = np.reshape(near[0], (len(nodes), -1))[:, -1]
     others = np.reshape(near[1], (len(nodes), -1))[:, -1]
-    apart = np.linalg.norm(shift - shift[others], axis=1)
+    apart = row_norms(shift - shift[others])
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))
     usual = setup.largest / mesh.extent

@@ -23,7 +23,7 @@ from slideviz.mesh.crossing import (
 )
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import cross3, dot3
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, row_norms, sealed
 from slideviz.mesh.topology import facet_vectors, unit
 from slideviz.solver.domain import find_period
 from slideviz.system.jit_cache import njit
@@ -270,7 +270,7 @@ def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
     # Of a quadrilateral the first three nodes, which are in one plane.
     facets = facets if facets.shape[1] == 2 else facets[:, [0, 1, 2, 2]]
     vectors = facet_vectors(points, facets)
-    sizes = np.linalg.norm(vectors, axis=1) ** (1.0 / (points.shape[1] - 1))
+    sizes = row_norms(vectors) ** (1.0 / (points.shape[1] - 1))
     corners = points[facets[:, : points.shape[1]]]
     return np.asarray(corners.mean(axis=1) - BESIDE * sizes[:, None] * unit(vectors))
 

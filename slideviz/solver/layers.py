@@ -121,8 +121,8 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
     columns = find_columns(mesh, 1)
     height = columns.stack_thickness(points)
     edges = points[columns.nodes]
-    rise = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
+    rise = row_norms(edges[:, 1] - edges[:, 0])
+    size = row_norms(facet_vectors(points, boundary.facets))
     length = size if mesh.dim == 2 else np.sqrt(size / 2)
     walls = []
     for role in ("moving", "fixed"):

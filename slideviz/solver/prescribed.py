@@ -14,7 +14,14 @@ from slideviz.case.moving_nodes import ROUNDING, moving_nodes, same
 from slideviz.errors import CaseError, DeformError, Message, Remark
 from slideviz.mesh.fans import components
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    Mesh,
+    largest_coordinate,
+    largest_norm,
+    row_norms,
+)
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.rbf.images import ImageDisplacements, require_free
 from slideviz.rbf.rims import Rims
@@ -54,7 +61,7 @@ def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
     follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
     gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
     # A motion displaces a copy that is a little out of place otherwise, too.
-    largest = float(np.linalg.norm(moved.vectors, axis=1).max(initial=0.0))
+    largest = largest_norm(moved.vectors)
     gap -= np.minimum(TOLERANCE, APART * halo.mismatch / mesh.extent) * largest
     gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
     if gap.max(initial=0.0) > same(moved.vectors, mesh):
@@ -96,12 +103,7 @@ class BoundaryConditions:
     @cached_property
     def largest(self) -> float:
         """Return the largest displacement, in the frame."""
-        return largest_of(self.target)
-
-
-def largest_of(vectors: FloatArray) -> float:
-    """Return the largest length of vectors (k, d); 0 of none."""
-    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+        return largest_norm(self.target)
 
 
 def motion_messages(
@@ -145,7 +147,7 @@ def prescribe(
             f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
         )
     vectors = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    allowed = tolerance * largest_of(vectors) + ROUNDING * largest_coordinate(mesh.points)
+    allowed = tolerance * largest_norm(vectors) + ROUNDING * largest_coordinate(mesh.points)
     spread = ImageDisplacements(moved.nodes, vectors, classes.representative)
     spread.require_alike(allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
@@ -170,7 +172,7 @@ def support_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
 def fitted_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
     """Return the support radius of ``INFLUENCE_FACTOR= AUTO``; parameters as `support_radius`."""
     sizes = np.ptp(moving_bodies(case, mesh, moved), axis=1)
-    farthest = np.linalg.norm(moved.vectors, axis=1).max(initial=0.0)
+    farthest = row_norms(moved.vectors).max(initial=0.0)
     needed = max(BODIES * sizes.max(initial=0.0), DISPLACEMENTS * farthest)
     return min(EXTENTS * mesh.extent, float(needed) or np.inf)
 

@@ -13,7 +13,7 @@ from slideviz.case.spans import periodic_pairs
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import SlidevizError, doubts_of, messages_of
 from slideviz.mesh.axis_frame import in_axis_frame
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, largest_size, mask_of
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.steps import Step
@@ -97,8 +97,7 @@ def fixed_beside(case: Case, mesh: Mesh, cells: IntArray) -> tuple[str, ...]:
     """Return the fixed boundaries that have nodes of cells (k,); none of a mesh in its file."""
     if isinstance(mesh, Skin):
         return ()
-    near = np.zeros(len(mesh.points), bool)
-    near[mesh.cells.take(cells).connectivity] = True
+    near = mask_of(len(mesh.points), mesh.cells.take(cells).connectivity)
     return tuple(
         marker.name
         for marker in mesh.markers
@@ -131,8 +130,8 @@ def _beyond_pitch_of_zone(case: Case, mesh: Mesh) -> str:
 
 def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
     if pair.kind == "translational":
-        return float(np.abs(vectors @ (pair.vector / pair.period)).max(initial=0.0))
+        return largest_size(vectors @ (pair.vector / pair.period))
     plane = (1.0, 1.0j, 0.0)
     before = in_axis_frame(points, pair.axis, pair.origin) @ plane
     after = in_axis_frame(points + vectors, pair.axis, pair.origin) @ plane
-    return float(np.abs(np.angle(after * before.conj())).max(initial=0.0))
+    return largest_size(np.angle(after * before.conj()))

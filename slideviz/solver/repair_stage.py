@@ -33,7 +33,8 @@ from slideviz.mesh.model import (
     Mesh,
     Skin,
     checked_reference,
-    row_norms,
+    largest_norm,
+    mask_of,
     sealed,
 )
 from slideviz.mesh.nearest import row_groups
@@ -275,7 +276,7 @@ def mend(
         number[done.folded_after],
         moved,
         before,
-        float(row_norms(now.points[moved] - mended.points[moved]).max(initial=0.0)),
+        largest_norm(now.points[moved] - mended.points[moved]),
         unmendable,
         (*warnings, *moved_layers(np.isin(layers, moved)), *slide_advice(case, mesh, poor, limit)),
     )
@@ -291,8 +292,7 @@ def _first_layers(cells: Cells, setup: Setup) -> IntArray:
     """Return the nodes of a run's layers in cells at moving boundaries: they have first heights."""
     if setup.zone is None:
         return setup.rigid
-    wall = np.zeros(len(setup.coords), bool)
-    wall[setup.classes.moving] = True
+    wall = mask_of(len(setup.coords), setup.classes.moving)
     rows = [nodes[wall[nodes].any(axis=1)].ravel() for _, nodes in cells.by_type.values()]
     return np.intersect1d(np.concatenate(rows), setup.zone.nodes)
 
@@ -414,9 +414,7 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     ``setup``: that of the run, if there was one: its known nodes stay.
     """
     if not mesh.markers:
-        held = np.zeros(len(points), bool)
-        held[shell_of(mesh)] = True
-        return Freedom.within(mesh.dim, held)
+        return Freedom.within(mesh.dim, mask_of(len(points), shell_of(mesh)))
     sliding = repair_case(case)
     # What stays is as in the run, where without a sliding method all other boundaries do.
     classes = find_domain(case, mesh).classes if setup is None else setup.classes
@@ -436,8 +434,7 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     body = elastic_body(mesh, frame, setup.axis)
     problem = problem_at(setup, coords, coords[setup.known])
 
-    slides = np.zeros(len(points), bool)
-    slides[setup.classes.sliding] = True
+    slides = mask_of(len(points), setup.classes.sliding)
     # A run takes nodes of internal boundaries off these: they move in planes beside their surface,
     # whose normals are those before (facets beside a boundary that moved away have others).
     inner = slides & _only_on(mesh, case.markers_with("internal"))

@@ -19,7 +19,7 @@ from slideviz.case.motions.span import moves_over_span
 from slideviz.case.spans import span_ends
 from slideviz.case.zone_cases import each_zone
 from slideviz.mesh.fans import components
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, mask_of, run_begins
 from slideviz.mesh.topology import corner_vectors, unit
 from slideviz.rbf.classify import MERGE_FRACTION
 from slideviz.rbf.frames import corners
@@ -49,8 +49,7 @@ def find_rims(
     boundary = domain.boundary
     moving = domain.classes.moving
     roles = np.array([domain.roles.get(name, "fixed") for name in boundary.names], object)
-    is_moving = np.zeros(len(mesh.points), bool)
-    is_moving[moving] = True
+    is_moving = mask_of(len(mesh.points), moving)
     facets = np.isin(roles[boundary.marker].astype(str), wall_roles)
     facets &= is_moving[boundary.facets].any(axis=1)
     facet, column = np.nonzero(facets[:, None] & is_moving[boundary.facets])
@@ -196,7 +195,7 @@ def _surfaces(
     normals = np.zeros((len(pairs), normal.shape[1]))
     np.add.at(normals, group.reshape(-1), normal)
     normals = unit(normals)
-    starts = np.flatnonzero(np.r_[True, pairs[1:, 0] != pairs[:-1, 0]])
+    starts = np.flatnonzero(run_begins(pairs[:, 0]))
     for first, last in zip(starts, np.r_[starts[1:], len(pairs)], strict=True):
         if last == first + 1:
             yield (int(pairs[first, 1]),), int(pairs[first, 0])

@@ -20,7 +20,16 @@ from slideviz.case.spans import span_field
 from slideviz.errors import Message, note
 from slideviz.machine.span import Span
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
+from slideviz.mesh.model import (
+    FloatArray,
+    IntArray,
+    Mesh,
+    Skin,
+    largest_norm,
+    mask_of,
+    row_norms,
+    row_numbers,
+)
 from slideviz.mesh.topology import TINY
 from slideviz.mesh.zones import require_one_zone
 from slideviz.rbf.classify import Classes, directions
@@ -58,7 +67,6 @@ from slideviz.solver.prepare import Prepared
 from slideviz.solver.prescribed import (
     BoundaryConditions,
     fitted_radius,
-    largest_of,
     prescribe,
     support_radius,
 )
@@ -105,14 +113,13 @@ def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float
     ``points`` (n, d).
     ``facets`` (f, k): of the boundary, so that a streamed mesh has the same.
     """
-    moving, sliding = np.zeros((2, len(points)), bool)
-    moving[classes.moving] = True
-    sliding[classes.sliding] = True
+    moving = mask_of(len(points), classes.moving)
+    sliding = mask_of(len(points), classes.sliding)
     near = facets[moving[facets].any(axis=1) & sliding[facets].any(axis=1)]
     ends = np.stack([near, np.roll(near, -1, axis=1)], axis=-1).reshape(-1, 2)
     ends = np.concatenate([ends, ends[:, ::-1]])
     one, two = ends[moving[ends[:, 0]] & sliding[ends[:, 1]]].T
-    gaps = np.linalg.norm(points[one] - points[two], axis=1)
+    gaps = row_norms(points[one] - points[two])
     return float(gaps[gaps > 0.0].min(initial=np.inf))
 
 
@@ -236,7 +243,7 @@ class Setup(Domain):
     @cached_property
     def largest(self) -> float:
         """Return the largest displacement that is asked for, in the frame."""
-        return largest_of(self.target)
+        return largest_norm(self.target)
 
     @cached_property
     def copies(self) -> IntArray:
@@ -295,8 +302,7 @@ class Setup(Domain):
         """Overwrite ``slid`` (m, d) of sliding halo copies by their donors', turned as the halo."""
         if self.halo is None:
             return
-        row = np.full(len(self.coords), -1)
-        row[nodes] = np.arange(len(nodes))
+        row = row_numbers(len(self.coords), nodes)
         copy = row[self.halo.receivers]
         origin = row[self.halo.donors]
         both = (copy >= 0) & (origin >= 0)

@@ -44,6 +44,7 @@ from slideviz.mesh.model import (
     Origin,
     Part,
     Skin,
+    mask_of,
     sealed,
 )
 from slideviz.mesh.zones import join_zones
@@ -189,8 +190,7 @@ def _boundary_cell_reader(
     first cell.
     """
     with open_zones(path, zone) as (source, (place,)):
-        on_boundary = np.zeros(place.n_points, bool)
-        on_boundary[boundary] = True
+        on_boundary = mask_of(place.n_points, boundary)
 
         def read(first: int) -> _BoundaryCells:
             block = element_block(source, place, place.cells, place.dim, first, BLOCK)

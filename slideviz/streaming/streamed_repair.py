@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from slideviz.case.model import Case
 from slideviz.formats.su2b.read import ElementBlock
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, Skin, sealed
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, Skin, row_norms, sealed
 from slideviz.mesh.quality import VALID, Quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
@@ -217,7 +217,7 @@ def mend_file(
     part = Part(sealed(nodes), sealed(bad), source.n_points, count)
     mesh = Skin(source.points.at(nodes), cells, name=skin.name, part=part)
     moved = np.searchsorted(nodes, regions.nodes)
-    way = np.linalg.norm(mesh.points[moved] - regions.before, axis=1)
+    way = row_norms(mesh.points[moved] - regions.before)
     # Later regions may have moved a node back to where it was.
     kept = np.flatnonzero(way > 0.0)
     unmendable, warnings = unmendable_words(impossible, skin)

@@ -24,7 +24,14 @@ from slideviz.design.deformer import Deformer
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.surface import MovingSurface, convex_part, make_surface
 from slideviz.errors import CaseError, ConditionWarning, Remark, ToleranceWarning, note
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.mesh.model import (
+    Assembly,
+    FloatArray,
+    IntArray,
+    Mesh,
+    largest_coordinate,
+    largest_size,
+)
 from slideviz.mesh.topology import unit
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
@@ -552,7 +559,7 @@ def _heard(said: list[Remark]) -> Iterator[None]:
 
 def _difference(found: FloatArray, written: FloatArray) -> list[str]:
     """Return a message if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
-    gap = float(np.abs(found - written).max(initial=0.0))
+    gap = largest_size(found - written)
     if gap <= CLOSE * largest_coordinate(written):
         return []
     messages = f"the gradient belongs to a deformation whose points differ by up to {gap:.2g} from"
@@ -576,7 +583,7 @@ def _directions(surface: MovingSurface) -> FloatArray:
     sums: list[FloatArray] = []
     for k, (place, part) in enumerate(surface.values):
         slope = surface.slope(place, part, undeformed=True)
-        largest = float(np.abs(slope).max(initial=0.0))
+        largest = largest_size(slope)
         unit = slope * (REACH * surface.mesh.extent / largest) if largest else slope
         if len(sums) < DIRECTIONS:
             sums.append(np.array(unit))

@@ -72,7 +72,7 @@ from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
 from slideviz.ffd.kinds import DIRECTIONS, NONE, Move, Planes, Request, moves_of, variable_problem
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.quality import quality
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
@@ -167,7 +167,7 @@ class MovedNodes:
         positive = order[mesh.points[order, 0] > 0.0]
         other = mesh.points[positive[-1], :2] if ny > nx and len(positive) else first
         trailing = 0.5 * (first + other)
-        apart = np.linalg.norm(self.points[:, :2] - trailing, axis=1)
+        apart = row_norms(self.points[:, :2] - trailing)
         leading = self.points[int(np.argmax(apart)), :2]
         width = trailing[0] - leading[0]
         if width == 0.0:

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import CORNER_AT, CORNERS, LANES
-from slideviz.mesh.model import BoolArray, Cells, FloatArray, IntArray
+from slideviz.mesh.model import BoolArray, Cells, FloatArray, IntArray, row_numbers
 from slideviz.mesh.repair.energy import Targets, write_curvatures, write_energy
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.system.jit_cache import njit
@@ -94,8 +94,7 @@ class Patch:
         self.blocks = int(freedom.place.max(initial=-1)) + 1
         self.maps = np.array(freedom.maps)
         self.still = np.zeros((self.blocks, points.shape[1]))
-        self.row = np.full(len(points), -1)
-        self.row[freedom.bound] = np.arange(len(freedom.bound))
+        self.row = row_numbers(len(points), freedom.bound)
         self._pool = pool
         self._flat = np.concatenate([part.nodes.ravel() for part in parts])
         owner = freedom.place[self._flat]
