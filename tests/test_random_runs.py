@@ -109,6 +109,13 @@ def test_numbering_may_change_no_more_than_a_run_says_itself():
     assert laws.doubt(plain.mesh, list(deform(plain.case, plain.mesh))) == 0.0
 
 
+def test_a_run_whose_nodes_coincide_after_a_step_says_that_it_may_be_all_wrong():
+    run = random_run(10165)
+    steps = list(deform(run.case, run.mesh))
+    assert any("may be wrong by up to 100 % of the largest" in text for text in steps[-1].warnings)
+    assert list(laws.numbering_does_not_matter(run, steps)) == []
+
+
 def test_images_see_one_that_goes_another_way(monkeypatch):
     def apart(run, points):
         a, _ = images(run.made, run.period)[0]

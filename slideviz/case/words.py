@@ -161,5 +161,6 @@ def first_of(items: Sequence[object], most: int = 3) -> str:
 
 def wrong_by(part: float, *, bounded: bool) -> str:
     """Return an error, a part of the largest value, in words: ``bounded``, or as measured."""
-    percent = f"{100.0 * part:.2g} % of the largest"
+    digits = float(f"{100.0 * part:.2g}")  # not 1e+02
+    percent = f"{digits:g} % of the largest"
     return f"up to {percent}" if bounded else f"{percent} or more; how much more is unknown"

@@ -183,7 +183,8 @@ class ExactFit(Fit):
             if refined[0].exact or error_estimate < max(field_error):
                 first = max(float(each.before.max(initial=0.0)) for each in refined)
                 self.refined = max(self.refined, *field_error, first)
-                self.error_estimate = max(self.error_estimate, error_estimate)
+                noise = min(system.noise(lambda _: tick(1.0)) / (largest or 1.0), 1.0)
+                self.error_estimate = max(self.error_estimate, error_estimate, noise)
                 return refined[0].weights, part[:0]
         self.error_estimate = max(self.error_estimate, *field_error)
         return found, part[system.factor.dropped]

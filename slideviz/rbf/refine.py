@@ -60,6 +60,8 @@ MARGIN = 10.0
 """Factor of an error that conjugate gradients measure: up to seven times too small where nodes
 nearly coincide, for the preconditioner does not see them."""
 
+NOISES = 4  # columns of data that are rounding, by which its error is estimated
+
 CHECKS = 60  # number of points between control nodes at each of four distances (`check_points`)
 
 
@@ -167,6 +169,18 @@ class System:
             noise = np.abs(factor.solve(right * signs[:, None])).max(axis=0)
             error_estimate += noise / np.where(most > 0.0, most, 1.0)
         return Refined(weights, error_estimate, first, factor is not None)
+
+    def noise(self, tick: Tick = no_tick) -> float:
+        """Return the largest component of the field of data that are rounding, with random signs.
+
+        Displacements are differences of coordinates. Where two nodes nearly coincide, as in a mesh
+        that has collapsed, their rounding makes a steep field, however well the system is solved.
+        """
+        features = self.place[0]
+        signs = np.random.default_rng(0).choice((-1.0, 1.0), (features.shape[1], NOISES))
+        rounding = float(np.finfo(float).eps * np.abs(features).max())
+        factor = self._double_factor(tick) or self._full_factor
+        return float(self._field(factor.solve(rounding * signs)).max())
 
     def _step(
         self,
