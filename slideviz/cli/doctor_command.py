@@ -20,7 +20,7 @@ from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
 from slideviz.system.atomic import write_whole
 from slideviz.system.libraries import OPENGL, apt_install, missing_for_window
-from slideviz.system.platform import free_memory
+from slideviz.system.platform import free_memory, needs_server
 
 Problem = tuple[str, str]
 """What is missing or wrong, and the line that mends it."""
@@ -143,7 +143,7 @@ def _drawing(report: Report) -> Iterator[tuple[str, object]]:
 
     from slideviz.export.offscreen import display_fault, has_opengl
 
-    if sys.platform.startswith("linux"):
+    if needs_server():
         yield "display", display_fault() or os.environ.get("DISPLAY") or "Wayland"
         has_fonts = any(any(Path(folder).rglob("*.[to]tf")) for folder in FONTS)
         yield "fonts", "some" if has_fonts else "none"

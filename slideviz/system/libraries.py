@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from slideviz.system.platform import needs_server
+
 WINDOW = {
     "libEGL.so.1": "libegl1",
     "libGL.so.1": "libgl1",
@@ -32,7 +34,7 @@ OPENGL = ("libegl1", "libgl1", "libgl1-mesa-dri")
 
 def missing_for_window() -> list[str]:
     """Return Debian's packages of the libraries of `WINDOW` that cannot be loaded."""
-    if not sys.platform.startswith("linux"):
+    if not needs_server():
         return []
     return [package for name, package in WINDOW.items() if not is_loadable((name,))]
 

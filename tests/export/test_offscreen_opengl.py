@@ -69,7 +69,7 @@ def test_libraries_of_the_window_are_named_by_their_packages(monkeypatch, tmp_pa
             raise OSError(name)
 
     monkeypatch.setattr(libraries.ctypes, "CDLL", load)
-    monkeypatch.setattr(libraries.sys, "platform", "linux")
+    monkeypatch.setattr(libraries, "needs_server", lambda: True)
     assert libraries.missing_for_window() == ["libgl1", "libxcb-cursor0"]
     monkeypatch.setattr(offscreen, "display_fault", lambda: "")
     assert run([]) == 1
@@ -77,5 +77,5 @@ def test_libraries_of_the_window_are_named_by_their_packages(monkeypatch, tmp_pa
     monkeypatch.setattr(libraries.sys, "_MEIPASS", str(tmp_path), raising=False)
     (tmp_path / "libxcb-cursor.so.0").touch()
     assert libraries.missing_for_window() == ["libgl1"]
-    monkeypatch.setattr(libraries.sys, "platform", "win32")
+    monkeypatch.setattr(libraries, "needs_server", lambda: False)
     assert libraries.missing_for_window() == []
