@@ -309,6 +309,18 @@ WRONG = {
     "start": ("boundary", "startFace 20", "startFace 21", "starts at face 21, expected 20"),
     "count": ("boundary", r"nFaces \d+;(?=\D+\d+;\s+}\s+\)\n)", "nFaces 1;", "its patches end at"),
     "entry": ("boundary", "nFaces", "faces", "patch 'x_m' has no type, nFaces, or startFace"),
+    "nan": (
+        "points",
+        r"\(0\.0 0\.0 0\.0\)",
+        "(0.0 nan 0.0)",
+        r"point 0 is at \(0.0, nan, 0.0\), which",
+    ),
+    "far": (
+        "points",
+        r"\(0\.0 0\.0 0\.0\)",
+        "(-1e60 0 0)",
+        "which is not finite, or larger than 1e",
+    ),
     "processor": ("boundary", "type patch", "type processor", "run reconstructParMesh -constant"),
 }
 

@@ -13,7 +13,7 @@ from slideviz.formats.openfoam.cells import cells_of
 from slideviz.formats.openfoam.foam_file import FoamFile, Patch, read_foam_file
 from slideviz.formats.openfoam.plane import Layer, plane_of
 from slideviz.formats.openfoam_paths import ENDING, REGIONS, instance_of, stem_of
-from slideviz.mesh.check import check_mesh
+from slideviz.mesh.check import LARGEST, check_mesh, within
 from slideviz.mesh.model import FloatArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.polyhedra import Faces, Polyhedra
 from slideviz.mesh.zones import join_zones
@@ -86,6 +86,12 @@ def _read_region(path: Path, source: Path, region: str = "") -> Mesh:
         folder = instance.parent / "constant" / inside / "polyMesh"
     values, place = points_file.numbers(points_file.scalar, 3)
     points = frozen_array(values, float)
+    if not within(points, LARGEST):
+        wrong = int(np.argmax(~(np.abs(points) <= LARGEST).all(axis=1)))
+        raise points_file.fault(
+            f"point {wrong} is at {tuple(points[wrong].tolist())}, which is not finite, or larger "
+            f"than {LARGEST:g}"
+        )
     faces_file = read_foam_file(folder / "faces")
     owner_file = read_foam_file(folder / "owner")
     neighbour_file = read_foam_file(folder / "neighbour")
