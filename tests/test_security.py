@@ -59,7 +59,7 @@ def test_the_page_states_the_limits_of_the_code():
     assert [size for size in sizes if size not in PAGE] == []
     assert f"{MOST:,} designs" in PAGE
     assert (files._SECONDS, files._SECONDS_PER_BYTE) == (20, 20e-6)
-    assert (files._MEMORY, files._MEMORY_PER_BYTE) == (8 << 30, 200)
+    assert (files._MEMORY, files._MEMORY_PER_BYTE) == (2 << 30, 400)
     assert session_file._LARGEST_TEXT == 100_000_000
     assert (foam_file.UNPACKED, foam_file._SPARE) == (200, 1 << 20)
     assert "private advisories of GitHub" in PAGE

@@ -58,8 +58,8 @@ from slideviz.terms import (
 # Limits of the process: several times what the slowest of meshio's readers needs.
 _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
-_MEMORY = 8 << 30
-_MEMORY_PER_BYTE = 200
+_MEMORY = 2 << 30
+_MEMORY_PER_BYTE = 400
 _ON_THE_CLOCK = 3  # limit of time over that of processor time, where there is none of that
 _TICK_SECONDS = 0.05  # seconds between two calls of the progress function
 _BYTES_PER_SECOND = 5e6  # speed of reading that the progress assumes

@@ -117,7 +117,7 @@ def test_nodes_in_one_place_have_no_factor_and_are_refined_by_conjugate_gradient
 @pytest.mark.parametrize(("apart", "least", "most"), [(0.1, 1e-15, 1e-10), (1e-14, 0.01, 1e9)])
 def test_rounding_of_data_counts_where_nodes_nearly_coincide(apart, least, most):
     points = profile(0.5)[0]
-    points = np.concatenate([points, points[:1] + [0.0, apart]])
+    points = np.concatenate([points, points[:1] + np.array([0.0, apart])])
     place = points.T.copy(), None
     system = System(Basis(4.0), place, factorise(matrix(Basis(4.0), place)))
     assert least < system.noise() < most
