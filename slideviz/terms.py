@@ -280,14 +280,19 @@ WallValue = Literal[
     "first-height", "height-ratio", "growth", "equal-layers", "wall-angle", "angle-change"
 ]
 Quantity = Literal[Metric, WallValue, "displacement"]
-ColorBy = Literal["role", Quantity]
+Difference = Literal["run-distance", "quality-gain"]
+ColorBy = Literal["role", Quantity, Difference]
 
 
 @dataclass(frozen=True)
 class ColorByTerm(Term):
-    """The words for a quantity that cells are colored by; ``unit`` is empty if it has none."""
+    """The words for a quantity that cells are colored by; ``unit`` is empty if it has none.
+
+    ``color_map`` is a diverging color map that it always has, with 0 in the middle; else empty.
+    """
 
     unit: str = ""
+    color_map: str = ""
 
     @property
     def axis(self) -> str:
@@ -331,12 +336,19 @@ RATED.update(WALL_VALUES.items())
 QUANTITIES: dict[Quantity, ColorByTerm] = dict(RATED.items())
 """The quantities that are values of cells; the first is the default."""
 QUANTITIES["displacement"] = ColorByTerm("displacement", unit="[mesh units]")
-COLOR_BY: dict[ColorBy, ColorByTerm] = {"role": ColorByTerm("role")}
+DIFFERENCES: dict[Difference, MetricTerm] = _table("DIFFERENCES", MetricTerm)
+"""What the cells of the runs in two views differ by."""
+RANKED: dict[ColorBy, MetricTerm] = dict(RATED.items())
+"""The values of cells of which one end is better, or of more interest."""
+RANKED.update(DIFFERENCES.items())
+CELL_VALUES: dict[ColorBy, ColorByTerm] = dict(QUANTITIES.items())
+"""The values of cells."""
+CELL_VALUES.update(DIFFERENCES.items())
+COLOR_BY: dict[ColorBy, ColorByTerm] = {"role": ColorByTerm("role"), **CELL_VALUES}
 """The quantities to color by; a mesh just opened has the first."""
-COLOR_BY.update(QUANTITIES.items())
 
 
-def quantity_of(color_by: ColorBy) -> Quantity:
+def quantity_of(color_by: ColorBy) -> ColorBy:
     """Return the quantity that is colored by, or size-skew for roles."""
     return "size-skew" if color_by == "role" else color_by
 

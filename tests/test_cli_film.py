@@ -18,7 +18,7 @@ from PIL import Image
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.samples.table import write_sample
-from slideviz.session.changes import second_view
+from slideviz.session.state import second_view
 
 
 @pytest.fixture
@@ -77,6 +77,21 @@ def test_two_runs_stand_beside_each_other(case, tmp_path, capsys):
     assert "SLIDING_MODE= ps, PERIODIC_MODE= moving: 2 steps, min 0." in out.out
     assert "SLIDING_MODE= none, PERIODIC_MODE= none: 2 steps, min 0." in out.out
     assert "SLIDING_MODE= none: inflow, outflow will not slide" in out.err
+
+
+def test_the_difference_of_two_runs_has_diverging_colors(case, tmp_path, capsys):
+    words = [*("film", str(case), "-o", str(tmp_path / "a_%d.png"), "-q", "--size", "800x400")]
+    words += ["--steps", "1", "--color", "quality-gain"]
+    assert run(words) == 2
+    assert "--color quality-gain compares two runs; give --beside too" in capsys.readouterr().err
+    beside = ["--beside", "SLIDING_MODE=none", "--beside", "PERIODIC_MODE=none"]
+    assert run([*words, *beside]) in (0, 3)
+    with Image.open(tmp_path / "a_1.png") as image:
+        red, _, blue = np.moveaxis(np.asarray(image).astype(int)[60:380, :340, :3], -1, 0)
+    with Image.open(tmp_path / "a_1.png") as image:
+        beside = np.asarray(image).astype(int)[60:380, 350:690, :3]
+    for here in ((red, blue), (beside[..., 2], beside[..., 0])):  # what one gains the other loses
+        assert (here[0] - here[1] > 60).sum() > 100
 
 
 def test_each_run_judges_the_undeformed_mesh_by_its_own_metric(tmp_path, monkeypatch):

@@ -189,6 +189,9 @@ def test_what_cannot_be_copied_says_why(samples, here):
         scripts.run_scripts(unsaved)
     with pytest.raises(CaseError, match="select a section"):
         scripts.section_scripts(session)
+    cut = changes.add_section(session, Section("plane", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    with pytest.raises(CaseError, match="a section of one run shows no difference"):
+        scripts.section_scripts(changes.set_view(cut, color_by="quality-gain"))
     file = session.case.change(view={"VIEW_MAP": "plasma"})
     file.write(file.source.with_name("plasma.cfg"))
     viewed = replace(session, case=session.case.change(source=file.source.with_name("plasma.cfg")))

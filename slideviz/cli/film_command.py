@@ -26,6 +26,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.scene.overview import require_detail
 from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
+from slideviz.terms import DIFFERENCES
 
 SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 
@@ -35,6 +36,8 @@ def main(arguments: Namespace) -> int:
     file = arguments.output
     film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
     check_film(file, film_options, overwrite=arguments.force)  # before the work, not after it
+    if arguments.color in DIFFERENCES and not arguments.beside:
+        arguments.wrong_usage(f"--color {arguments.color} compares two runs; give --beside too")
     if arguments.beside:
         require_pair_width(film_options.pixels(file))
     case = read_case(arguments)

@@ -30,6 +30,7 @@ from slideviz.export.titles import (
 )
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
+from slideviz.session.changes import show_frame
 from slideviz.session.pieces import CheckCancelled, InThread, run_inline
 from slideviz.session.state import Session, StepFrame, planned_steps
 
@@ -264,10 +265,10 @@ def film_steps(
                 at = round(far, 9 if film_options.between else 0)
                 at = min(at, len(one.frames) - 1)
             film_frames.append((yield InThread(partial(film_frame_at, one.frames, at))))
-        shown = [
-            _showing(one, film_frame.frame)
-            for one, film_frame in zip(runs, film_frames, strict=True)
-        ]
+        others = [film_frame.frame for film_frame in film_frames[::-1]]
+        beside = [show_frame(runs[0], round(position)).frame_beside]
+        pairs = zip(runs, film_frames, others if len(runs) > 1 else beside, strict=True)
+        shown = [_showing(one, film_frame.frame, other) for one, film_frame, other in pairs]
         return (yield from renderer.draw_panes(shown, options, write(film_frames)))
 
     yield from render_frames(len(longest.frames), file, film_options, draw)
@@ -336,14 +337,14 @@ def _blend(
     return StepFrame(mesh, blended, end.step)
 
 
-def _showing(session: Session, frame: StepFrame) -> Session:
+def _showing(session: Session, frame: StepFrame, compared: StepFrame | None) -> Session:
     """Return the session with one frame in place of all its run's steps, and the same colors."""
     run = session.run_shown
     assert run is not None
     runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
     # The color range of the whole run: that of one frame would change from image to image.
     view = replace(session.view, frame=1, color_range=session.color_range)
-    return replace(session, runs=runs, view=view)
+    return replace(session, runs=runs, view=view, compared=compared)
 
 
 def _titles(session: Session, options: PictureOptions) -> Titles:

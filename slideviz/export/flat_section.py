@@ -102,7 +102,7 @@ def _choice(session: Session, section: Section) -> CellsInRange | None:
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole_cells
     if frame is None or threshold is None or curve:
         return None
-    return CellsInRange.of(frame.shown_values(session.view.color_by, session.mesh), threshold)
+    return CellsInRange.of(frame.shown_values(session.view.color_by, session.reference), threshold)
 
 
 def frame_words(session: Session) -> str:

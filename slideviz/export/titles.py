@@ -176,10 +176,10 @@ def mark_words(session: Session) -> str:
         return f"{words}: inverted"
     if session.view.color_by == "role" or session.mesh is None:
         return words
-    value = float(frame.values(session.view.color_by, session.mesh)[cell])
+    value = float(frame.values(session.view.color_by, session.reference)[cell])
     if session.view.color_by in WALL_VALUES and np.isnan(value):
         return f"{words}: at no wall"
-    number = ".4g" if session.view.color_by == "displacement" else ".4f"
+    number = ".4g" if session.view.color_by in ("displacement", "run-distance") else ".4f"
     return f"{words}: {value:{number}}"
 
 

@@ -148,9 +148,9 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     only = None
     paint = _Paint(None, None, edge)
     if view.color_by != "role":
-        values = frame.shown_values(view.color_by, session.mesh)
+        values = frame.shown_values(view.color_by, session.reference)
         at_walls = view.color_by in WALL_VALUES
-        colors = color_scale(view.color_map, session.color_range, at_walls)
+        colors = color_scale(session.color_map, session.color_range, at_walls)
         shown = clipped(values, session.color_range) if at_walls else values
         paint = _Paint(shown, colors, edge)
         only = None if view.threshold is None else CellsInRange.of(values, view.threshold)
@@ -227,7 +227,7 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     left = 1.0 - (STRIP - 14) * scale / width
     wide = 20 * scale / width
     place = figure.add_axes((left, 0.16, wide, 0.62), zorder=1)
-    colors = color_scale(session.view.color_map, session.color_range)
+    colors = color_scale(session.color_map, session.color_range)
     bar = color_bar(place, colors, "", letters, inverted=inverted, upright=True)
     bar.outline.set_visible(False)
     place.tick_params(length=0, pad=0.3 * letters)  # the numbers do not touch the bar

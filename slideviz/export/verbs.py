@@ -16,9 +16,9 @@ from slideviz.export.offscreen_renderer import PICTURE_SIZE
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
-from slideviz.session.changes import UNDEFORMED, show_beside
+from slideviz.session.changes import show_beside
 from slideviz.session.opening import session_of_runs
-from slideviz.session.state import Run, StepFrame
+from slideviz.session.state import UNDEFORMED, Run, StepFrame
 from slideviz.solver.deform import Step
 from slideviz.terms import QUANTITIES, Quantity
 

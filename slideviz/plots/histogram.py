@@ -141,7 +141,7 @@ def draw_distribution(
         left = low - BAND * (high - low)
         _strip(axes, bars, outlines, (left, low), foot, style)
     axes.set_xlim(left, high)
-    if high - left < 0.1 * max(abs(left), abs(high)):
+    if high - left < max(0.1 * max(abs(left), abs(high)), 1e-3):
         axes.locator_params(axis="x", nbins=4)  # numbers at ticks are long
     _counts_axis(axes, bars, outlines, log)
     inset = (low - left) / (high - left)

@@ -18,7 +18,7 @@ from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT, Style, style_axes
 from slideviz.sections.span import SpanChannel, SpanWalls
 from slideviz.system.weak_cache import WeakCache
-from slideviz.terms import QUANTITIES
+from slideviz.terms import COLOR_BY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,7 +140,7 @@ def draw_meridional(
     axes.locator_params(axis="x", nbins=4)
     axes.set_aspect("equal", adjustable="datalim")
     bar = figure.colorbar(mesh, ax=axes)
-    label = f"mean {QUANTITIES[paint.label].axis}"
+    label = f"mean {COLOR_BY[paint.label].axis}"
     bar.set_label(label, **style.letters)
     bar.ax.tick_params(colors=style.scheme.text, labelsize=style.size)
     bar.outline.set_edgecolor(style.scheme.edge)

@@ -15,7 +15,7 @@ from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.terms import QUANTITIES
+from slideviz.terms import COLOR_BY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +60,7 @@ def curve_of(lines: Polygons, section: Section, paint: Paint) -> Curve:
 
 def labels_of(section: Section, paint: Paint) -> tuple[str, str]:
     """Return the labels of both axes of curves: the positions along a section, and the values."""
-    return section.in_plane.position_label().full, QUANTITIES[paint.label].axis
+    return section.in_plane.position_label().full, COLOR_BY[paint.label].axis
 
 
 @record

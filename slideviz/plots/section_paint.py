@@ -15,11 +15,14 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import walls
 from slideviz.plots.ticks import rounded_out
+from slideviz.session.colors import with_drawable_colors
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import (
     QUANTITIES,
+    RANKED,
     RATED,
     WALL_VALUES,
+    ColorBy,
     Metric,
     Quantity,
     field_of,
@@ -36,7 +39,7 @@ def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
 class Paint:
     """A value for every cell of a mesh, with limits and color map."""
 
-    label: Quantity  # the quantity
+    label: ColorBy  # the quantity
     values: FloatArray  # (m,): its value in every cell
     inverted: np.ndarray
     """(m,): whether each cell is inverted, and drawn in the color of inverted cells."""
@@ -68,7 +71,7 @@ class Paint:
             return True
         if self.label in WALL_VALUES:
             return False
-        term = RATED[self.label]
+        term = RANKED[self.label]
         return term.colors is None and np.isinf(term.range[1])
 
     def shown(self, cells: IntArray) -> FloatArray:
@@ -84,7 +87,7 @@ class Paint:
     @property
     def worst(self) -> Literal["min", "max"]:
         """Return the end that counts: the worst values, or the largest displacement."""
-        if self.label == "displacement" or RATED[self.label].best == "low":
+        if self.label == "displacement" or RANKED[self.label].best == "low":
             return "max"
         return "min"
 
@@ -134,11 +137,12 @@ def shown_paint(session: Session, frame: StepFrame | None = None) -> Paint:
     A view in the colors of roles has size-skew.
     """
     frame = frame or session.frame
+    session = with_drawable_colors(session)
     assert frame is not None
     what = quantity_of(session.view.color_by)
     inverted = frame.quality.status == INVERTED
-    values = frame.values(what, session.mesh)
-    return Paint(what, values, inverted, session.color_range, session.view.color_map)
+    values = frame.values(what, session.reference)
+    return Paint(what, values, inverted, session.color_range, session.color_map)
 
 
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:

@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.case.motion_words import deformation
 from slideviz.design.blade_gaps import gaps
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import FINE
+from slideviz.mesh.quality import FINE, Quality
 from slideviz.plots.draw import GreedyRun, StepRun
 from slideviz.plots.gap_curves import Measured
 from slideviz.plots.histogram import Bars, Distribution, Outline, draw_distribution
@@ -25,18 +25,19 @@ from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.span import ConstantSpan, SpanWalls, between_walls, find_walls
-from slideviz.session.changes import show_frame
+from slideviz.session.changes import set_view, show_frame
+from slideviz.session.colors import with_drawable_colors
 from slideviz.session.passages import find_periods
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.system.weak_cache import WeakCache, weak_cache
 from slideviz.terms import (
-    METRICS,
-    QUANTITIES,
+    COLOR_BY,
+    DIFFERENCES,
+    RANKED,
     SIZE_SKEW,
     WALL_VALUES,
     ColorBy,
-    Quantity,
     quantity_of,
 )
 
@@ -209,13 +210,15 @@ class CurveRows:
         """Return the curve of the undeformed mesh, then one per session, the first session's last.
 
         Meshes that the section does not cut are left out, and so is the undeformed mesh if
-        displacements are drawn. ``shown``: the session of each view, the first view first, with the
-        view's cached cuts.
+        displacements are drawn. Differences have one curve, that of the first view. ``shown``: the
+        session of each view, the first view first, with the view's cached cuts.
         """
         line = _line(section)
-        states = [(session, cuts) for session, cuts in reversed(shown) if session.view.frame]
         first = shown[0][0]
-        if first.first is not None and first.view.color_by != "displacement":
+        what = first.view.color_by
+        shown = shown[:1] if what in DIFFERENCES else shown
+        states = [(session, cuts) for session, cuts in reversed(shown) if session.view.frame]
+        if first.first is not None and what not in ("displacement", *DIFFERENCES):
             states.insert(0, (show_frame(first, 0), self._first))
         curves = (self._row(session, cuts, line) for session, cuts in states)
         return tuple(row for row in curves if row is not None)
@@ -257,6 +260,10 @@ def histogram_limits(session: Session, full_range: bool) -> Range:
     ``full_range``: all values that are possible (of the displacement, from 0).
     """
     what = shown_measure(session)
+    if what in DIFFERENCES:
+        whole = whole_range(what)
+        usual = set_view(session, color_range=None).color_range
+        return whole if full_range and whole[1] < np.inf else usual
     shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
     spreads = [ends for frame in shown if (ends := spread(frame, what, session.mesh)) is not None]
     low = min((e[0] for e in spreads), default=0.0)
@@ -272,9 +279,11 @@ def histogram_limits(session: Session, full_range: bool) -> Range:
     return rounded_out(0.0 if full_range else low, high)
 
 
-def whole_range(what: Quantity) -> tuple[float, float]:
+def whole_range(what: ColorBy) -> tuple[float, float]:
     """Return the ends of all possible values of a quantity that are of interest."""
-    return (0.0, np.inf) if what not in METRICS else METRICS[what].colors or METRICS[what].range
+    if what == "displacement" or what in WALL_VALUES:
+        return 0.0, np.inf
+    return RANKED[what].colors or RANKED[what].range
 
 
 def draw_histogram(
@@ -290,25 +299,27 @@ def draw_histogram(
     ``log``: whether the axis of the counts is logarithmic. ``full_range``: whether the other axis
     shows all possible values, not only those of the cells.
     """
+    session = with_drawable_colors(session)
     if session.frame is None:
         return
     what = shown_measure(session)
     limits = histogram_limits(session, full_range)
-    counts = partial(distribution, what=what, limits=limits, undeformed=session.mesh)
+    counts = partial(distribution, what=what, limits=limits, reference=session.reference)
     shown = counts(session.frame)
     run = session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     label = "preview" if session.preview else label
-    term = QUANTITIES[what]
+    term = COLOR_BY[what]
     metric = f"{term.label} quality [-]" if what in SIZE_SKEW else term.axis
     runs, left_out = compared(session)
     outlines = [
         Outline(other.label, counts(other.last), series_of(other))
         for other in runs
-        if other.last is not None
+        if other.last is not None and what not in DIFFERENCES
     ]
     # The undeformed mesh has no displacement.
-    if session.first is not None and session.view.frame > 0 and what != "displacement":
+    alone = what in ("displacement", *DIFFERENCES)
+    if session.first is not None and session.view.frame > 0 and not alone:
         outlines.append(Outline("undeformed", counts(session.first), None))
     axes = figure.add_subplot()
     bars = Bars(label, shown, _colors(session, shown))
@@ -343,19 +354,20 @@ def first_value(axes: Axes) -> float:
     return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
 
 
-def shown_measure(session: Session) -> Quantity:
+def shown_measure(session: Session) -> ColorBy:
     """Return the quantity of the histogram: that of the view's colors.
 
     For a mesh that stays in its file it is size-skew, the only one known of all cells.
     """
-    return quantity_of("size-skew" if session.lacks_cells else session.view.color_by)
+    known = with_drawable_colors(session).view.color_by
+    return quantity_of("role" if session.lacks_cells else known)
 
 
 def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
     low, high = session.color_range
     middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
     part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
-    return [tuple(rgba) for rgba in mpl.colormaps[session.view.color_map](part)]
+    return [tuple(rgba) for rgba in mpl.colormaps[session.color_map](part)]
 
 
 _MIDDLES = (np.arange(FINE) + 0.5) / FINE
@@ -370,11 +382,11 @@ def distribution(
     frame: StepFrame,
     what: ColorBy,
     limits: tuple[float, float] = (0.0, 1.0),
-    undeformed: Mesh | None = None,
+    reference: Mesh | Quality | None = None,
 ) -> Distribution:
     """Return the distribution of a frame's values ``what`` in `BINS` equal intervals of limits.
 
-    ``undeformed`` is needed for displacements.
+    ``reference``: see `Session.reference`.
     """
     edges = np.linspace(*limits, BINS + 1)
     totals = frame.quality.of_mesh
@@ -382,7 +394,7 @@ def distribution(
         places = np.clip(np.searchsorted(edges, _MIDDLES, "right") - 1, 0, BINS - 1)
         counts = np.bincount(places, totals.fine_counts, BINS).astype(np.int64)
         return Distribution(counts, edges, totals.inverted)
-    return Distribution.of(_values(frame, what, undeformed), edges)
+    return Distribution.of(_values(frame, what, reference), edges)
 
 
 @weak_cache
@@ -399,10 +411,10 @@ def spread(
     return (float(right.min()), float(right.max())) if len(right) else None
 
 
-def _values(frame: StepFrame, what: ColorBy, undeformed: Mesh | None) -> FloatArray:
+def _values(frame: StepFrame, what: ColorBy, reference: Mesh | Quality | None) -> FloatArray:
     """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted.
 
     Of numbers of walls only those of cells at walls.
     """
-    values = frame.shown_values(what, undeformed)[frame.quality.counted]
+    values = frame.shown_values(what, reference)[frame.quality.counted]
     return values[~np.isinf(values)] if what in WALL_VALUES else values

@@ -42,7 +42,7 @@ def recolored(old: Session | None, new: Session) -> bool:
         old is None
         or old.frame is not new.frame
         or old.view.color_by != new.view.color_by
-        or old.mesh is not new.mesh
+        or old.reference is not new.reference
         or (new.view.color_by in WALL_VALUES and old.color_range != new.color_range)
     )
 

@@ -177,9 +177,9 @@ class Stage:
         frame = session.frame
         what = session.view.color_by
         assert frame is not None
-        key = (frame, what)
+        key = (frame, what, session.reference)
         if self._values is None or self._values[0] != key:
-            self._values = key, frame.shown_values(what, session.mesh)
+            self._values = key, frame.shown_values(what, session.reference)
         return self._values[1]
 
     @staticmethod
@@ -197,17 +197,18 @@ class Stage:
         """
         frame = of or session.frame
         what = session.view.color_by
+        reference = session.reference
         assert frame is not None
-        if self._values is not None and self._values[0] == (frame, what):
+        if self._values is not None and self._values[0] == (frame, what, reference):
             return self.drawn(session, self._values[1][cells])
-        return self.drawn(session, frame.shown_values(what, session.mesh, cells))
+        return self.drawn(session, frame.shown_values(what, reference, cells))
 
     def value_of(self, session: Session, cell: int) -> float:
         """Return the value of one cell, which may be a worst cell of a mesh in its file."""
         assert session.frame is not None
         frame, at = session.frame.place_of(cell)
         what = session.view.color_by
-        return float(frame.shown_values(what, session.mesh, np.array([at]))[0])
+        return float(frame.shown_values(what, session.reference, np.array([at]))[0])
 
     def in_threshold(self, session: Session) -> CellsInRange | None:
         """Return the cells within the view's threshold; None if there is no threshold."""
@@ -226,8 +227,8 @@ class Stage:
         self.table.scalar_range = (low, high)
         at_walls = session.view.color_by in WALL_VALUES
         self.table.above_range_color = self.scheme.cell if at_walls else None
-        if session.view.color_map != self.table.cmap.name:
-            self.table.apply_cmap(session.view.color_map, 256)
+        if session.color_map != self.table.cmap.name:
+            self.table.apply_cmap(session.color_map, 256)
 
     def set_background(self) -> None:
         """Set the plotter's background to that of the color scheme."""

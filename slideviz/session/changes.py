@@ -22,6 +22,7 @@ from slideviz.session.opening import UNCHOSEN, guess_by_name, has_ffd, with_peri
 from slideviz.session.reach import scaled
 from slideviz.session.saving import bound_sections
 from slideviz.session.state import (
+    UNDEFORMED,
     Handle,
     PanelPlace,
     Preview,
@@ -35,8 +36,6 @@ from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, FfdSystem, Role
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
-UNDEFORMED = 0
-"""The number of the undeformed mesh where a run's number is asked for; those begin with 1."""
 MOST_REMOVED = 2  # removed runs that undo can bring back: each may take hundreds of megabytes
 Change = TypeVar("Change", bound=Callable[..., Any])
 Row = TypeVar("Row")
@@ -600,26 +599,6 @@ def adopt_settings(session: Session, number: int) -> Session:
     if run is None:
         return session
     return replace(session, case=run.case, guesses={})
-
-
-def second_view(session: Session) -> Session:
-    """Return the session that the second view shows: the other run, at the matching step.
-
-    Unchanged where there is no second view.
-    """
-    if session.view.beside == UNDEFORMED:
-        return show_frame(session, 0)
-    run = session.run_shown
-    other = session.run(session.view.beside)
-    if other is None:
-        return session
-    planned = run.planned if run is not None else 0
-    at = session.view.frame
-    # The step at about the same part of the displacement, where numbers of steps differ.
-    frame = round(at * other.planned / planned) if planned else 0
-    if at:
-        frame = max(frame, 1)
-    return show_frame(replace(session, shown=other.number), frame)
 
 
 def saved_mesh(session: Session) -> Session:

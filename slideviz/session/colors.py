@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from slideviz.mesh.metrics import is_known
 from slideviz.mesh.quality import INVERTED
-from slideviz.session.changes import second_view, set_view, undoable
-from slideviz.session.state import Session, StepFrame, outwards
-from slideviz.terms import METRICS
+from slideviz.session.changes import set_view, undoable
+from slideviz.session.state import Session, outwards, second_view
+from slideviz.terms import COLOR_BY, DIFFERENCES, METRICS
 
 
 @undoable("color range")
@@ -23,6 +25,10 @@ def fit_colors(session: Session, every: bool = True) -> Session:
     return session if limits is None else set_view(session, color_range=limits)
 
 
+NO_SECOND = (
+    "There is no second run to take the difference from: View > Compare with shows one beside. "
+    "Until then the roles are shown."
+)
 NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the roles are shown."
 
 
@@ -35,6 +41,8 @@ def not_drawable(session: Session) -> str:
             f"The {METRICS[what].label} compares neighbouring cells, which stay in the file. The "
             "roles are shown."
         )
+    if what in DIFFERENCES and session.reference is None:
+        return f"{session.lacks_cells} The roles are shown." if session.lacks_cells else NO_SECOND
     lacking = what == "displacement" and not any(run.frames for run in session.runs)
     return NO_DISPLACEMENT if lacking else ""
 
@@ -58,25 +66,28 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
         return None
     lows = []
     highs = []
-    for frame in _frames(session, every):
-        values = frame.values(what, session.mesh)
+    for one in _states(session, every):
+        frame = one.frame
+        assert frame is not None
+        values = frame.values(what, one.reference)
         values = values[(frame.quality.status != INVERTED) & np.isfinite(values)]
         if len(values):
             lows.append(float(values.min()))
             highs.append(float(values.max()))
     if not lows or not min(lows) < max(highs):
         return None
-    return outwards(min(lows), max(highs))
+    most = max(-min(lows), *highs)
+    return outwards(-most, most) if COLOR_BY[what].color_map else outwards(min(lows), max(highs))
 
 
-def _frames(session: Session, every: bool) -> set[StepFrame]:
-    """Return the frames that are shown in all views, with ``every`` those of all their steps."""
-    shown: set[StepFrame] = set()
-    for one in (session, second_view(session)):
-        if one.frame is not None:
-            shown.add(one.frame)
-        if every:
-            # Displacements are largest in the last step, and measuring each step takes time.
-            far = one.view.color_by == "displacement"
-            shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
-    return shown
+def _states(session: Session, every: bool) -> Iterator[Session]:
+    """Yield the sessions of all views, with ``every`` at all their steps."""
+    what = session.view.color_by
+    # Differences in the second view are those in the first, or their opposites.
+    views = {session} if what in DIFFERENCES else {session, second_view(session)}
+    for one in views:
+        last = len(one.frames) - 1
+        steps = range(last + 1)
+        # Displacements are largest in the last step, and measuring each step takes time.
+        shown = {0, one.view.frame, last} if what == "displacement" else {*steps}
+        yield from (set_view(one, frame=k) for k in (shown if every else {one.view.frame}))

@@ -17,20 +17,19 @@ from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
+from slideviz.mesh.quality import INVERTED, Quality, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.session.state import StepFrame
 from slideviz.terms import (
     CELL_STATES,
-    RATED,
+    RANKED,
     SIZE_SKEW,
     WALL_VALUES,
     CellState,
     ColorBy,
     field_of,
-    quantity_of,
 )
 
 NEAR = 4  # the nearest point of a boundary is looked for in the elements at so many nearest nodes
@@ -132,30 +131,35 @@ class WorstCells:
 
 def measure(color_by: ColorBy) -> ColorBy:
     """Return ``color_by`` where one end of its values is worse, else size-skew."""
-    return color_by if color_by in RATED else "size-skew"
+    return color_by if color_by in RANKED else "size-skew"
 
 
 def badness(what: ColorBy, values: FloatArray) -> FloatArray:
-    """Return numbers (m,) that are larger where values of a quantity of `RATED` are worse."""
+    """Return numbers (m,) that are larger where values of a quantity of `RANKED` are worse."""
     if what in WALL_VALUES:
         return BADNESS[field_of(what)](values)
-    return values if RATED[quantity_of(what)].best == "low" else -values
+    return values if RANKED[what].best == "low" else -values
 
 
 def worst_cells(
-    frames: Sequence[StepFrame], at: int, what: ColorBy, count: int = WORST
+    frames: Sequence[StepFrame],
+    at: int,
+    what: ColorBy,
+    count: int = WORST,
+    reference: Mesh | Quality | None = None,
 ) -> WorstCells:
     """Return the worst cells of the frame ``at``, with the frame in which each was worst.
 
     Inverted cells come first, cells without a value are left out. Only these cells are followed
     through the frames, to save time and memory, and only by the numbers of the quality. Ties are in
-    the order of the cells' numbers.
+    the order of the cells' numbers. ``reference``: see `Session.reference`; by default the mesh of
+    the first frame.
     """
     frame = frames[at]
     what = measure(what)
     if frame.extra is not None:
         return _listed(frame, frame.extra, at, count)
-    values = frame.values(what, frames[0].mesh)
+    values = frame.values(what, reference or frames[0].mesh)
     halo = frame.quality.halo
     rank = np.where(frame.quality.status == INVERTED, -np.inf, -badness(what, values))
     there = ~np.isnan(values)

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from slideviz.session.changes import (
-    UNDEFORMED,
-    second_view,
-    set_view,
-    show_beside,
-    show_frame,
-    show_run,
-)
+from slideviz.session.changes import set_view, show_beside, show_frame, show_run
 from slideviz.session.runs_words import summary
-from slideviz.session.state import Run, Session
+from slideviz.session.state import UNDEFORMED, Run, Session, second_view
 
 
 def run_title(run: Run, among: Sequence[Run] = ()) -> str:

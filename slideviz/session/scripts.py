@@ -17,12 +17,11 @@ from slideviz.case.zone_cases import with_marker_names
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError
 from slideviz.formats.table import usual_ending
-from slideviz.session.changes import UNDEFORMED
 from slideviz.session.motions import shown_case
 from slideviz.session.panes import second_session
 from slideviz.session.saving import Camera, view_to_case
-from slideviz.session.state import Session, result_settings
-from slideviz.terms import quantity_of
+from slideviz.session.state import UNDEFORMED, Session, result_settings
+from slideviz.terms import DIFFERENCES, quantity_of
 
 _DIGITS = 5  # decimals of the camera's numbers, relative to half the height of the view
 _VIEW = {"zoom": "view"}
@@ -130,6 +129,8 @@ def section_scripts(session: Session, *_: object) -> Scripts:
     section = session.view.section
     if section is None or recipe.frame not in (0, session.planned):
         raise CaseError("select a section (panel Sections), and show the last step or the first")
+    if session.view.color_by in DIFFERENCES:
+        raise CaseError("a section of one run shows no difference; copy the view, or other colors")
     path = f"{recipe.source.stem}_section.png"
     mesh = recipe.deformed if recipe.frame else str(recipe.case.mesh_file)
     shown = "step.mesh" if recipe.frame else "mesh"

@@ -26,8 +26,10 @@ from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
 from slideviz.terms import (
+    COLOR_BY,
+    DIFFERENCES,
     METRICS,
-    RATED,
+    RANKED,
     SHOWN,
     SIZE_SKEW,
     WALL_VALUES,
@@ -46,6 +48,8 @@ Handle = Literal["", "section", "motion", "boundary"]
 """What has a handle: the selected section, the chosen motion, the selected boundaries; "" nothing.
 """
 
+UNDEFORMED = 0
+"""The number of the undeformed mesh where a run's number is asked for; those begin with 1."""
 LABEL = 20  # most characters of a run's name in a plot
 
 
@@ -84,24 +88,28 @@ class StepFrame:
         )
 
     def values(
-        self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
+        self, what: ColorBy, reference: Mesh | Quality | None = None, cells: IntArray | None = None
     ) -> FloatArray:
         """Return the values of a quantity ``what`` in all cells (m,), or in ``cells`` (k,).
 
         A metric of nodes has the worst of each cell's nodes, one that compares neighbouring cells
         is NaN where only the skin is in memory. The displacement of a cell is the mean
-        distance of its nodes from where they are in ``undeformed``, in the mesh's length unit. A
-        number of walls is NaN in cells that are not at a wall.
+        distance of its nodes from where they are in ``reference``, in the mesh's length unit. A
+        number of walls is NaN in cells that are not at a wall. ``reference``: see
+        `Session.reference`.
         """
-        if what == "displacement":
-            return cell_displacement(self.mesh, self.base or undeformed or self.mesh, cells)
+        if isinstance(reference, Quality):
+            every = self.quality.values - reference.values
+            return every if cells is None else every[cells]
+        if what in ("displacement", "run-distance"):
+            return cell_displacement(self.mesh, self.base or reference or self.mesh, cells)
         if what in WALL_VALUES:
-            every = self._at_walls(field_of(what), self.base or undeformed or self.mesh)
+            every = self._at_walls(field_of(what), self.base or reference or self.mesh)
             return every if cells is None else every[cells]
         names = {"size": self.quality.size, "skew": self.quality.skew}
         if what in METRICS and what not in SIZE_SKEW:
             every = (
-                metric(self.mesh, what, self.base or undeformed).of_cells
+                metric(self.mesh, what, self.base or reference).of_cells
                 if is_known(self.mesh, what)
                 else np.full(len(self.mesh.cells), np.nan)
             )
@@ -110,11 +118,11 @@ class StepFrame:
         return every if cells is None else every[cells]
 
     def shown_values(
-        self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
+        self, what: ColorBy, reference: Mesh | Quality | None = None, cells: IntArray | None = None
     ) -> FloatArray:
         """Return `values` for colors: nan where a cell is inverted, inf where it is at no wall."""
         status = self.quality.status if cells is None else self.quality.status[cells]
-        values = self.values(what, undeformed, cells)
+        values = self.values(what, reference, cells)
         if what in WALL_VALUES:
             values = np.where(np.isnan(values), np.inf, values)
         return np.where(status == INVERTED, np.nan, values)
@@ -132,9 +140,9 @@ class StepFrame:
             known[name] = none if layers is None else layers.with_layers().at_cells(name)
         return known[name]
 
-    def ends(self, what: ColorBy, undeformed: Mesh) -> tuple[float, float] | None:
+    def ends(self, what: ColorBy, reference: Mesh | Quality | None) -> tuple[float, float] | None:
         """Return the smallest and largest finite value of a quantity; None where there is none."""
-        values = self.values(what, undeformed)
+        values = self.values(what, reference)
         values = values[np.isfinite(values)]
         return (float(values.min()), float(values.max())) if len(values) else None
 
@@ -411,6 +419,8 @@ class Session:
     invalid: tuple[tuple[PanelPlace, str], ...] = ()
     """tuple of (PanelPlace, str): fields whose text is not valid, so that the case still has the
     value before: the panel, and a sentence. No run starts meanwhile."""
+    compared: StepFrame | None = None
+    """What a second view or an image of a film is compared with: the frame of the other view."""
     removed: tuple[Run, ...] = ()  # the last runs removed from ``runs``, which undo can bring back
     newest: int = 0  # the highest number that a run had so far, removed ones too
 
@@ -467,6 +477,26 @@ class Session:
         """Return the frame that is shown; None before a mesh is open."""
         frames = self.frames
         return frames[min(self.view.frame, len(frames) - 1)] if frames else None
+
+    @property
+    def frame_beside(self) -> StepFrame | None:
+        """Return the frame of the other view, or None."""
+        other = second_view(self)
+        return self.compared if other is self else other.frame
+
+    @property
+    def reference(self) -> Mesh | Quality | None:
+        """Return what the values of the view compare with: the undeformed mesh.
+
+        For differences it is the mesh or the quality in the other view; None where there is none.
+        """
+        what = self.view.color_by
+        if what not in DIFFERENCES:
+            return self.mesh
+        frame = self.frame_beside
+        if frame is None or self.lacks_cells:
+            return None
+        return frame.mesh if what == "run-distance" else frame.quality
 
     @property
     def deformed(self) -> StepFrame | None:
@@ -531,6 +561,11 @@ class Session:
         return results[self.limit] if there and self.limit is not None else None
 
     @property
+    def color_map(self) -> str:
+        """Return the color map of the view, or that which the quantity always has."""
+        return COLOR_BY[self.view.color_by].color_map or self.view.color_map
+
+    @property
     def color_range(self) -> tuple[float, float]:
         """Return the values at the ends of the color bar."""
         what = self.view.color_by
@@ -542,7 +577,9 @@ class Session:
             return 0.0, round_up(self.largest_displacement) or 1.0
         if what in WALL_VALUES:
             return self._wall_range
-        low, high = RATED[what].colors or RATED[what].range
+        if what in DIFFERENCES:
+            return self._difference_range
+        low, high = RANKED[what].colors or RANKED[what].range
         if high == np.inf and self.mesh is not None:
             ends = {self.frames[0], self.frames[-1]}
             high = round_up(max(frame.largest(what, self.mesh) for frame in ends))
@@ -566,6 +603,17 @@ class Session:
         return (0.0, 2.0 * low) if low > 0 else (low, low + 1.0)
 
     @cached_property
+    def _difference_range(self) -> tuple[float, float]:
+        """Return round numbers around the differences at the last step, with 0 in their middle."""
+        what = self.view.color_by
+        # With a color range: `second_view` would ask for this one.
+        view = replace(self.view, frame=len(self.frames) - 1, color_range=(0.0, 1.0))
+        last = replace(self, view=view)
+        low, high = (last.frame and last.frame.ends(what, last.reference)) or (0.0, 0.0)
+        most = round_up(max(-low, high)) or 1.0
+        return (-most if COLOR_BY[what].color_map else 0.0), most
+
+    @cached_property
     def largest_displacement(self) -> float:
         """Return the largest displacement of a node after all runs, in the mesh's length unit."""
         if self.mesh is None:
@@ -582,6 +630,32 @@ class Session:
         """Return a case without the guesses that boundaries are fixed, as they are by default."""
         guessed = {name for name in self.guesses if case.roles.get(name) == "fixed"}
         return case.change(roles={n: role for n, role in case.roles.items() if n not in guessed})
+
+
+def second_view(session: Session) -> Session:
+    """Return the session that the second view shows: the other run, at the matching step.
+
+    It has the same colors. Unchanged where there is no second view.
+    """
+    beside = session.view.beside
+    other = session.run(beside)
+    if session.compared is not None or (other is None and beside != UNDEFORMED):
+        return session
+    frame = 0
+    if other is not None:
+        run = session.run_shown
+        planned = run.planned if run is not None else 0
+        at = session.view.frame
+        # The step at about the same part of the displacement, where numbers of steps differ.
+        frame = round(at * other.planned / planned) if planned else 0
+        frame = min(max(frame, 1) if at else frame, len(other.frames))
+    return replace(
+        session,
+        preview=None,
+        compared=session.frame,
+        shown=session.shown if other is None else other.number,
+        view=replace(session.view, frame=frame, color_range=session.color_range),
+    )
 
 
 def round_up(value: float) -> float:

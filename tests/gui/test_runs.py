@@ -625,3 +625,34 @@ def test_the_support_radius_is_said_and_follows_the_settings_or_a_compared_run(r
     window.store.change(changes.show_beside, None)
     window.store.change(changes.set_case, method="idw")
     assert "no support radius" in bar.currentMessage()
+
+
+def test_the_difference_of_two_runs_is_chosen_while_they_are_compared(ran):
+    window = ran.window
+    click(ran, 1, keys=Qt.KeyboardModifier.ControlModifier)
+    ran.qtbot.waitUntil(lambda: window.viewing.second.isVisible())
+    color = window.actions_table.bar.color
+    ran.choose(color, "quality-gain")
+    scenes = window.viewing._scenes()
+    mine, other = (scene.session.frame.quality.values for scene in scenes)
+    for scene, wanted in zip(scenes, (mine - other, other - mine), strict=True):
+        np.testing.assert_allclose(scene.stage.values(scene.session), wanted)
+        assert scene.stage.table.cmap.name == "PuOr"
+        assert tuple(scene.stage.table.scalar_range) == ran.session.color_range
+    drawn = np.asarray(window.scene._cells.shape.cell_data["values"])
+    np.testing.assert_allclose(np.sort(drawn), np.sort(mine - other))
+    display = window.dock_manager.panels["display"]
+    assert not display.map.isEnabled()
+    assert "purple" in display.map.toolTip()
+    worst = window.dock_manager.panels["worst"]
+    window.docks["worst"].raise_()
+    ran.qtbot.waitUntil(lambda: worst.model.worst is not None)
+    ran.qtbot.waitUntil(lambda: worst.model.worst.measure == "quality-gain")
+    assert worst.model.worst.values[0] == (mine - other).min()
+    assert worst.model.headers[1].startswith("Quality\ngain")
+    window.store.change(changes.show_frame, 1)
+    mine, other = (scene.session.frame.quality.values for scene in scenes)
+    np.testing.assert_allclose(scenes[0].stage.values(scenes[0].session), mine - other)
+    ran.click(window.viewing.titles[1].close_button)
+    assert "There is no second run" in window.statusBar().currentMessage()
+    assert window.scene.session.view.color_by == "role"

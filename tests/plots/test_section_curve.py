@@ -33,7 +33,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.section_cuts import Cuts
-from slideviz.session.state import StepFrame
+from slideviz.session.state import StepFrame, second_view
 from tests.builders import cube, square
 
 EYE = {0: np.eye(4)}
@@ -190,7 +190,7 @@ def test_of_two_runs_that_are_compared_both_have_a_curve(session):
     frames = session.runs[0].frames
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.show_beside(session, 1)
-    shown = [(session, Cuts()), (changes.second_view(session), Cuts())]
+    shown = [(session, Cuts()), (second_view(session), Cuts())]
     rows = CurveRows().of(shown, LINE)
     assert [one.label for one in rows] == ["undeformed", "run 1", "run 2"]
 

@@ -10,7 +10,7 @@ from slideviz.scene.ghosts import WIRE
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.state import StepFrame
+from slideviz.session.state import StepFrame, second_view
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
     frames = [StepFrame(cube, quality(cube))]
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.show_beside(session, changes.UNDEFORMED)
-    for state in (changes.second_view(session), changes.show_frame(session, 0)):
+    for state in (second_view(session), changes.show_frame(session, 0)):
         scene.update(state)
         assert not ghost.visibility
     # Settings that have changed since are told of over the run.
@@ -189,10 +189,10 @@ def test_runs_beside_each_other_both_have_a_motion_ghost_or_none(scene, cube):
     for sliding in ("ps", "ds"):
         session = ran_to(changes.set_case(session, sliding=sliding), moved)
     session = changes.show_beside(session, 1)
-    for state in (session, changes.second_view(session)):
+    for state in (session, second_view(session)):
         scene.update(state)
         assert not ghost.visibility, "both runs have this motion"
     session = changes.set_role(session, (top,), "fixed")
-    for state in (session, changes.second_view(session)):
+    for state in (session, second_view(session)):
         scene.update(state)
         assert ghost.visibility, "no run has shown this yet"

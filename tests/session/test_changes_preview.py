@@ -13,7 +13,7 @@ from slideviz.mesh.quality import quality
 from slideviz.session import changes, jobs
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import preview_words
-from slideviz.session.state import StepFrame
+from slideviz.session.state import StepFrame, second_view
 from tests import builders
 
 NEVER = bool
@@ -97,7 +97,7 @@ def test_any_other_step_ends_the_preview():
     again = changes.show_preview(done, session.preview)
     assert changes.show_run(again, done.shown).frame is done.runs[-1].last
     assert changes.start_run(again, name="design").preview is None
-    assert changes.second_view(replace(again, view=replace(again.view, beside=0))).preview is None
+    assert second_view(replace(again, view=replace(again.view, beside=0))).preview is None
 
 
 def test_a_live_run_replaces_the_one_before():

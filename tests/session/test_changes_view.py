@@ -15,7 +15,7 @@ from slideviz.session import changes
 from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements
-from slideviz.session.state import Session, StepFrame, result_settings
+from slideviz.session.state import Session, StepFrame, result_settings, second_view
 from slideviz.session.store import Store
 
 
@@ -262,7 +262,7 @@ def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
     ran = changes.add_frames(changes.start_run(session), [frame, frame])
     both = changes.show_beside(ran, changes.UNDEFORMED)
     assert both.view.beside == changes.UNDEFORMED
-    assert changes.second_view(both).frame is session.first
+    assert second_view(both).frame is session.first
     assert both.frame is frame
     gone = changes.remove_run(changes.end_run(both, "done"), 1)
     assert gone.view.beside is None

@@ -13,7 +13,7 @@ from slideviz.session.panes import choices, close_pane, panes, show_in
 from slideviz.session.run_messages import stopped_words
 from slideviz.session.runs_words import steps_words
 from slideviz.session.saving import Unsaved, title_of
-from slideviz.session.state import Run, StepFrame
+from slideviz.session.state import Run, StepFrame, second_view
 from slideviz.solver.deform import deform
 
 
@@ -85,7 +85,7 @@ def test_a_run_that_ended_early_says_how_far_it_came(session, computed, made, pl
     assert (f"({words})" in Unsaved.of(both, busy=False).question("closing")) == early
     assert (f"{made} of {planned} steps" in steps_words(run)) == early
     # Beside it is the step of another run that is as far, not that run's last one.
-    beside = changes.second_view(changes.show_beside(both, 2))
+    beside = second_view(changes.show_beside(both, 2))
     assert beside.view.frame == max(round(made * 4 / planned), 1)
     assert show_in(changes.show_beside(both, 1), 0, 2).view.frame == max(
         round(made * 4 / planned), 1

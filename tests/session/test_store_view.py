@@ -14,7 +14,7 @@ from slideviz.session import changes
 from slideviz.session.changes import UNDO_WORDS, undo_words
 from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh
-from slideviz.session.state import Session, StepFrame, ViewState
+from slideviz.session.state import Session, StepFrame, ViewState, second_view
 from slideviz.session.store import MERGE_S, Store, UndoState
 from slideviz.terms import COLOR_BY, ROLES, SHOWN
 
@@ -360,7 +360,7 @@ def require_valid(session: Session):
     )
     numbers = [run.number for run in session.runs]
     assert numbers == sorted(set(numbers))
-    assert changes.second_view(session).frame is not None
+    assert second_view(session).frame is not None
     assert np.isfinite(session.color_range).all()
 
 

@@ -57,7 +57,7 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
-from slideviz.session.state import Session
+from slideviz.session.state import UNDEFORMED, Session
 from slideviz.terms import SHOWN
 
 LARGE = 50_000
@@ -480,9 +480,7 @@ class FilmForm(PixelFields, QWidget):
         for option in (self.white, self.fill, self.mark, self.both):
             option.toggled.connect(self._changed)
             form.addRow("", option)
-        compared = (
-            renderer.beside is not None and renderer.session.view.beside != changes.UNDEFORMED
-        )
+        compared = renderer.beside is not None and renderer.session.view.beside != UNDEFORMED
         form.setRowVisible(self.both, compared)
         form.setRowVisible(self.mark, renderer.session.view.marked_cell is not None)
         self._kind_chosen(self.kind.currentData())

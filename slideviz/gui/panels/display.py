@@ -34,8 +34,9 @@ from slideviz.session.state import Session
 from slideviz.terms import (
     COLOR_BY,
     COLOR_MAPS,
+    DIFFERENCES,
     POINTS_SHOWN,
-    RATED,
+    RANKED,
     SHOWN,
     Shown,
     labels,
@@ -48,6 +49,7 @@ TIPS = {
     "fit": COMMANDS["fit_colors"].button_tip,
 }
 ROLES_ONLY = "Roles have colors of their own: color by a value first."
+DIVERGING = "Differences go from orange below 0 by white to purple above."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
 
 
@@ -198,9 +200,12 @@ class DisplayPanel(Panel):
         self.color_by.show_value(view.color_by)
         self.map.show_value(view.color_map)
         valued = view.color_by != "role"
-        for widget in (self.map, self.range, self.fit_range):
+        for widget in (self.range, self.fit_range):
             widget.setEnabled(valued)
-        self.map.setToolTip(TIPS["map"] if valued else ROLES_ONLY)
+        own = bool(COLOR_BY[view.color_by].color_map)
+        self.map.setEnabled(valued and not own)
+        tip = DIVERGING if own else TIPS["map"]
+        self.map.setToolTip(tip if valued else ROLES_ONLY)
         self.range.set_tip(TIPS["range"] if valued else ROLES_ONLY)
         self.fit_range.setToolTip(TIPS["fit"] if valued else ROLES_ONLY)
         self.range.show_value(session.color_range)
@@ -257,14 +262,14 @@ def _shown(session: Session) -> object:
     case = session.case
     view = session.view
     periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
-    runs = session.runs if view.color_by == "displacement" else ()
+    runs = session.runs if view.color_by in ("displacement", *DIFFERENCES) else ()
     style = replace(view.style, handle="")
-    return session.mesh, session.pairs, style, periodic, runs
+    return session.reference, session.pairs, style, periodic, runs
 
 
 def _worse_half(session: Session) -> tuple[float, float]:
     """Return the worse half of the color range, which is the first threshold."""
     low, high = session.color_range
     middle = low + 0.5 * (high - low)
-    term = RATED.get(quantity_of(session.view.color_by))
+    term = RANKED.get(quantity_of(session.view.color_by))
     return (middle, high) if term is not None and term.best == "low" else (low, middle)

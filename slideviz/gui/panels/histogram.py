@@ -25,7 +25,7 @@ from slideviz.plots.session_plots import (
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import Session
-from slideviz.terms import RATED, SIZE_SKEW, WALL_VALUES
+from slideviz.terms import RANKED, SIZE_SKEW, WALL_VALUES
 
 END_PX = 6  # distance in pixels up to which a press moves an end of the range
 
@@ -164,7 +164,8 @@ class HistogramPanel(Panel):
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
         low, high = whole_range(shown_measure(session))
-        self.whole.setText(f"{low:g}–{high:g}" if high < np.inf else f"from {low:g}")
+        both = f"{low:g}–{high:g}" if low >= 0 else f"{low:g} to {high:g}"
+        self.whole.setText(both if high < np.inf else f"from {low:g}")
         for widget in (self.numbers, self.log, self.whole, self.save):
             widget.setVisible(session.frame is not None)
         self.whole.setEnabled(shown_measure(session) not in WALL_VALUES)
@@ -184,7 +185,7 @@ class HistogramPanel(Panel):
         what = shown_measure(session)
         counted = session.frame.quality.counted
         quality = session.frame.quality
-        plain = session.frame.values(what, session.mesh)[counted]
+        plain = session.frame.values(what, session.reference)[counted]
         if what in WALL_VALUES:
             plain = plain[~np.isnan(plain)] if not np.isnan(plain).all() else np.array([np.nan])
         bad = quality.inverted
@@ -192,7 +193,7 @@ class HistogramPanel(Panel):
         if what == "displacement":  # of a node: values of cells are means over their nodes
             word = "highest"
             ends = session.frame.largest_displacement(session.mesh)
-        elif RATED[what].best == "low":
+        elif RANKED[what].best == "low":
             word = "max"
             ends = plain.max()
         else:
@@ -207,7 +208,7 @@ class HistogramPanel(Panel):
         threshold = session.view.threshold
         self.range_text.setVisible(threshold is not None)
         if threshold is not None:
-            values = session.frame.shown_values(what, session.mesh)[counted]
+            values = session.frame.shown_values(what, session.reference)[counted]
             count = len(cells_in_range(values, threshold))
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"

@@ -43,7 +43,7 @@ from slideviz.session.runs_words import (
     summary,
     table_rows,
 )
-from slideviz.session.state import Run, Session
+from slideviz.session.state import UNDEFORMED, Run, Session
 from slideviz.system.csv_table import csv_text
 
 RUN, MIN, MEAN, INVERTED = range(4)  # the columns of the list
@@ -296,7 +296,7 @@ class RunsPanel(Panel):
         self.buttons["compare"].setEnabled(run is not None and run.last is not None)
         for command in filter(None, RUN_COMMANDS):
             able = run is not None and command.enabled(run)
-            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
+            selected = command.name in OF_ALL or self.tree.number != UNDEFORMED
             self.buttons[command.name].setEnabled(able and selected)
 
     def _select(self, session: Session) -> None:
@@ -331,7 +331,7 @@ class RunsPanel(Panel):
         self, item: QTreeWidgetItem, run: Run | None, session: Session, champion: bool
     ) -> None:
         """Fill the row of a run; None: of the undeformed mesh."""
-        number = changes.UNDEFORMED if run is None else run.number
+        number = UNDEFORMED if run is None else run.number
         last = session.frames[0] if run is None else run.last
         texts = ["Undeformed" if run is None else f"{number}  {run_words(run)}", "–", "–", "–"]
         if last is not None:
@@ -415,7 +415,7 @@ class RunsPanel(Panel):
 
     def show_run(self, number: int) -> None:
         """Show the last step of a run, or the undeformed mesh."""
-        if number == changes.UNDEFORMED:
+        if number == UNDEFORMED:
             self.change(changes.show_frame, 0)
         else:
             self.change(changes.show_run, number)

@@ -35,6 +35,7 @@ from slideviz.gui.widgets.plot_canvas import words_label
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
+from slideviz.plots.session_plots import shown_measure
 from slideviz.session import changes
 from slideviz.session.inspect import (
     WorstCells,
@@ -411,8 +412,8 @@ class WorstPanel(Panel):
             self.model.show(None)
             return
         at = session.frames.index(session.frame)
-        what = measure(session.view.color_by)
-        worst = worst_cells(session.frames, at, what)
+        what = measure(shown_measure(session))
+        worst = worst_cells(session.frames, at, what, reference=session.reference)
         title = f"{COLOR_BY[what].axis}, of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
         self.model.extent = session.frame.mesh.extent
@@ -485,8 +486,8 @@ class WorstPanel(Panel):
 
 def _listed(session: Session) -> object:
     """Return what the list of worst cells depends on."""
-    what = measure(session.view.color_by)
-    return session.frame, len(session.frames), what, machine_pair(session)
+    what = measure(shown_measure(session))
+    return session.frame, session.reference, len(session.frames), what, machine_pair(session)
 
 
 def info_text(session: Session, cell: int, every: bool = False) -> str:

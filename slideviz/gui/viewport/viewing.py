@@ -32,7 +32,7 @@ from slideviz.session import changes, jobs
 from slideviz.session.motions import Ghosts
 from slideviz.session.panes import choices, close_pane, panes
 from slideviz.session.section_cuts import Cuts
-from slideviz.session.state import Session
+from slideviz.session.state import UNDEFORMED, Session, second_view
 from slideviz.session.store import Store
 
 
@@ -331,7 +331,7 @@ class Viewing(QWidget):
         self.second.reduce_effects()
         self.second.set_flat(session.mesh.dim == 2)
         self.second_scene.set_coarse_boundaries(self.coarse)
-        self.second_scene.open(changes.second_view(session), self.surfaces)
+        self.second_scene.open(second_view(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
         self.second_scene.camera.copy_from(self.scene.camera)
         self._share_legend(session.view.swapped)
@@ -460,7 +460,7 @@ class Viewing(QWidget):
     def _sync_beside(self, session: Session) -> None:
         beside = session.view.beside
         other = session.run(beside)
-        if other is None and beside != changes.UNDEFORMED:
+        if other is None and beside != UNDEFORMED:
             self._drop_second()
             return
         names = choices(session)
@@ -471,7 +471,7 @@ class Viewing(QWidget):
             self._make_second(session)
         else:
             self._swap(session.view.swapped)
-            self.second_scene.update(changes.second_view(session))
+            self.second_scene.update(second_view(session))
             self.second.render_soon()
 
     def views_and_scenes(self) -> list[tuple[View3D, Scene]]:
