@@ -15,11 +15,11 @@ from time import perf_counter
 import numpy as np
 
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.operations import many
 from slideviz.rbf.solve import NOTHING, extend
 from slideviz.system.device import arrays_at, card_name, why_no_card
 from slideviz.system.threads import cores
+from slideviz.terms import KERNELS
 
 TARGETS = 10_000_000
 CONTROLS = 20_000

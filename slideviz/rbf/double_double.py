@@ -17,8 +17,8 @@ from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import _K, one_at_a_time
 from slideviz.rbf.evaluate import Basis, Tick, no_tick
-from slideviz.rbf.kernels import KERNELS
 from slideviz.system.jit_cache import njit
+from slideviz.terms import KERNELS
 
 # Without "fastmath", which takes a + b - a for b.
 

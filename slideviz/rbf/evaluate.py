@@ -12,8 +12,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.card import CardLoops
 from slideviz.rbf.compiled import Inputs, Metric
-from slideviz.rbf.kernels import KERNELS
 from slideviz.system.device import Place
+from slideviz.terms import KERNELS
 
 CHUNK = 25_000_000  # pairs between two calls of ``tick``: some tens of milliseconds
 
@@ -60,7 +60,7 @@ class Basis:
     @property
     def metric(self) -> Metric:
         """Return what the loops take."""
-        return self.period_over_pi, 1.0 / self.radius, KERNELS[self.kernel].code
+        return self.period_over_pi, 1.0 / self.radius, list(KERNELS).index(self.kernel)
 
     @property
     def loops(self) -> HostLoops | CardLoops:

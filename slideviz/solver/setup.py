@@ -36,7 +36,6 @@ from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, hold_on_axis
 from slideviz.rbf.frames import corners as corners_of
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.operations import add_displacement
@@ -73,7 +72,7 @@ from slideviz.solver.prescribed import (
 from slideviz.solver.rims import find_rims
 from slideviz.system.device import Place, choose_place, free_on_card
 from slideviz.system.platform import free_memory
-from slideviz.terms import NOT_WALLS
+from slideviz.terms import KERNELS, NOT_WALLS
 
 if TYPE_CHECKING:
     from slideviz.elastic.conditions import Body

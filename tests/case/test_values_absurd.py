@@ -14,10 +14,10 @@ from slideviz.case.motions.rigid import Translate
 from slideviz.cli import run
 from slideviz.errors import ArgumentError, CaseError, UnsoundError
 from slideviz.mesh.check import LARGEST
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import Reduction
 from slideviz.sections.model import Section
 from tests import builders
+from tests.oracles.kernels import KERNELS
 from tests.slow import one_of_each_fast
 
 TEXTS = ("1e300", "1.7e308", "1e49", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")

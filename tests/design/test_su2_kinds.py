@@ -548,7 +548,7 @@ def test_settings_of_radial_functions_are_those_of_su2(text, here):
 
 
 def test_multiquadrics_of_su2_and_ours_are_proportional(here):
-    from slideviz.rbf.kernels import KERNELS
+    from tests.oracles.kernels import KERNELS
 
     Path("a.cfg").write_text(
         f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1\nDEFORM_KIND= RBF\nRADIAL_BASIS_FUNCTION_PARAMETER= 3\n"

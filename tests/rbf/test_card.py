@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from slideviz.rbf import card
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.operations import many
 from slideviz.rbf.solve import NOTHING, extend
 from slideviz.system.device import HOST, card_arrays
 from tests.fake_cupy import fake_cupy, needs_compiler
+from tests.oracles.kernels import KERNELS
 
 __all__ = ["fake_cupy"]
 pytestmark = needs_compiler

@@ -7,13 +7,13 @@ import slideviz as sv
 from slideviz.errors import DeformError
 from slideviz.rbf import evaluate as module
 from slideviz.rbf.evaluate import Basis, connected, evaluate, reached
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem
 from slideviz.solver import deform as solver
 from slideviz.solver.deform import _systems
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, far_field, sphere_in_box
+from tests.oracles.kernels import KERNELS
 
 COMPACT = [name for name, kernel in KERNELS.items() if kernel.compact]
 

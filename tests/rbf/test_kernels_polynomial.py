@@ -10,9 +10,9 @@ from slideviz.case.check import contradictions
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.rigid import Translate
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import Reduction
 from tests import builders
+from tests.oracles.kernels import KERNELS
 
 DEFINITE = [name for name, kernel in KERNELS.items() if not kernel.polynomial]
 SADDLES = [name for name, kernel in KERNELS.items() if kernel.polynomial]

@@ -7,8 +7,8 @@ import pytest
 
 from slideviz.rbf.evaluate import Basis, evaluate
 from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.slopes import pull_positions, push_positions
+from tests.oracles.kernels import KERNELS
 
 DISTANCES = {"euclidean": (3, 0.0), "translational": (4, 0.0), "rotational": (4, 0.7)}
 H = 1e-6

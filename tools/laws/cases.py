@@ -11,9 +11,9 @@ from slideviz.case.model import Case
 from slideviz.case.motions.motion import Motion
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.kernels import PLAIN
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import SLIDING, Role
+from slideviz.terms import KERNELS, SLIDING, Role
 from tools.laws.draw import Made, Period, Rng
 from tools.laws.meshes import nearest_neighbour, random_mesh
 

@@ -26,10 +26,10 @@ from slideviz.mesh.jacobians import INVERTED, VALID
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import quality
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import GAMMA
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
+from slideviz.terms import KERNELS
 from tests.oracles.gmsh_jacobians import smallest_jacobians
 from tools.laws import stages
 from tools.laws.cases import Run
