@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from slideviz.argument_types import record
@@ -23,7 +23,7 @@ from slideviz.design.deformer import Deformer
 from slideviz.errors import CaseError
 from slideviz.formats.cgns.read import CgnsForm
 from slideviz.formats.files import read, write
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
 
 COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""
@@ -56,7 +56,7 @@ class SolverSurface:
         return np.where(self.moving[at] == self.nodes, at, -1)
 
     @cached_property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> BoolArray:
         """Return a mask (N, 1) of the nodes that are not moving nodes."""
         return self.place[:, None] < 0
 

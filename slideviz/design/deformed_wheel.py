@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types, record
 from slideviz.case.limits import LimitResult, check_case_limits
@@ -21,12 +20,12 @@ from slideviz.formats.files import read
 from slideviz.formats.table import ZoneContent, write_content
 from slideviz.machine.wheel import Wheel
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Assembly, CellRows, FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.zones import unique_names, zones_of
 from slideviz.solver.deform import deform
-from slideviz.solver.steps import Progress
+from slideviz.solver.steps import Progress, Report
 
 Count = int | Literal["all"]
 """A number of passages: "all" for a whole turn."""
@@ -78,7 +77,7 @@ def wheel(
     passages: Count | Sequence[Count] = "all",
     numbered: bool = False,
     designs: Table | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Report | None = None,
 ) -> WheelQuality:
     """Deform a passage, and write the wheel that its copies make; return its quality.
 
@@ -248,7 +247,7 @@ def write_wheel(
     points: Sequence[FloatArray],
     passages: Count | Sequence[Count] = "all",
     numbered: bool = False,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Report | None = None,
 ) -> WheelQuality:
     """Write the wheel of deformed passages; parameters and errors as `wheel`.
 
@@ -321,9 +320,7 @@ def _together(zones: Sequence[WheelQuality]) -> WheelQuality:
     )
 
 
-def _write(
-    path: Path, contents: Sequence[ZoneContent], progress: Callable[[Progress], None]
-) -> None:
+def _write(path: Path, contents: Sequence[ZoneContent], progress: Report) -> None:
     """Write the wheels of zones, and call ``progress`` after each block."""
     total = sum(each.n_cells + each.n_points for each in contents)
     done = 0
@@ -334,7 +331,7 @@ def _write(
             done += j - i
             return content.points(i, j)
 
-        def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        def cells(i: int, j: int) -> CellRows:
             nonlocal done
             done += j - i
             return content.cells(i, j)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import partial, reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types, record
 from slideviz.case.displacement import Displacements
@@ -33,6 +32,7 @@ from slideviz.errors import (
 from slideviz.mesh.interfaces import disjoint_interfaces, torn_interfaces
 from slideviz.mesh.model import (
     Assembly,
+    BoolArray,
     FloatArray,
     IntArray,
     Mesh,
@@ -51,12 +51,12 @@ from slideviz.rbf.operations import difference_from, flat
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, Tape, Variable, put, take, transform, value
-from slideviz.solver.deform import Progress
 from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness, wall_warnings
 from slideviz.solver.interface_motion import InterfaceMotion
 from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import AUTO_TOLERANCE, Setup, make_setup
+from slideviz.solver.steps import Report
 
 BADLY_CONDITIONED = 1e14
 """Above this condition number, the effect of moving a single node has few correct digits."""
@@ -133,7 +133,7 @@ def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArr
 
 
 def warn_of_errors(
-    errors: FloatArray, allowed: FloatArray, reference: NDArray[np.bool_], *, reduced: bool
+    errors: FloatArray, allowed: FloatArray, reference: BoolArray, *, reduced: bool
 ) -> None:
     """Warn where designs miss what they must do by more than is allowed.
 
@@ -488,8 +488,6 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
 
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""
-
-Report = Callable[[Progress], None]
 
 
 CONSTRAINTS = ("min", "mean", "margin")

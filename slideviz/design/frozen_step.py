@@ -28,7 +28,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate, 
 from slideviz.rbf import tape
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
-from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.evaluate import Rows, matrix
 from slideviz.rbf.exact import Fit, gathered, parts, row_keys, row_terms
 from slideviz.rbf.field import share
 from slideviz.rbf.frames import Frame
@@ -56,7 +56,7 @@ from slideviz.rbf.solve import (
     pseudo_inverse,
 )
 from slideviz.rbf.tape import Array, Variable, recorded, value
-from slideviz.solver.deform import Progress, all_steps, require_memory
+from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import (
     Stepping,
@@ -65,7 +65,7 @@ from slideviz.solver.stepping import (
     one_step,
     with_halo_copies,
 )
-from slideviz.solver.steps import step_timer
+from slideviz.solver.steps import Report, step_timer
 from slideviz.system.platform import free_memory
 
 REMEDY = (
@@ -445,7 +445,7 @@ class FrozenFit(Fit):
         self,
         blocks: list[IntArray],
         factors: list[Factor],
-        place: tuple[FloatArray, FloatArray | None],
+        place: Rows,
         name: str,
     ) -> Callable[[FloatArray], FloatArray]:
         """Return the solver of a system in blocks; a `MeasuredSystem` if refined or checked."""
@@ -852,8 +852,6 @@ def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> 
     keep_undeformed(value(at), value(moved), start, before)
     return at
 
-
-Report = Callable[[Progress], None]
 
 BYTES = 64  # free memory for each entry of a factor, above which factors are kept for further calls
 

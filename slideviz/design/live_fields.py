@@ -7,7 +7,7 @@ translation, rotation and scale of it; of other motions each number has a field.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +20,8 @@ from slideviz.case.moving_nodes import moving_nodes
 from slideviz.design.deformer import Deformer, facets_of
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, row_norms
-from slideviz.solver.deform import Progress
 from slideviz.solver.setup import Setup
+from slideviz.solver.steps import Report
 from slideviz.system.grouping import grouped
 from slideviz.system.platform import free_memory
 
@@ -55,7 +55,7 @@ class LiveFields:
     start: FloatArray | None = None  # (n, d): the points of that run
 
     @classmethod
-    def of(cls, case: Case, mesh: Mesh, progress: Callable[[Progress], None]) -> LiveFields:
+    def of(cls, case: Case, mesh: Mesh, progress: Report) -> LiveFields:
         """Return the fields for the motions of a case; ``progress`` may raise an error to stop.
 
         Raises CaseError where the case does not fit the mesh, and DeformError where there would be

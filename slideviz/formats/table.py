@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from slideviz.errors import MeshError
 from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
+from slideviz.mesh.model import CellRows
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
 from slideviz.system.tables import table_beside
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
+    from slideviz.mesh.model import FloatArray, Marker, Mesh
 
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 """Endings of files whose format may be found by their content."""
@@ -52,9 +53,8 @@ class ZoneContent:
     dim: int  # 2 or 3
     n_cells: int
     n_points: int  # `n_cells`, `n_points`: numbers of cells and points
-    cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
-    """Returns cells in the order of the file: types (k,), nodes one after the other, and the index
-    of each (k,)."""
+    cells: Callable[[int, int], CellRows]
+    """Returns cells in the order of the file."""
     types: Callable[[int, int], NDArray[np.uint8]]  # returns the types (k,) of these cells
     points: Callable[[int, int], FloatArray]  # returns coordinates (k, d)
     markers: tuple[Marker, ...]  # the boundaries

@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.mesh.axis_frame import Triple
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
@@ -59,8 +60,8 @@ class Curves(ABC):
 class Span(ABC):
     """The span of points between a root, or hub, and a tip, or shroud."""
 
-    axis: tuple[float, float, float]
-    origin: tuple[float, float, float]
+    axis: Triple
+    origin: Triple
     middle: float
     radius: float
     holes: IntArray

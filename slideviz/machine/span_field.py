@@ -35,7 +35,7 @@ from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.machine.span import Curves, Distances, Span, facets_of
 from slideviz.machine.wall import closed_wall, turn_about_axis, wall_profile
-from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
+from slideviz.mesh.axis_frame import Triple, along, axis_basis, in_axis_frame
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import unit
@@ -64,8 +64,8 @@ WHOLE = 2.0 * np.pi  # the period of a mesh that repeats by no rotation
 class SpanField(Span):
     """The normalised span between two walls, and meridional coordinates about the axis."""
 
-    axis: tuple[float, float, float]
-    origin: tuple[float, float, float]
+    axis: Triple
+    origin: Triple
     middle: float  # theta that is farthest from where its branch ends
     radius: float  # the largest one of the walls
     walls: tuple[ClosestPoints, ClosestPoints]
@@ -191,8 +191,8 @@ def find_span(
     mesh: Mesh,
     hub: str,
     shroud: str,
-    axis: tuple[float, float, float],
-    origin: tuple[float, float, float],
+    axis: Triple,
+    origin: Triple,
     period: float = WHOLE,
 ) -> SpanField:
     """Return the span between two boundaries of a 3D mesh, whose passages repeat by ``period``.
@@ -213,8 +213,8 @@ def _span_between(
     mesh: Mesh,
     hub: str,
     shroud: str,
-    axis: tuple[float, float, float],
-    origin: tuple[float, float, float],
+    axis: Triple,
+    origin: Triple,
     period: float,
 ) -> SpanField:
     if mesh.dim != 3:

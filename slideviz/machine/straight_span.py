@@ -16,7 +16,7 @@ from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.machine.span import Curves, Distances, Span, facets_of
 from slideviz.machine.wall import plane_normal, turn_about_axis
-from slideviz.mesh.axis_frame import along, in_axis_frame
+from slideviz.mesh.axis_frame import Triple, along, in_axis_frame
 from slideviz.mesh.model import NO_NODES, FloatArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import unit
@@ -24,7 +24,6 @@ from slideviz.system.weak_cache import weak_cache
 
 PARALLEL = 1e-6  # largest sine of the angle between directions that are one
 EXACT = 1e-12  # components of a wall's unit normal below this are rounding
-Triple = tuple[float, float, float]
 
 
 @record

@@ -16,7 +16,16 @@ from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.table import ZoneContent
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
-from slideviz.mesh.model import NO_NODES, Cells, FloatArray, IntArray, Marker, Mesh, row_norms
+from slideviz.mesh.model import (
+    NO_NODES,
+    CellRows,
+    Cells,
+    FloatArray,
+    IntArray,
+    Marker,
+    Mesh,
+    row_norms,
+)
 from slideviz.mesh.periodic import TOLERANCE, Pair
 
 
@@ -126,7 +135,7 @@ class Wheel:
         ]
         return np.concatenate(parts)
 
-    def cells(self, i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+    def cells(self, i: int, j: int) -> CellRows:
         """Return the cells i to j - 1: types (k,), all nodes in turn, and numbers (k,).
 
         Cells of one type follow each other, copy after copy.

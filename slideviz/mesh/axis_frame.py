@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.model import FloatArray
 
+Triple = tuple[float, float, float]
 Vector = Sequence[float] | FloatArray  # three numbers
 
 Z_AXIS = (0.0, 0.0, 1.0)

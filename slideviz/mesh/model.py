@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+CellRows = tuple[NDArray[np.uint8], IntArray, IntArray]
+"""Types (k,) of cells, their nodes one after the other, and the index of each (k,)."""
 Signs = NDArray[np.int8]
 """(m,): 1, or -1 for a cell that is numbered the other way round."""
 Index = slice | IntArray

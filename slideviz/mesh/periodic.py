@@ -15,7 +15,14 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.errors import MeshError, Message, point_words
-from slideviz.mesh.axis_frame import Z_AXIS, axis_basis, axis_text, in_axis_frame, ordered_sum
+from slideviz.mesh.axis_frame import (
+    Z_AXIS,
+    Triple,
+    axis_basis,
+    axis_text,
+    in_axis_frame,
+    ordered_sum,
+)
 from slideviz.mesh.check import check_size
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, ZonePart, frozen_array
@@ -52,8 +59,8 @@ class Pair:
     kind: PeriodicKind
     vector: FloatArray  # (d,): translation from first to second; zero when rotational
     angle: float  # rotation in radians about axis through origin; zero when translational
-    axis: tuple[float, float, float]
-    origin: tuple[float, float, float]
+    axis: Triple
+    origin: Triple
     """`axis`, `origin` (3,) tuple of float: direction of the axis of rotation, and a point on it;
     without effect when translational."""
     nodes: IntArray  # (k, 2): each node of first and its image
@@ -365,7 +372,7 @@ def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tup
 def _pairs(mesh: Mesh, going_on: Callable[[], object]) -> list[Pair]:
     """Return the pairs of a zone, as `find_pairs` does."""
     count = {name: len(mesh.marker(name).nodes) for name in mesh.marker_names}
-    tries: list[tuple[PeriodicKind, tuple[float, float, float]]] = [("translational", Z_AXIS)]
+    tries: list[tuple[PeriodicKind, Triple]] = [("translational", Z_AXIS)]
     tries += [("rotational", axis) for axis in (_AXES[:1] if mesh.dim == 2 else _AXES)]
     found: list[Pair] = []
     allowed = TOLERANCE * mesh.extent

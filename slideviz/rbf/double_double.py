@@ -16,7 +16,7 @@ from numba import prange
 from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import _K, one_at_a_time
-from slideviz.rbf.evaluate import Basis, Tick, no_tick
+from slideviz.rbf.evaluate import Basis, Rows, Tick, no_tick
 from slideviz.system.jit_cache import njit
 from slideviz.terms import KERNELS
 
@@ -278,7 +278,7 @@ class Residuals:
     """Computes residuals of an interpolation system with twice the digits of a float64."""
 
     basis: Basis  # its kernel is one of ``FUNCTIONS``
-    place: tuple[FloatArray, FloatArray | None]
+    place: Rows
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     _cache: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
 

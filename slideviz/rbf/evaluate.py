@@ -23,6 +23,9 @@ weights share them: the functions and their products stay in the cache."""
 
 ROWS = 256  # largest number of targets that are in memory at a time then
 
+Rows = tuple[FloatArray, FloatArray | None]
+"""Features (k, n) of nodes, and their directions (n, d), None for all components."""
+
 Tick = Callable[[float], None]
 """A progress callback: takes the fraction done, and may raise to stop the work."""
 
@@ -240,8 +243,8 @@ def connected(basis: Basis, features: FloatArray) -> IntArray:
 
 def matrix(
     basis: Basis,
-    rows: tuple[FloatArray, FloatArray | None],
-    columns: tuple[FloatArray, FloatArray | None] | None = None,
+    rows: Rows,
+    columns: Rows | None = None,
     tick: Tick = no_tick,
 ) -> FloatArray:
     """Return G_ab = phi(|x_a - c_b|) (m_a . n_b), (N, n).

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, largest_size, row_dots, run_begins
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.double_double import supports
-from slideviz.rbf.evaluate import Tick, matrix
+from slideviz.rbf.evaluate import Rows, Tick, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem, first_occurrences
 from slideviz.rbf.refine import TRUSTED, System, check_points
@@ -121,7 +121,7 @@ class ExactFit(Fit):
         known = np.setdiff1d(np.arange(len(names)) if problem.lasting else some, left_out)
         self.stages += ((names[known],),)
 
-    def _place(self, rows: ConstraintRows) -> tuple[FloatArray, FloatArray | None]:
+    def _place(self, rows: ConstraintRows) -> Rows:
         """Return the features (k, r) and directions of rows."""
         return self._problem.place(rows.nodes), rows.directions
 

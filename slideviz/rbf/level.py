@@ -22,7 +22,7 @@ from slideviz.mesh.model import (
 )
 from slideviz.mesh.nearest import OBLIQUE
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
-from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.evaluate import Rows, matrix
 from slideviz.rbf.exact import (
     condition_with_terms,
     gathered,
@@ -467,7 +467,7 @@ class GreedyLevel:
         nodes = self._among.rows.nodes
         normals = self._among.rows.directions
 
-        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
+        def place(index: IntArray) -> Rows:
             features = self._problem.place(nodes[index])
             return features, None if normals is None else normals[index]
 

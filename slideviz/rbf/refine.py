@@ -22,7 +22,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, FloatArray, row_dots
 from slideviz.rbf.double_double import DoubleFactor, Residuals, supports
-from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
+from slideviz.rbf.evaluate import Basis, Rows, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
 from slideviz.system.weak_cache import WeakCache
 
@@ -83,7 +83,7 @@ class System:
     """An interpolation system with its factor, to estimate errors and to refine solutions."""
 
     basis: Basis
-    place: tuple[FloatArray, FloatArray | None]
+    place: Rows
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     factor: Factor  # without the rows that the pivot guard left out
 
@@ -261,9 +261,7 @@ class System:
         return Residuals(self.basis, self.place)
 
 
-def with_dropped_rows(
-    basis: Basis, place: tuple[FloatArray, FloatArray | None], factor: Factor
-) -> Factor:
+def with_dropped_rows(basis: Basis, place: Rows, factor: Factor) -> Factor:
     """Return ``factor`` with the rows appended that it left out, with `SHIFT` on their diagonal.
 
     Ten times `SHIFT`, and so on, where the rows are not positive definite with that.

@@ -23,6 +23,7 @@ from scipy.sparse.linalg import splu
 
 from slideviz.argument_types import record
 from slideviz.errors import CaseError
+from slideviz.mesh.axis_frame import Triple
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, row_dots
 
 NOSE = (0.05, 0.04)
@@ -40,12 +41,12 @@ class BladeSection:
     angles_deg: tuple[float, float] = (30.0, -50.0)
     """(float, float): angles of the camber line to the x axis, at the leading and at the trailing
     edge."""
-    thickness: tuple[float, float, float] = (0.1, 0.2, 1.4)
+    thickness: Triple = (0.1, 0.2, 1.4)
     """(float, float, float): a, b, c of the half thickness sqrt(x (1 - x)) (a + b (1 - x)^c). The
     root rounds both ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind."""
     pitch: float = 0.75  # distance of the periodic sides in y
     ends: tuple[float, float] = (-0.5, 1.6)  # (float, float): x of inflow and outflow
-    hole: tuple[float, float, float] = (-0.1, 1.12, 0.14)
+    hole: Triple = (-0.1, 1.12, 0.14)
     """(float, float, float): first and last x of the hole that the O-grid fills, before smoothing,
     and its half height about the camber line."""
 

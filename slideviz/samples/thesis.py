@@ -23,7 +23,7 @@ from slideviz.case.motions.rigid import Rotate, Translate
 from slideviz.case.moving_nodes import displacement_of
 from slideviz.errors import CaseError
 from slideviz.formats.table import ZoneContent
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import CellRows, Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.terms import Role
 
 LINE = 3  # VTK identifiers
@@ -71,7 +71,7 @@ def zone_of(grid: Structured) -> ZoneContent:
     def types(i: int, j: int) -> NDArray[np.uint8]:
         return np.full(j - i, _element(grid), np.uint8)
 
-    def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+    def cells(i: int, j: int) -> CellRows:
         ids = np.arange(i, j)
         return types(i, j), grid.cells(ids).ravel(), ids
 

@@ -6,7 +6,7 @@ worker run the same code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -25,7 +25,7 @@ from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone
 from slideviz.solver.prepare import Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
-from slideviz.solver.steps import Progress, Step, Trial, step_timer
+from slideviz.solver.steps import Progress, Report, Step, Trial, step_timer
 from slideviz.system.platform import free_memory
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
@@ -43,7 +43,7 @@ RELAX_BYTES = 1_700  # bytes of memory that relaxation takes for each node: meas
 def deform(
     case: Case,
     mesh: Mesh,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Report | None = None,
     setup: Setup | None = None,
     certify: bool = False,
     converged: bool = False,
@@ -122,7 +122,7 @@ def deform(
 
 def _steps_of_zone(
     prepared: Prepared,
-    report: Callable[[Progress], None],
+    report: Report,
     setup: Setup | None = None,
     *,
     certify: bool,

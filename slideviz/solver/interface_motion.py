@@ -22,10 +22,9 @@ from slideviz.mesh.zones import names_in, with_zones
 from slideviz.solver.growth import check_motion
 from slideviz.solver.prepare import Prepared, prepare
 from slideviz.solver.rims import on_walls
-from slideviz.solver.steps import Progress, Step
+from slideviz.solver.steps import Progress, Report, Step
 from slideviz.terms import Role
 
-Report = Callable[[Progress], None]
 Run = Callable[[Prepared, Report], Iterator[Step]]
 """Deforms one zone."""
 FOLLOWING = ("fixed", "sliding", "internal")  # roles of boundaries that follow another zone's

@@ -37,7 +37,7 @@ from slideviz.solver.growth import (
 )
 from slideviz.solver.layers import Room
 from slideviz.solver.setup import Setup, sliding_normals
-from slideviz.solver.steps import Progress, Step, Trial, step_timer
+from slideviz.solver.steps import Report, Step, Trial, step_timer
 from slideviz.system.threads import in_parts
 
 THINNINGS = 3
@@ -107,7 +107,7 @@ class Stepping:
     mesh: Mesh
     setup: Setup
     """`case`, `mesh`, `setup`: what is asked, the undeformed mesh, and the arrays made of both."""
-    report: Callable[[Progress], None]
+    report: Report
     """Called with each ``Progress``; an exception it raises ends the run."""
     seconds: dict[str, float]
     """Spent before the first step, by phase; added to those of the first step."""

@@ -54,8 +54,12 @@ class Progress:
         return "" if self.zone is None else f" of zone {self.zone}"
 
 
+Report = Callable[[Progress], None]
+"""What is told how far a run is."""
+
+
 def step_timer(
-    report: Callable[[Progress], None],
+    report: Report,
     step: int = 1,
     total: int = 1,
     seconds: dict[str, float] | None = None,

@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.errors import printable
 from slideviz.formats.binary_copy import binary_layouts, write_layouts
@@ -19,7 +18,7 @@ from slideviz.formats.su2.write import content_blocks, require_text_names
 from slideviz.formats.su2b.read import BLOCK, read_markers
 from slideviz.formats.su2b.write import halo_error, require_binary_names
 from slideviz.formats.table import ZoneContent, format_of
-from slideviz.mesh.model import Cells, IntArray
+from slideviz.mesh.model import CellRows, Cells, IntArray
 from slideviz.streaming.skin import index_of, read_skin
 from slideviz.streaming.source import FileSource, Scratch, ZoneSource
 from slideviz.streaming.stream_input import require_disk_space, text_size
@@ -47,7 +46,7 @@ def _text_of_zone(source: ZoneSource, folder: Path) -> Iterator[bytes]:
     with ExitStack() as stack:
         where = _places(stack, source, folder)
 
-        def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        def cells(i: int, j: int) -> CellRows:
             if where is None:
                 block = source.elements_at(i, j - i)
                 return block.types, block.nodes, block.ids

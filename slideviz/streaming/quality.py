@@ -25,7 +25,7 @@ from slideviz.errors import MeshError, Message
 from slideviz.formats.su2b.read import read_markers
 from slideviz.mesh.margin import SafeFraction, step_safety
 from slideviz.mesh.metrics import MetricValues, rated_metric
-from slideviz.mesh.model import Cells, FloatArray, Index, IntArray, Mesh
+from slideviz.mesh.model import BoolArray, Cells, FloatArray, Index, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums, facets_of
 from slideviz.mesh.quality import INVERTED, Quality, quality, quality_totals
 from slideviz.solver.deform import folded_at
@@ -375,7 +375,7 @@ def _hashes(facets: IntArray) -> Hashes:
     return out
 
 
-def _is_among(hashes: Hashes, some: Hashes) -> NDArray[np.bool_]:
+def _is_among(hashes: Hashes, some: Hashes) -> BoolArray:
     if not len(some):
         return np.zeros(len(hashes), bool)
     at = np.minimum(np.searchsorted(some, hashes), len(some) - 1)

@@ -40,7 +40,7 @@ from slideviz.solver.interface_motion import InterfaceMotion, joined_steps, zone
 from slideviz.solver.prepare import NOT_STREAMED, Prepared, beginning_with, prepare
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
-from slideviz.solver.steps import Progress, RunResult, Step, step_timer
+from slideviz.solver.steps import Progress, Report, RunResult, Step, step_timer
 from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.quality import (
@@ -352,7 +352,7 @@ class RemainingTime:
     each `Progress`, its ``left`` filled in. ``stages``: names of `SECONDS`, in order.
     """
 
-    def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:
+    def __init__(self, report: Report, *stages: str) -> None:
         self._report = report
         self._ahead = [(stage, SECONDS[stage]) for stage in stages]
         """The stage that goes on and those after it, with their usual seconds."""
@@ -409,15 +409,12 @@ class RemainingTime:
         return this_stage + pace * sum(seconds for _, seconds in later)
 
 
-ReportProgress = Callable[[Progress], None]
-
-
 def stream(
     case: Case,
     output: Path,
     *,
     file_format: FileFormat | None = None,
-    report: ReportProgress = lambda _: None,
+    report: Report = lambda _: None,
     warn: Callable[[str], object] = lambda _: None,
     replaces: Path | None = None,
     listed: int = 100,
@@ -542,7 +539,7 @@ class _ZoneRuns:
             )
             self._measured.pop(zone, None)
 
-    def _deform(self, prepared: Prepared, report: ReportProgress) -> Iterator[Step]:
+    def _deform(self, prepared: Prepared, report: Report) -> Iterator[Step]:
         """Yield the steps of a zone, whose points are in the file then, mended if asked for.
 
         With STEPS= auto, trials write all points of the zone to rate them.

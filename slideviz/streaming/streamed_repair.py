@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.case.model import Case
 from slideviz.formats.su2b.read import ElementBlock
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, Skin, row_norms, sealed
+from slideviz.mesh.model import (
+    BoolArray,
+    Cells,
+    FloatArray,
+    IntArray,
+    Mesh,
+    Part,
+    Skin,
+    row_norms,
+    sealed,
+)
 from slideviz.mesh.quality import VALID, Quality
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.patches import with_images
@@ -30,7 +39,7 @@ from slideviz.system.threads import Tick
 
 BYTES = 3000  # of memory that repair takes for each cell of a region: measured on hexahedra
 
-Chosen = Callable[[ElementBlock, IntArray], NDArray[np.bool_]]
+Chosen = Callable[[ElementBlock, IntArray], BoolArray]
 """Takes cells (k,) of a file, and where the nodes of each begin; returns which of them count."""
 
 Layers = Callable[[IntArray, FloatArray], IntArray]
@@ -139,7 +148,7 @@ class FileRegions:
                 nodes = block.nodes[np.repeat(which, sizes)]
                 yield ElementBlock(0, block.types[which], nodes, block.ids[which])
 
-    def _nodes_of(self, chosen: Chosen) -> NDArray[np.bool_]:
+    def _nodes_of(self, chosen: Chosen) -> BoolArray:
         """Return a mask (n,) of the nodes of the chosen cells, and of their images."""
         mask = np.zeros(self._source.n_points, bool)
         for block in self._blocks(chosen):
@@ -147,7 +156,7 @@ class FileRegions:
         mask[self._skin] = with_images(self._freedom.place, mask[self._skin])
         return mask
 
-    def _freedom_of(self, nodes: IntArray, inside: NDArray[np.bool_], undeformed: Mesh) -> Freedom:
+    def _freedom_of(self, nodes: IntArray, inside: BoolArray, undeformed: Mesh) -> Freedom:
         """Return the freedom of the nodes (n,) of a region.
 
         ``inside`` (n,): those of which all cells are in the region.
@@ -162,7 +171,7 @@ class FileRegions:
         return self._freedom.of_part(shared).embedded(places, len(nodes)).without(bare)
 
 
-def _touching(near: NDArray[np.bool_]) -> Chosen:
+def _touching(near: BoolArray) -> Chosen:
     """Return what chooses the cells with a node in the mask ``near`` (n,)."""
     return lambda block, first: np.logical_or.reduceat(near[block.nodes], first)
 

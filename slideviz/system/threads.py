@@ -46,9 +46,7 @@ def cuts(begin: int, end: int, size: int) -> list[tuple[int, int]]:
     return [(first, min(first + size, end)) for first in range(begin, end, size)]
 
 
-def in_parts(
-    work: Callable[[slice], object], count: int, tick: Callable[[float], object] = lambda _: None
-) -> None:
+def in_parts(work: Callable[[slice], object], count: int, tick: Tick = lambda _: None) -> None:
     """Call ``work`` with slices that cut ``count`` rows into parts, on all cores.
 
     ``work``: each call writes to places of its own.
@@ -57,7 +55,7 @@ def in_parts(
     """
     parts = iter([slice(*ends) for ends in cuts(0, count, PART)])
 
-    def run_remaining(report: Callable[[float], object]) -> None:
+    def run_remaining(report: Tick) -> None:
         try:
             for part in parts:
                 report(part.start / count)

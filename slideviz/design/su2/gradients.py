@@ -34,7 +34,7 @@ from slideviz.mesh.model import (
 )
 from slideviz.mesh.topology import unit
 from slideviz.solver.deform import deform
-from slideviz.solver.steps import Progress
+from slideviz.solver.steps import Report
 from slideviz.system.file_checks import require_regular_file
 
 MAGIC = 535532  # the first number of SU2's binary restart files
@@ -439,7 +439,7 @@ class Gradients:
 
 
 def design_gradients(
-    config: Su2Config, mesh: Mesh, progress: Callable[[Progress], None] | None = None
+    config: Su2Config, mesh: Mesh, progress: Report | None = None
 ) -> tuple[MovingSurface, Gradients]:
     """Return the moving boundaries of a configuration, and the gradients (`find_gradients`).
 
@@ -465,9 +465,7 @@ def design_gradients(
     )
 
 
-def find_gradients(
-    surface: MovingSurface, progress: Callable[[Progress], None] | None = None
-) -> Gradients:
+def find_gradients(surface: MovingSurface, progress: Report | None = None) -> Gradients:
     """Return the gradients of the objective whose sensitivities the configuration names.
 
     Raises SlidevizError if the sensitivities are missing or of another mesh, or the deformation is
@@ -567,7 +565,7 @@ def _difference(found: FloatArray, written: FloatArray) -> list[str]:
 
 
 def _deformer(
-    surface: MovingSurface, displacement: FloatArray, progress: Callable[[Progress], None] | None
+    surface: MovingSurface, displacement: FloatArray, progress: Report | None
 ) -> Deformer:
     """Return a deformer made at ``displacement`` (m, d); if zero, also for `_directions`."""
     reference = displacement[None]

@@ -21,7 +21,7 @@ from slideviz.formats.su2b.read import BLOCK, BinaryForm
 from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.model import CellRows, Cells, IntArray, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.system.threads import cuts
 
@@ -188,7 +188,7 @@ def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
     """Return the content of a zone for a mesh; ``order`` has the cell at each place of the file."""
     cells = mesh.cells
 
-    def part(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+    def part(i: int, j: int) -> CellRows:
         if order is not None:
             some = cells.take(order[i:j])
             return some.types, some.connectivity, order[i:j]

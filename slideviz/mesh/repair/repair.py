@@ -8,7 +8,7 @@ is worse than before. In rounds the limit rises to the one that is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple, Protocol
@@ -36,7 +36,7 @@ from slideviz.mesh.repair.energy import Targets, targets
 from slideviz.mesh.repair.freedom import Freedom, places
 from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.mesh.skew import EXPONENTS
-from slideviz.system.threads import cores, equal_shares
+from slideviz.system.threads import Tick, cores, equal_shares
 from slideviz.terms import SkewMetric
 
 RINGS = 3, 5, 8, 13, 21  # rings of cells around bad ones; a patch that fails grows to the next
@@ -83,9 +83,6 @@ BELOW = 0.1  # cells of a lower quality are mended, too
 LIMITS = tuple(k / 20 for k in range(20))
 """Limits of the rounds that come before the last one: first cells are unfolded, then poor cells
 lifted in smaller patches, whose energy they determine more."""
-
-Report = Callable[[float], object]
-"""Called with the fraction that is done; what it raises ends the repair."""
 
 
 @record
@@ -149,7 +146,7 @@ class _Work:
     signs: Signs
     metric: SkewMetric
     below: float
-    report: Callable[[float], object]
+    report: Tick
     hopeless: BoolArray
     bad: BoolArray
     """`hopeless`, `bad` (m,): cells that cannot be mended, which no energy counts, and those that
@@ -167,7 +164,7 @@ def repair_mesh(
     layers: IntArray | tuple[()] = (),
     below: float = BELOW,
     metric: SkewMetric = "knupp",
-    report: Report = lambda _: None,
+    report: Tick = lambda _: None,
 ) -> Repaired:
     """Return the mesh's points with bad cells mended: those not proved valid, or too low.
 
@@ -224,7 +221,7 @@ def mend_cells(
     ratings: FloatArray,
     below: float,
     metric: SkewMetric,
-    report: Report,
+    report: Tick,
 ) -> tuple[IntArray, IntArray, tuple[Impossible, ...]]:
     """Mend the bad cells (k,) of a mesh, in rounds whose limit rises to ``below``.
 
@@ -281,7 +278,7 @@ class _Rounds:
         self.layered = False
         self.reached = True  # whether no cell that can be mended is below the limit of the round
 
-    def mend(self, limit: float, report: Report, layers_stay: bool = True) -> None:
+    def mend(self, limit: float, report: Tick, layers_stay: bool = True) -> None:
         """Mend the cells that are rated below a limit, in patches that grow."""
         bad = self.cells[self.ratings < limit]
         for stage, tick in enumerate(equal_shares(report, len(RINGS))):
@@ -428,9 +425,7 @@ class _Score(NamedTuple):
 class _Mending:
     """The work on one patch."""
 
-    def __init__(
-        self, work: _Work, cells: IntArray, free: BoolArray, tell: Callable[[float], object]
-    ) -> None:
+    def __init__(self, work: _Work, cells: IntArray, free: BoolArray, tell: Tick) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
         self.work = work
         self.tell = tell
