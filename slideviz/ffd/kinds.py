@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -19,23 +18,6 @@ from slideviz.mesh.model import FloatArray
 NEARLY = 1e-6
 """SU2's shift of the plane in which a twist finds its centre (``SegmentIntersectsPlane``)."""
 NORMAL = np.array([NEARLY, 1.0 + NEARLY, NEARLY])  # normal of that plane
-
-
-class Move(Protocol):
-    """A way to move the control points of a box, scaled by an amount."""
-
-    @property
-    def chosen(self) -> np.ndarray:
-        """Return which control points it moves, (I, J, K) bool."""
-
-    def change(self, points: FloatArray, amount: float, /) -> FloatArray:
-        """Return the change (I, J, K, 3) of points."""
-
-    def slope(self, points: FloatArray, amount: float, /) -> FloatArray:
-        """Return the derivative (I, J, K, 3) of the moved points with respect to the amount."""
-
-    def pushed(self, points: FloatArray, amount: float, rates: FloatArray, /) -> FloatArray:
-        """Return the derivative (I, J, K, 3) of the moved points along ``rates`` of the points."""
 
 
 @record
@@ -156,6 +138,9 @@ class Twist:
         return rates + turn.turned(rates - centre, amount)
 
 
+Move = Shift | Turn | Twist
+"""A way to move the control points of a box, scaled by an amount."""
+Moves = tuple[Move, ...]
 Planes = tuple[frozenset[int], frozenset[int], frozenset[int]]
 """Indices of held planes of control points in each direction i, j, k of a box."""
 NONE: Planes = (frozenset(), frozenset(), frozenset())
@@ -176,7 +161,11 @@ class Request:
         return self.kind in ("FFD_CONTROL_POINT", "FFD_CONTROL_POINT_2D") and not any(self.numbers)
 
 
-def moves_of(box: Box, request: Request, held: Planes = NONE) -> tuple[Move, ...]:
+MovesOf = Callable[[Box, Request, Planes], Moves]
+"""A function that returns the moves of a kind of variables."""
+
+
+def moves_of(box: Box, request: Request, held: Planes = NONE) -> Moves:
     """Return the move of a box for each value of a variable; () where held planes leave none."""
     return KINDS[request.kind](box, request, held)
 
@@ -236,7 +225,7 @@ def _shift(box: Box, chosen: list[tuple[int | slice, ...]], vector: FloatArray) 
     return Shift(unit)
 
 
-def _control_point(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+def _control_point(box: Box, request: Request, held: Planes) -> Moves:
     index = request.index
     lines = [axis for axis in range(3) if index[axis] == -1]
     if len(lines) == 3 or _is_held(index, held):
@@ -247,7 +236,7 @@ def _control_point(box: Box, request: Request, held: Planes) -> tuple[Move, ...]
     return _by(box, request, [points_at(index)], free)
 
 
-def _control_point_2d(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+def _control_point_2d(box: Box, request: Request, held: Planes) -> Moves:
     axes = _directions(box, request.kind)
     layers = 3 - sum(axes)  # the direction of the layers that move together
     index = [0, 0, 0]
@@ -263,7 +252,7 @@ def _control_point_2d(box: Box, request: Request, held: Planes) -> tuple[Move, .
 
 def _by(
     box: Box, request: Request, chosen: list[tuple[int | slice, ...]], free: np.ndarray
-) -> tuple[Move, ...]:
+) -> Moves:
     """Return the shift along the variable's direction, or one along each axis without one."""
     axes = _directions(box, request.kind)
     if request.direct:
@@ -274,10 +263,10 @@ def _by(
     return tuple(Shift(_shift(box, chosen, each).unit * free[..., None]) for each in vectors)
 
 
-def _pair(sign: float, flat: bool) -> Callable[[Box, Request, Planes], tuple[Move, ...]]:
+def _pair(sign: float, flat: bool) -> MovesOf:
     """Return the kind that moves the first two layers, the first one by ``sign`` times as much."""
 
-    def moved(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    def moved(box: Box, request: Request, held: Planes) -> Moves:
         i = request.index[0]
         vector = np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, 1.0])
         unit = np.zeros(box.points.shape)
@@ -291,14 +280,14 @@ def _pair(sign: float, flat: bool) -> Callable[[Box, Request, Planes], tuple[Mov
     return moved
 
 
-def _gull(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+def _gull(box: Box, request: Request, held: Planes) -> Moves:
     (j,) = request.index
     if j in held[1]:
         return ()
     return (_shift(box, [(slice(None), j, slice(None))], np.array([0.0, 0.0, 1.0])),)
 
 
-def _nacelle(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+def _nacelle(box: Box, request: Request, held: Planes) -> Moves:
     index = request.index
     last = box.degrees
     if index == (-1, -1, -1):
@@ -317,7 +306,7 @@ def _nacelle(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
     return (_shift(box, chosen, vector),) if chosen else ()
 
 
-def _twist(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+def _twist(box: Box, request: Request, held: Planes) -> Moves:
     (j,) = request.index
     if j in held[1]:
         return ()
@@ -329,11 +318,11 @@ def _twist(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
     return (Twist(chosen, first, second, j, request.length),)
 
 
-def _rotation(box: Box, request: Request, _held: Planes) -> tuple[Move, ...]:
+def _rotation(box: Box, request: Request, _held: Planes) -> Moves:
     return (_about(request, np.ones(box.points.shape[:3], bool), np.pi / 180.0),)
 
 
-def _control_surface(box: Box, request: Request, _held: Planes) -> tuple[Move, ...]:
+def _control_surface(box: Box, request: Request, _held: Planes) -> Moves:
     chosen = np.zeros(box.points.shape[:3], bool)
     chosen[:-2, 2:-2] = True
     return (_about(request, chosen, -np.pi / 180.0),)
@@ -344,7 +333,7 @@ def _about(request: Request, chosen: np.ndarray, rate: float) -> Turn:
     return Turn(chosen, first, second - first, rate)
 
 
-KINDS: dict[str, Callable[[Box, Request, Planes], tuple[Move, ...]]] = {
+KINDS: dict[str, MovesOf] = {
     "FFD_CONTROL_POINT": _control_point,
     "FFD_CONTROL_POINT_2D": _control_point_2d,
     "FFD_CAMBER": _pair(1.0, flat=False),

@@ -69,11 +69,22 @@ from slideviz.errors import (
 )
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
-from slideviz.ffd.kinds import DIRECTIONS, NONE, Move, Planes, Request, moves_of, variable_problem
+from slideviz.ffd.kinds import (
+    DIRECTIONS,
+    NONE,
+    Move,
+    Moves,
+    Planes,
+    Request,
+    Turn,
+    moves_of,
+    variable_problem,
+)
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.quality import quality
+from slideviz.mesh.surfaces import padded
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step
@@ -259,11 +270,11 @@ def _scaling(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatAr
 
 
 def _rotated(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
-    return _turned(variable, on.points, np.radians(amount), derivative=False)
+    return _turn(variable, on).change(padded(on.points), amount)[:, : on.mesh.dim]
 
 
 def _rotating(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
-    return np.radians(1.0) * _turned(variable, on.points, np.radians(amount), derivative=True)
+    return _turn(variable, on).slope(padded(on.points), amount)[:, : on.mesh.dim]
 
 
 def _hicks_henne(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
@@ -412,35 +423,21 @@ def _shown(point: FloatArray) -> str:
     return f"({', '.join(f'{value:.6g}' for value in point)})"
 
 
-def _turned(
-    variable: DesignVariable, points: FloatArray, angle: float, derivative: bool
-) -> FloatArray:
-    """Return the displacement of points (m, d) by a rotation about a line, ``angle`` in radians.
+def _turn(variable: DesignVariable, on: MovedNodes) -> Turn:
+    """Return the rotation about the line through two points, the variable's numbers; in degrees.
 
-    Or, with ``derivative``, its derivative with respect to the angle. The line goes through the
-    two points that are the variable's numbers, in 2D along z. Rodrigues:
-    ``sin(a) k x v + (1 - cos(a)) k x (k x v)``. Raises CaseError where the points define no line.
+    In 2D the line is along z. Raises CaseError where the points define no line.
     """
-    dim = points.shape[1]
     first, second = np.array(variable.numbers).reshape(2, 3)
-    axis = second - first if dim == 3 else np.array([0.0, 0.0, 1.0])
-    if dim == 2 and (first != second)[:2].any():
+    axis = second - first if on.mesh.dim == 3 else np.array([0.0, 0.0, 1.0])
+    if on.mesh.dim == 2 and (first != second)[:2].any():
         raise CaseError(
             f"the line from {_shown(first)} to {_shown(second)} leaves the normal of a "
             "mesh of 2 dimensions; give both points the same x and y"
         )
-    length = np.linalg.norm(axis)
-    if length == 0.0:
+    if np.linalg.norm(axis) == 0.0:
         raise CaseError("its two points coincide, so the line between them has no direction")
-    arm = np.zeros((len(points), 3))
-    arm[:, :dim] = points - first[:dim]
-    across = np.cross(axis / length, arm)
-    twice = np.cross(axis / length, across)
-    if derivative:
-        out = np.cos(angle) * across + np.sin(angle) * twice
-    else:
-        out = np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * twice
-    return np.asarray(out[:, :dim])
+    return Turn(np.ones(len(on.points), bool), first, axis, np.radians(1.0))
 
 
 def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Planes:
@@ -644,7 +641,7 @@ class MovedBoxes(Displacer):
             (place, part) for place, variable in variables for part in range(len(variable.values))
         ]
 
-    def _moves(self, place: int) -> tuple[Move, ...]:
+    def _moves(self, place: int) -> Moves:
         variable = self.config.variables[place]
         box = next(box for box in self.boxes if box.name == variable.box)
         return moves_of(box, request_of(self.config, variable), self.held[box.name])
