@@ -33,7 +33,7 @@ from slideviz.rbf.projection import as_simplices
 from slideviz.sections.cut import transformed
 from slideviz.sections.span import SpanChannel, find_walls
 
-PLACES = frozen_array(np.linspace(0.02, 0.98, 25).round(2), np.float64)
+PLACES = frozen_array(np.linspace(0.02, 0.98, 25).round(2))
 """Spans, and parts of the chord, at which distances are measured; 0.1, 0.5, 0.9 among them."""
 RIM = 0.1  # the nodes of a blade within this span of its end are its tip
 TOUCHING = "they touch (distance 0)"

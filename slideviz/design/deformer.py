@@ -476,7 +476,7 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
         mesh,
         setup,
         asked.nodes,
-        frozen_array(mesh.points[nodes], np.float64),
+        frozen_array(mesh.points[nodes]),
         rows,
         turn,
         known,

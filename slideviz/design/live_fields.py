@@ -118,7 +118,7 @@ class LiveFields:
         points = self.mesh.points + shift.reshape(self.mesh.points.shape)
         for nodes, setup, facets in self.walls:
             project(points, nodes, setup, facets)
-        return frozen_array(points, np.float64)
+        return frozen_array(points)
 
 
 def simplified(case: Case) -> Case:

@@ -98,7 +98,7 @@ def find_fans(
     fan_marker = np.empty(total, np.int64)
     fan_node[fan] = node
     fan_marker[fan] = boundary.marker[facet]
-    return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
+    return Fans(*map(frozen_array, (facet, node, fan, fan_node, fan_marker)))
 
 
 def fan_normals(

@@ -110,13 +110,13 @@ def make_halo(
         mismatch[some] = row_norms(mesh.points[receivers[some]] - image)
     donors, rotations = _rooted(len(mesh.points), receivers, donors, rotations, mismatch)
     return Halo(
-        frozen_array(receivers, np.int64),
-        frozen_array(donors, np.int64),
-        frozen_array(rotations, np.float64),
-        frozen_array(outer, np.int64),
-        frozen_array(_touching(mesh.cells, beyond), bool),
+        frozen_array(receivers),
+        frozen_array(donors),
+        frozen_array(rotations),
+        frozen_array(outer),
+        frozen_array(_touching(mesh.cells, beyond)),
         sides,
-        frozen_array(mismatch, np.float64),
+        frozen_array(mismatch),
     )
 
 

@@ -63,8 +63,8 @@ def find_interfaces(
             shared = np.zeros(len(mesh.points), bool)
             shared[nodes] = there
             if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
-                here = frozen_array(nodes[there], np.int64)
-                other = frozen_array(partner[there], np.int64)
+                here = frozen_array(nodes[there])
+                other = frozen_array(partner[there])
                 found.append(ZoneInterface(marker.name, zone, name, here, other))
     return tuple(found)
 

@@ -63,8 +63,11 @@ def row_dots(one: FloatArray, other: FloatArray) -> FloatArray:
     return np.einsum("md,md->m", one, other)
 
 
-def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
-    """Return ``values`` as a C-contiguous, read-only array; copies what is writable."""
+def frozen_array(values: ArrayLike, dtype: type | None = None) -> NDArray:
+    """Return ``values`` as a C-contiguous, read-only array; copies what is writable.
+
+    ``dtype``: None keeps that of an array.
+    """
     array: NDArray = np.ascontiguousarray(values, dtype=dtype)
     if array.flags.writeable:
         array = array.copy() if array is values else array

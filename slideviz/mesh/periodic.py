@@ -195,11 +195,11 @@ def _match_kind(
         first=first,
         second=second,
         kind=kind,
-        vector=frozen_array(vector, np.float64),
+        vector=frozen_array(vector),
         angle=angle,
         axis=tuple(float(v) for v in axis),  # type: ignore[arg-type]
         origin=tuple(float(v) for v in origin),  # type: ignore[arg-type]
-        nodes=frozen_array(np.stack([a, b[partner]], axis=1), np.int64),
+        nodes=frozen_array(np.stack([a, b[partner]], axis=1)),
         mismatch=float(distance.max()),
     )
     return pair, float(distance.max()) if one_to_one and not trivial else np.inf
@@ -299,7 +299,7 @@ def _paired(
 def _in_whole(mesh: Mesh, part: ZonePart, pair: Pair) -> Pair:
     """Return a pair of a zone with the names and nodes that its boundaries have in the mesh."""
     name = names_from(mesh, part)
-    nodes = frozen_array(pair.nodes + part.points.start, np.int64)
+    nodes = frozen_array(pair.nodes + part.points.start)
     return replace(pair, first=name[pair.first], second=name[pair.second], nodes=nodes)
 
 

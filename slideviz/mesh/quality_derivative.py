@@ -111,8 +111,8 @@ def derivative_of(
         p=float(p),
         minimum=minimum,
         mean=found.mean,
-        of_minimum=frozen_array(gradients[0], np.float64),
-        of_mean=frozen_array(gradients[1], np.float64),
+        of_minimum=frozen_array(gradients[0]),
+        of_mean=frozen_array(gradients[1]),
     )
 
 

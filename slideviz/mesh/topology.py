@@ -55,7 +55,7 @@ class Boundary:
     @cached_property
     def nodes(self) -> IntArray:
         """Return the boundary nodes, sorted: (b,)."""
-        return frozen_array(sorted_nodes(self.facets), np.int64)
+        return frozen_array(sorted_nodes(self.facets))
 
     def around(self, markers: Collection[str]) -> Boundary:
         """Return the facets of markers, and those of others that share a node with them."""
@@ -65,11 +65,11 @@ class Boundary:
         joints = kept[self.joints].all(axis=1)
         return replace(
             self,
-            facets=frozen_array(self.facets[kept], np.int64),
-            marker=frozen_array(self.marker[kept], np.int64),
-            owner=frozen_array(self.owner[kept], np.int64),
-            joints=frozen_array((np.cumsum(kept) - 1)[self.joints[joints]], np.int64),
-            joint_nodes=frozen_array(self.joint_nodes[joints], np.int64),
+            facets=frozen_array(self.facets[kept]),
+            marker=frozen_array(self.marker[kept]),
+            owner=frozen_array(self.owner[kept]),
+            joints=frozen_array((np.cumsum(kept) - 1)[self.joints[joints]]),
+            joint_nodes=frozen_array(self.joint_nodes[joints]),
         )
 
 
@@ -92,12 +92,12 @@ def find_boundary(mesh: Mesh) -> Boundary:
     facets = _turn_outward(mesh, facets, owner)
     joints, joint_nodes = find_joints(facets, mesh.dim)
     return Boundary(
-        frozen_array(facets, np.int64),
-        frozen_array(marker_of, np.int64),
+        frozen_array(facets),
+        frozen_array(marker_of),
         mesh.marker_names,
-        frozen_array(owner if ids is None else ids[owner], np.int64),
-        frozen_array(joints, np.int64),
-        frozen_array(_by_position(mesh.points, joint_nodes), np.int64),
+        frozen_array(owner if ids is None else ids[owner]),
+        frozen_array(joints),
+        frozen_array(_by_position(mesh.points, joint_nodes)),
     )
 
 

@@ -112,10 +112,10 @@ def in_layers(
     return Profile(
         label,
         coordinate,
-        frozen_array(np.linspace(low, high, layers + 1), np.float64),
-        frozen_array(np.where(empty, np.nan, minimum), np.float64),
-        frozen_array(np.where(empty, np.nan, total / np.maximum(count, 1)), np.float64),
-        frozen_array(count, np.int64),
+        frozen_array(np.linspace(low, high, layers + 1)),
+        frozen_array(np.where(empty, np.nan, minimum)),
+        frozen_array(np.where(empty, np.nan, total / np.maximum(count, 1))),
+        frozen_array(count),
     )
 
 

@@ -118,9 +118,9 @@ def _without_rims(fans: Fans, boundary: Boundary, classes: Classes) -> Fans:
     keep = away | ~others[fans.fan]
     return replace(
         fans,
-        facet=frozen_array(fans.facet[keep], np.int64),
-        node=frozen_array(fans.node[keep], np.int64),
-        fan=frozen_array(fans.fan[keep], np.int64),
+        facet=frozen_array(fans.facet[keep]),
+        node=frozen_array(fans.node[keep]),
+        fan=frozen_array(fans.fan[keep]),
     )
 
 

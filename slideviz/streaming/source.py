@@ -69,8 +69,8 @@ class CellBlock:
         """Return the block with the name and the zone of the mesh that it is a part of."""
         part = replace(
             whole.numbering,
-            points=frozen_array(self.nodes, np.int64),
-            cells=frozen_array(self.ids, np.int64),
+            points=frozen_array(self.nodes),
+            cells=frozen_array(self.ids),
         )
         mesh = Skin(
             self.mesh.points,
