@@ -319,10 +319,9 @@ class ZoneDesign:
 
 def zone_rows(rows: IntArray, design: Array) -> Array:
     """Return rows (..., m_z, d) of a design (..., m, d), as `ZoneDesign.rows` has them."""
-    shape = value(design).shape
-    out = np.zeros((*shape[:-2], len(rows), shape[-1]))
     moved = np.flatnonzero(rows >= 0)
-    return put(out, moved, take(design, rows[moved]), overwrite=True)
+    nothing = np.zeros((len(rows), value(design).shape[-1]))
+    return put(nothing, moved, take(design, rows[moved]))
 
 
 def zone_designs(

@@ -93,28 +93,32 @@ class MeasuredSystem:
         Errors are parts of the largest of ``data`` (..., n, m), if not of the right-hand sides;
         ``of_weights``: as of ``System.refined``.
         """
-        n, m = right.shape[-2:]
-        wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
+        m = right.shape[-1]
         largest = np.abs(right if data is None else data).max(axis=(-1, -2), initial=0.0)
         largest = np.repeat(largest.ravel(), m)
-        out = np.empty_like(wide)
         error_estimate = np.zeros(len(largest))
-        for block, system in zip(self._blocks, self._systems, strict=True):
-            with enough_threads(2.0 * len(block) * wide[block].size):
-                solved = system.factor.solve(wide[block])
-                if self._refined:
-                    refined = system.refined(wide[block], largest, solved, of_weights=of_weights)
-                    solved = refined.weights
-                    field_error = refined.error_estimate
-                else:
-                    parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
-                    off = [system.field_error(wide[block, at], solved[:, at]) for at in parts]
-                    field_error = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
-            out[block] = solved
-            error_estimate = np.maximum(error_estimate, field_error)
+
+        def solve(wide: FloatArray) -> FloatArray:
+            out = np.empty_like(wide)
+            for block, system in zip(self._blocks, self._systems, strict=True):
+                data = wide[block]
+                with enough_threads(2.0 * len(block) * data.size):
+                    solved = system.factor.solve(data)
+                    if self._refined:
+                        refined = system.refined(data, largest, solved, of_weights=of_weights)
+                        solved = refined.weights
+                        field_error = refined.error_estimate
+                    else:
+                        parts = [slice(first, first + m) for first in range(0, len(largest), m)]
+                        off = [system.field_error(data[:, at], solved[:, at]) for at in parts]
+                        field_error = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
+                out[block] = solved
+                np.maximum(error_estimate, field_error, out=error_estimate)
+            return out
+
+        solutions = tape.over_columns(solve, right)
         self.error_estimate = error_estimate.reshape(*right.shape[:-2], m).max(axis=-1)
-        shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
-        return np.ascontiguousarray(shaped).reshape(right.shape)
+        return solutions
 
     def tangent(self, right: FloatArray, data: FloatArray | None = None) -> FloatArray:
         """Return the solutions (..., n, m) of the forward pass: changes of weights.
@@ -230,9 +234,7 @@ class LeastSquares:
         constant = partial(self._along, factor=np.ones(len(self.values)))
 
         def outside(t: FloatArray) -> FloatArray:
-            inside = np.zeros_like(t)
-            inside[..., self.rows, :] = t[..., self.rows, :]
-            return inside - constant(t)
+            return tape.placed(t[..., self.rows, :], self.rows, t.shape[-2]) - constant(t)
 
         def twice(t: FloatArray) -> FloatArray:
             return self(self(t))
@@ -249,10 +251,9 @@ class LeastSquares:
 
     def _along(self, right: FloatArray, factor: FloatArray) -> FloatArray:
         """Return ``right`` (..., n, m) with its parts along eigenvectors times ``factor`` (k,)."""
-        out = np.zeros_like(right)
         inside = self.vectors.T @ right[..., self.rows, :]
-        out[..., self.rows, :] = self.vectors @ (factor[:, None] * inside)
-        return out
+        inside = self.vectors @ (factor[:, None] * inside)
+        return tape.placed(inside, self.rows, right.shape[-2])
 
 
 def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> FloatArray:
@@ -278,11 +279,8 @@ def full_factor(system: FloatArray) -> Factor:
 
 def columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
     """Return solutions for right-hand sides (..., n, m), by one call of ``solve`` for all."""
-    n, m = right.shape[-2:]
-    wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
-    with enough_threads(2.0 * n * wide.size):
-        solved = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
-    return np.ascontiguousarray(np.moveaxis(solved, 1, 0)).reshape(right.shape)
+    with enough_threads(2.0 * right.shape[-2] * right.size):
+        return tape.over_columns(solve, right)
 
 
 Keep = Callable[[str, Callable[[], Any]], Any]
@@ -355,9 +353,7 @@ class FrozenFit(Fit):
         count = len(rows.nodes)
         m = value(rows.right).shape[-1]
         solve, extra = self._solver(rows, index, level, stage)
-        right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
-        right[..., :count, :] = value(rows.right)
-        weights: Array = solve(right)
+        weights: Array = solve(tape.placed(value(rows.right), slice(count), count + extra))
         forward = solve
         back = None
         if isinstance(solve, MeasuredSystem | WithPolynomial):
@@ -512,9 +508,8 @@ class FrozenFit(Fit):
             return factor, total
 
         def solve(right: FloatArray) -> FloatArray:
-            out = np.zeros_like(right)
-            out[..., used, :] = columnwise(lambda b: lu_solve(factor, b), right[..., used, :])
-            return out
+            inside = columnwise(lambda b: lu_solve(factor, b), right[..., used, :])
+            return tape.placed(inside, used, right.shape[-2])
 
         return solve, total
 

@@ -20,6 +20,7 @@ from slideviz.rbf.tape import (
     join,
     length,
     multiply,
+    placed,
     put,
     reshape,
     take,
@@ -177,9 +178,9 @@ def merge(problem: Problem, nodes: IntArray, values: Array) -> tuple[IntArray, A
         problem.same_as[nodes], return_inverse=True, return_counts=True
     )
     given = value(values)
-    data = np.zeros((*given.shape[:-2], len(controls), given.shape[-1]))
-    data[..., group, :] = given
-    gap = np.abs(data[..., group, :] - given).max(axis=-1, initial=0.0)
+    gap = np.abs(placed(given, group, len(controls))[..., group, :] - given).max(
+        axis=-1, initial=0.0
+    )
     if gap.max(initial=0.0) > AGREE * problem.basis.radius:
         worst = np.unravel_index(int(np.argmax(gap)), gap.shape)
         disagree(problem, nodes, int(worst[-1]), float(gap[worst]))

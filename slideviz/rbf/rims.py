@@ -33,6 +33,7 @@ from slideviz.rbf.tape import (
     Variable,
     linear,
     over_columns,
+    placed,
     summed,
     sums,
     take,
@@ -170,8 +171,7 @@ class Bodies:
 
     def spread(self, of_rim: FloatArray) -> FloatArray:
         """Return the correction (..., b, d) of all places, of that of the rim (..., r, d)."""
-        out = np.zeros((*of_rim.shape[:-2], len(self.share), of_rim.shape[-1]))
-        out[..., self.rim, :] = of_rim
+        out = placed(of_rim, self.rim, len(self.share))
         if len(self.inner) and of_rim.any():
             solve, columns = self._harmonic
             inner = over_columns(lambda x: solve(-(columns @ x)), of_rim)
@@ -262,9 +262,7 @@ class Rims:
         size = len(bodies.share)
 
         def spread(x: FloatArray) -> FloatArray:
-            out = np.zeros((*x.shape[:-2], count, x.shape[-1]))
-            out[..., there, :] = bodies.spread(x)[..., place, :]
-            return out
+            return placed(bodies.spread(x)[..., place, :], there, count)
 
         def gathered(g: FloatArray) -> FloatArray:
             return bodies.gathered(sums(g[..., there, :], place, size))

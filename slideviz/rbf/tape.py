@@ -278,6 +278,13 @@ def transpose(x: Array) -> Array:
     return linear(x, turned, turned)
 
 
+def placed(values: FloatArray, rows: IntArray | slice, count: int) -> FloatArray:
+    """Return an array (..., count, c) with ``values`` (..., m, c) in some rows (m,), else zero."""
+    out = np.zeros((*values.shape[:-2], count, values.shape[-1]))
+    out[..., rows, :] = values
+    return out
+
+
 def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
     """Return the sums (..., count, c) of ``values`` (..., m, c) with equal ``rows`` (m,)."""
     out = np.zeros((*values.shape[:-2], count, values.shape[-1]))
@@ -332,18 +339,13 @@ def put(x: Array, rows: IntArray, new: Array, *, overwrite: bool = False) -> Arr
     fits = overwrite and v.shape[:-2] == ahead
     out = v if fits else np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))
     out[..., rows, :] = w
-    shape = v.shape[-2:]
 
     def without(t: FloatArray) -> FloatArray:
         kept = t.copy()
         kept[..., rows, :] = 0.0
         return kept
 
-    def alone(t: FloatArray) -> FloatArray:
-        placed = np.zeros((*t.shape[:-2], *shape))
-        placed[..., rows, :] = t
-        return placed
-
+    alone = partial(placed, rows=rows, count=v.shape[-2])
     return recorded(out, (x, without, without), (new, alone, lambda g: g[..., rows, :]))
 
 
@@ -356,11 +358,7 @@ def join(*parts: Array) -> Array:
     links: list[Link] = []
     for part, v, stop in zip(parts, values, stops.tolist(), strict=True):
         here = slice(stop - v.shape[-2], stop)
-
-        def alone(t: FloatArray, here: slice = here) -> FloatArray:
-            out = np.zeros((*t.shape[:-2], total, t.shape[-1]))
-            out[..., here, :] = t
-            return out
+        alone = partial(placed, rows=here, count=total)
 
         def cut(g: FloatArray, here: slice = here) -> FloatArray:
             return g[..., here, :]
