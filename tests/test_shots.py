@@ -1,6 +1,7 @@
 """The pictures of ``make shots``: each state, as the screen shows it."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,13 +90,21 @@ def test_dark_is_dark(window, tmp_path):
         assert np.asarray(image.convert("L")).mean() < 90
 
 
+def film_of_nothing(_window, path, _place):
+    path.touch()
+    return path
+
+
 @pytest.mark.slow
 def test_all_pictures_of_a_folder_and_the_film_moves(tmp_path, qapp, monkeypatch):
     start = shots.ShotState("start", lambda window, place: None)
     monkeypatch.setattr(shots, "STATES", (start,))
     monkeypatch.setattr(shots, "machine_pictures", lambda folder, place: [])
-    paths = shots.shots(tmp_path / "new" / "folder")
-    assert [path.name for path in paths] == ["start.png", "passage.gif", "in_time.gif"]
+    monkeypatch.setattr(shots, "film_of_window", film_of_nothing)
+    start, window, *paths = shots.shots(tmp_path / "new" / "folder")
+    assert (start.name, window.name) == ("start.png", "window.gif")
+    assert [path.name for path in paths] == ["passage.gif", "in_time.gif"]
+    paths = [start, *paths]
     assert all(path.stat().st_size > 1_000 for path in paths)
     with Image.open(paths[1]) as film:
         first = np.asarray(film.convert("L")).astype(int)
@@ -122,6 +131,38 @@ def test_a_palette_keeps_a_few_red_pixels_and_a_smooth_background(tmp_path):
     assert np.abs(kept[11, 11] - (232, 17, 45)).max() < 30
     assert np.abs(kept[200:] - drawn[200:]).max() <= 4
     assert (kept[250:] == 255).all()
+
+
+@pytest.mark.slow
+def test_the_film_shows_a_blade_dragged_with_its_preview(window, tmp_path, monkeypatch):
+    monkeypatch.setattr(shots, "TURNS", 4)
+    monkeypatch.setattr(shots, "LIFTS", 3)
+    path = shots.film_of_window(window, tmp_path / "film.gif", tmp_path)
+    session = window.store.session
+    turned, lifted = session.case.motions
+    assert turned.angle_deg == pytest.approx(shots.TURN, abs=0.3)
+    assert lifted.vector == pytest.approx((0.0, shots.LIFT), abs=0.01)
+    assert not session.outdated, "the run has taken the place of the preview"
+    with Image.open(path) as film:
+        assert film.size == shots.WINDOW_FILM
+        assert film.n_frames >= 7, "what is dragged moves in each picture"
+        pictures = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            pictures.append(np.asarray(film.convert("RGB"))[60:560, 280:700].astype(int))
+    for after in pictures[2:]:
+        assert (np.abs(after - pictures[0]).max(axis=2) > 40).sum() > 500
+
+
+def test_the_film_in_the_repository_takes_ten_seconds_and_three_megabytes():
+    path = Path(shots.__file__).parents[1] / "screenshots" / "window.gif"
+    assert path.stat().st_size < 3e6
+    with Image.open(path) as film:
+        times = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            times.append(film.info["duration"])
+    assert 9_000 < sum(times) < 11_000
 
 
 def test_a_folder_that_cannot_be_made(tmp_path):

@@ -361,7 +361,15 @@ def dark(window: MainWindow, place: Path) -> None:
 
 WINDOW_FILM = (960, 600)
 """Width and height of the film of the window in pixels."""
-WINDOW_STEPS = 21
+
+TURN, LIFT = -14.0, 0.2
+"""How the mouse moves the airfoil in the film: turned by degrees, then up by a length."""
+
+TURNS, LIFTS = 26, 14
+"""Number of images of each."""
+
+POINTER = ((0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12))
+"""Corners of the mouse pointer, which the screen does not have, in pixels from its tip."""
 
 STATES = (
     ShotState("roles", roles),
@@ -383,26 +391,96 @@ STATES = (
 
 
 def film_of_window(window: MainWindow, path: Path, place: Path) -> Path:
-    """Write a film of ten seconds of the window, in which a blade turns, and return its path."""
+    """Write a film of ten seconds in which the mouse drags a blade, with the live preview."""
+    import numpy as np
     from PIL import Image
+    from qtpy.QtCore import QPoint, Qt
+    from qtpy.QtTest import QTest
+
+    from slideviz.scene.pick import Projection
 
     write_sample("passage", place / "film", 60)
-    case = Case.read(place / "film" / "passage.cfg")
-    case.change(motions=FAR, steps=WINDOW_STEPS).write(place / "film" / "passage.cfg")
     _open(window, place / "film" / "passage.cfg")
-    _run(window)
-    window.store.change(changes.set_view, passages=1)
-    frames = []
-    for step in range(WINDOW_STEPS + 1):
-        window.store.change(changes.show_frame, step)
-        with Image.open(photograph(window, place / "frame.png")) as image:
-            frames.append(image.convert("RGB").resize(WINDOW_FILM, Image.Resampling.LANCZOS))
+    store = window.store
+    store.change(changes.set_case, motions=(Rotate("airfoil", 0.0), Translate("airfoil", (0, 0))))
+    store.change(changes.set_view, passages=1, color_by="size-skew")
+    store.change(changes.choose_motion, 0)
+    window.live.switch(True)
+    wait(lambda: window.live.fields is not None)
+    view = window.view
+    mouse = window.viewing.handles[view]
+    frames: list[Any] = []
+
+    def spot(pixel: Any) -> QPoint:
+        x, y = np.asarray(pixel) / view.devicePixelRatioF()
+        return QPoint(round(x), round(view.height() - 1 - y))
+
+    def take(pixel: Any) -> None:
+        """Move the mouse to a pixel of the view, and film what comes of it."""
+        QTest.mouseMove(view, spot(pixel))
+        frames.append(_with_pointer(_seen(window, place), view.mapTo(window, spot(pixel))))
+
+    def drag(grip: Any, pixels: Callable[[Any, Any], Any]) -> None:
+        """Drag a part of the handle along ``pixels(start, middle)``, an array (k, 2)."""
+        _seen(window, place)
+        line = next(part.line for part in mouse.parts if part.grip == grip)
+        start = line[0] if len(line) > 2 else line.mean(axis=0)
+        middle = Projection.of(view).pixels(mouse.placed().origin[None])[0]
+        take(start)
+        QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=spot(start))
+        for pixel in pixels(start, middle):
+            take(pixel)
+        QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=spot(pixel))
+
+    def around(start: Any, middle: Any) -> Any:
+        turns = np.exp(1j * np.radians(np.linspace(0.0, TURN, TURNS)))
+        spokes = ((start - middle) @ [1.0, 1.0j]) * turns
+        return middle + np.column_stack([spokes.real, spokes.imag])
+
+    def up(start: Any, _middle: Any) -> Any:
+        ends = Projection.of(view).pixels(np.array([[0.0, 0.0, 0.0], [0.0, LIFT, 0.0]]))
+        return start + np.linspace(0.0, 1.0, LIFTS)[:, None] * (ends[1] - ends[0])
+
+    drag(("turn", (2,)), around)
+    wait(lambda: not window.runner.busy and bool(store.session.runs))
+    drag(("move", (1,)), up)
+    wait(lambda: store.session.preview is None and not store.session.outdated)
+    settle(window)
+    frames.append(_seen(window, place))
     # One palette for all pictures: what does not move keeps its bits, and the file stays small.
-    palette = frames[-1].quantize(128, Image.Quantize.MEDIANCUT)
+    palette = frames[-1].quantize(255, Image.Quantize.MAXCOVERAGE, kmeans=1)
     first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
-    times = [800, *[300] * (WINDOW_STEPS - 1), 3200]
+    times = [600, *[190] * (len(others) - 1), 2600]
     first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=True)
     return path
+
+
+def _seen(window: MainWindow, place: Path) -> Any:
+    """Return what the screen shows of a window, once the preview of its case is drawn."""
+    from PIL import Image
+
+    live = window.live
+    session = window.store.session
+    wait(lambda: not live._runner.busy and not window.runner.busy)
+    if session.preview is not None and session.preview.case is not session.case:
+        live.begin()
+        wait(lambda: window.store.session.preview.case is window.store.session.case)
+    wait(lambda: not any(plot.busy for plot in window.findChildren(PlotCanvas)))
+    window.viewing.render()
+    end = time.monotonic() + 0.15
+    wait(lambda: time.monotonic() > end)
+    with Image.open(_grabbed(window, place / "frame.png")) as image:
+        return image.convert("RGB").resize(WINDOW_FILM, Image.Resampling.LANCZOS)
+
+
+def _with_pointer(image: Any, tip: Any) -> Any:
+    """Return a picture of the window with the mouse pointer at a place in the window."""
+    from PIL import ImageDraw
+
+    part = WINDOW_FILM[0] / SIZE[0]
+    corners = [(part * tip.x() + x, part * tip.y() + y) for x, y in POINTER]
+    ImageDraw.Draw(image).polygon(corners, fill="black", outline="white")
+    return image
 
 
 def film_of_passage(path: Path) -> Path:
@@ -557,11 +635,16 @@ def photograph(window: MainWindow, path: Path) -> Path:
     window.view.snapshot()
     window.viewing.render()
     settle(window)
+    shrink(_grabbed(window, path))
+    return path
+
+
+def _grabbed(window: MainWindow, path: Path) -> Path:
+    """Write what the screen has where the window is, and return the path."""
     frame = window.geometry()
     shown = window.screen().grabWindow(0, frame.x(), frame.y(), frame.width(), frame.height())
     if not shown.save(str(path)):
         raise SlidevizError(f"{path}: the picture cannot be written; choose another folder")
-    shrink(path)
     return path
 
 
