@@ -245,9 +245,9 @@ def write_wheel(
     cases: Sequence[Case],
     mesh: Mesh,
     points: Sequence[FloatArray],
-    passages: Count | Sequence[Count] = "all",
-    numbered: bool = False,
-    progress: Report | None = None,
+    passages: Count | Sequence[Count],
+    numbered: bool,
+    progress: Report | None,
 ) -> WheelQuality:
     """Write the wheel of deformed passages; parameters and errors as `wheel`.
 

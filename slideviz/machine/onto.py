@@ -98,9 +98,7 @@ def find_edges(points: FloatArray, facets: IntArray) -> tuple[IntArray, IntArray
     return sharp, nodes[count == 1, None]
 
 
-def lay_onto(
-    points: FloatArray, facets: IntArray, target: Target, walls: Sequence[Wall] = ()
-) -> Laid:
+def lay_onto(points: FloatArray, facets: IntArray, target: Target, walls: Sequence[Wall]) -> Laid:
     """Return a boundary laid onto a target surface.
 
     Parameters

@@ -41,9 +41,7 @@ class Fans:
     fan_marker: IntArray  # `fan_node`, `fan_marker` (m,): the node and the marker of each fan
 
 
-def smooth_joints(
-    boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
-) -> BoolArray:
+def smooth_joints(boundary: Boundary, points: FloatArray, feature_angle_deg: float) -> BoolArray:
     """Return a mask (j,) of the joints of facets of one marker at less than the feature angle.
 
     ``points`` (n, d) are the Cartesian coordinates of the undeformed mesh.

@@ -78,7 +78,7 @@ def derivative_of(
     found: Quality,
     sums: FloatArray | None,
     p: float,
-    going_on: Callable[[], object] = lambda: None,
+    going_on: Callable[[], object],
 ) -> QualityDerivative:
     """Return the smooth minimum and the mean of a mesh's quality, with their derivatives.
 

@@ -63,7 +63,7 @@ def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
     return first * (inside + ahead) + (last - first) / 2 * inside**2 + last * behind
 
 
-def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> FloatArray:
+def blade_nodes(lower: int, upper: int, section: BladeSection) -> FloatArray:
     """Return the blade's nodes, counter-clockwise from the leading edge, (lower + upper, 2)."""
     phi = np.linspace(0.0, np.pi, 20001)
     there = _spread(_surface(phi, -1.0, section), lower)
@@ -160,7 +160,7 @@ def channel_numbers(n: GridCounts) -> IntArray:
     return np.where(mask, np.cumsum(mask).reshape(shape) - 1, -1)
 
 
-def channel_points(n: GridCounts, section: BladeSection = PASSAGE) -> FloatArray:
+def channel_points(n: GridCounts, section: BladeSection) -> FloatArray:
     """Return nodes (m, 2) at all places of the channel, also in the hole, before smoothing.
 
     Lines in y are straight; those in x follow the camber line.

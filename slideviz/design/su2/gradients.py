@@ -439,7 +439,7 @@ class Gradients:
 
 
 def design_gradients(
-    config: Su2Config, mesh: Mesh, progress: Report | None = None
+    config: Su2Config, mesh: Mesh, progress: Report | None
 ) -> tuple[MovingSurface, Gradients]:
     """Return the moving boundaries of a configuration, and the gradients (`find_gradients`).
 
@@ -465,7 +465,7 @@ def design_gradients(
     )
 
 
-def find_gradients(surface: MovingSurface, progress: Report | None = None) -> Gradients:
+def find_gradients(surface: MovingSurface, progress: Report | None) -> Gradients:
     """Return the gradients of the objective whose sensitivities the configuration names.
 
     Raises SlidevizError if the sensitivities are missing or of another mesh, or the deformation is

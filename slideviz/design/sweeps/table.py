@@ -491,7 +491,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     return Designs(columns, tuple(designs))
 
 
-def head_of(columns: Iterable[str], words: Sequence[str] = WORDS) -> list[str]:
+def head_of(columns: Iterable[str], words: Sequence[str]) -> list[str]:
     """Return the column titles of a table of results: number, design variables, results."""
     return ["design", *columns, *NUMBERS, *words]
 
@@ -516,7 +516,7 @@ def cells_of(
     return [number, *values, *numbers, *(texts[name] for name in words)]
 
 
-def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) -> DesignRow:
+def result_of(head: Sequence[str], cells: Sequence[str], folder: Path) -> DesignRow:
     """Return the result in a line of a table; ValueError if its columns are not ``head``."""
     fields = dict(zip(head, cells, strict=True))  # columns and results differ in name
     numbers: dict[str, Any] = {
