@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import prange
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
 from slideviz.rbf.compiled import fast, squared_distance
 from slideviz.rbf.constraint_rows import merge
@@ -121,7 +122,7 @@ def _means(
         return field.at(value(targets), np.empty(0), tick), field
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WeightedField:
     """Displacement field: means of the displacements of sources, by their inverse distance."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.lines import listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
 from slideviz.errors import CaseError, Message, Remark, raise_all, shown
@@ -50,7 +51,7 @@ NodesOn = Mapping[str, IntArray]
 DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Displacements:
     """Prescribed displacements of nodes."""
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from slideviz.argument_types import CheckedFields, check_types
+from slideviz.argument_types import CheckedFields, check_types, record
 from slideviz.case.values import Kind
 from slideviz.case.words import first_of, name_text, number
 from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, raise_all, shown
@@ -45,7 +45,7 @@ MOST_CELLS = 1e12  # more than any mesh has
 _ITEM = re.compile(r'(?:"[^"]*"|[^",;])+')
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeasuredMesh:
     """A deformed mesh with its quality, whose limits are checked."""
 
@@ -240,7 +240,7 @@ class Limit(CheckedFields):
         return OPERATORS[self.sign](values, self.value)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LimitResult:
     """Whether a mesh meets a limit."""
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.loops import count_types
 from slideviz.formats.su2.numbers import (
@@ -41,7 +41,7 @@ _Task = tuple[str, int, int]
 """``cells`` or ``points``, index of the first piece, and of the one after the last."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class BinaryLayout:
     """The layout of the binary form (`su2b.layout`) of a text mesh: where each part begins."""
 

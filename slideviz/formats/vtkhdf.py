@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.formats.hdf5 import Hdf5Draft, free_name, hdf5_write
 from slideviz.formats.table import WriteOptions
 from slideviz.mesh.check import check_mesh
@@ -35,7 +35,7 @@ PARTITION = 1 << 20  # most cells of a partition
 Values = Mapping[str, NDArray]  # arrays by name, a row for each cell or point
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Block:
     group: h5py.Group  # its group in the file
     nodes: IntArray  # (n,): the mesh nodes of its points, one partition after the other

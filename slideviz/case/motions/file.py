@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements, NodesOn, read_displacements
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named, nodes_moved
 from slideviz.case.values import path_text
@@ -132,7 +133,7 @@ def read_path(words: list[Word]) -> Path:
     return Path(words[0].text.replace("\\", "/"))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Prescribed(Motion):
     """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
@@ -53,7 +54,7 @@ _LAID = WeakCache()
 _one_at_a_time = Lock()
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Remaining(Message):
     """The note on how far boundaries remain from the target that they are laid onto."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.motion import (
     Amount,
@@ -219,7 +220,7 @@ def moves_over_span(case: Case) -> bool:
     return any(applies_to(motion, name) for motion in over for name in case.markers_with("moving"))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Blade:
     """Boundaries that motions over the span move, with all of these motions."""
 

@@ -11,7 +11,7 @@ that are not one to one (mixing planes, overset grids) are left open: their face
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from slideviz.argument_types import record
 from slideviz.errors import path_error, printable
 from slideviz.formats.cgns.tree import Node, cgns_file
 from slideviz.formats.cgns.write import write_tree
@@ -46,7 +47,7 @@ JOINED = 1e-6
 _ONE_TO_ONE = "Abutting1to1"  # value of GridConnectivityType for interfaces that are joined
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Interface:
     """An interface of a zone with another one, or with itself."""
 
@@ -61,7 +62,7 @@ class Interface:
     why: str = ""  # reason why it cannot be joined, for a remark; empty if it can, or is periodic
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Joined:
     """Zones joined to one mesh."""
 
@@ -235,7 +236,7 @@ def _nearest(
     return here, there[closest]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CgnsForm(Origin):
     """Where the coordinates of a mesh are in the CGNS file it was read from."""
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, path_error, printable
 from slideviz.mesh.model import IntArray
 
@@ -49,7 +49,7 @@ def cgns_file(path: Path) -> Iterator[Node]:
         ) from problem
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Node:
     """A node of the tree: the file, its group in it, and its path, ``/Base/Zone/ZoneBC``.
 

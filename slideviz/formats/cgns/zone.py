@@ -7,12 +7,12 @@ Conventions"), which for linear elements is that of SU2.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.formats.cgns.tree import DATA, Node
 from slideviz.formats.meshio.bridge import in_node_sets
 from slideviz.mesh.cached_boundary import outer_facets
@@ -38,7 +38,7 @@ _SIZES[list(TYPES)] = [ELEMENTS[vtk].n_nodes for vtk in TYPES.values()]
 _MIXED = _NAMES.index("MIXED")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CgnsElements:
     """Elements of an unstructured zone."""
 
@@ -179,7 +179,7 @@ _BY_DIRECTION = ("IFaceCenter", "JFaceCenter", "KFaceCenter")
 _LABELS = ("IndexRange_t", "IndexArray_t")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CgnsZone:
     """A zone: its vertices, its cells, and where its coordinates are in the file."""
 

@@ -12,7 +12,7 @@ import re
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -22,6 +22,7 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, path_error, printable
 from slideviz.formats.table import endings
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
@@ -389,7 +390,7 @@ _NAMED = ("marker", "gmsh:physical", "cell_tags", "netgen:index")
 _ZERO_IS_NONE = ("marker", "gmsh:physical", "cell_tags")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeshioBlock:
     """Elements of one type: index in meshio's list of blocks, VTK identifier, nodes (m, n)."""
 

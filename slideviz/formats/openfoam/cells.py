@@ -8,11 +8,12 @@ each of these pieces, with its top at a node added in the middle of the cell.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import ELEMENTS, SIZES
 from slideviz.mesh.jacobians import INVERTED
@@ -40,7 +41,7 @@ _ROUNDS = 6  # in which faces of wrong elements are divided, at most
 _STEPS = 100  # in which the top of parts is looked for
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pieces:
     """The faces, divided into triangles and quadrilaterals."""
 
@@ -163,7 +164,7 @@ def divided(corners: FloatArray, hinges: BoolArray) -> IntArray:
     return table.reshape(count, size - 2, 3)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Built:
     """Cells built from faces."""
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, path_error, shown
 from slideviz.formats.source import unreadable
 from slideviz.mesh.model import IntArray, offsets_of
@@ -41,7 +42,7 @@ class Patch:
     count: int
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FoamFile:
     """The bytes of a file of OpenFOAM, and what its header says of them."""
 

@@ -7,10 +7,10 @@ coordinates along the axis and away from it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.formats.openfoam.cells import Built, ordered_cells, sound_quadrilaterals
 from slideviz.formats.openfoam.foam_file import Patch
 from slideviz.mesh.model import (
@@ -30,7 +30,7 @@ STRAIGHT = 1e-9  # an axis is a coordinate's where its cosine is this near to 1
 AXIS = "axis"  # name of the boundary on the axis of a wedge, which has no patch
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Layer:
     """Where the points of a layer are in its plane."""
 
@@ -48,7 +48,7 @@ class Layer:
         return points + np.einsum("nk,nkd->nd", moved, self.ways)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Plane:
     """The plane mesh of a layer."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import path_error, printable
 from slideviz.formats.openfoam.cells import cells_of
 from slideviz.formats.openfoam.foam_file import FoamFile, Patch, read_foam_file
@@ -30,7 +31,7 @@ ROLES: dict[str, Role] = {
 """The roles of boundaries by the types of their patches."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PolyMesh(Origin):
     """The points of the files that a mesh was read from, to write them back."""
 

@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2 import KEYWORD
@@ -212,7 +213,7 @@ def number_of(rows: Rows) -> int:
     return rows[-1].row + rows[-1].rows if rows else 0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Lines:
     """The lines of a file, numbered from 0 (in messages from 1), as runs.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
 from slideviz.formats.su2.lines import Lines, Rows, boxes_elsewhere
@@ -182,7 +183,7 @@ _SNIFFED_BYTES = 1 << 16  # bytes of a file that are searched for ``NDIME=``
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Document(Origin):
     """An SU2 file as it was read, with the places of its parts, so that it can be written again."""
 

@@ -7,11 +7,11 @@ only located, so that writing can keep them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2 import ROWS
@@ -44,7 +44,7 @@ _NAME_IT = "; name the marker"
 _COUNT_THEM = "; add it with the number of elements"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MarkerRows:
     """A boundary: its name, the line of its MARKER_TAG, and the rows of its elements."""
 
@@ -53,7 +53,7 @@ class MarkerRows:
     rows: Rows
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SendRows:
     """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, value of ``SEND_TO``, and its rows."""
 
@@ -63,7 +63,7 @@ class SendRows:
     rows: Rows
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TextZone:
     """Where the parts of one zone are in the file."""
 
@@ -297,7 +297,7 @@ class _Walk:
 BLOCK_BYTES = 1 << 20  # about how many bytes a block has: whole lines that are scanned together
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Text:
     """One zone of an SU2 text file, located but not read."""
 

@@ -6,7 +6,6 @@ Numbers are written with as few digits as identify the float64, so that nothing 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Piece, Rows, is_ffd
@@ -117,7 +117,7 @@ def _patched(zones: Sequence[Mesh]) -> Iterator[bytes]:
     yield from patched_blocks(documents[0].raw, changes)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PointChange:
     """What is new in a zone of a text: its points, and perhaps its boxes."""
 

@@ -8,13 +8,14 @@ mistake.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import record
 from slideviz.errors import MeshError, printable
 from slideviz.formats.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zones
 from slideviz.mesh.check import first_fault
@@ -27,7 +28,7 @@ from slideviz.system.threads import Tick, equal_shares
 BLOCK = 1 << 18  # most elements or points that are read at a time
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ElementBlock:
     """Consecutive elements of a file."""
 
@@ -175,7 +176,7 @@ def _check_dim(
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class BinaryForm(Origin):
     """The form of the ``.su2b`` file that a mesh was read from, to write it the same way."""
 
