@@ -387,7 +387,7 @@ class ShownTerm(Term):
 
     shortcut: str = ""  # the key that switches it
     at_first: bool = False  # whether it is drawn by default
-    needs: Literal["", "boxes", "3d"] = ""  # what it needs: nothing, FFD boxes, or a 3D mesh
+    needs: Literal["mesh", "boxes", "3d"] = "mesh"  # any mesh, FFD boxes, or a 3D mesh
     why_not: str = ""  # the tip where this is missing
     in_bar: bool = True  # whether the tool bar has a button for it
 

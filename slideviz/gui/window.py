@@ -33,7 +33,7 @@ from slideviz.gui.background import (
     LivePreview,
     SectionReader,
 )
-from slideviz.gui.commands import COMMANDS, MENUS, CommandState, Menu, colored_by_value
+from slideviz.gui.commands import COMMANDS, MENUS, CommandState, Menu, holds
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks, available_area
@@ -133,7 +133,7 @@ class Actions:
         for name, command in COMMANDS.items():
             command.show(self.by_name[name], now)
         for name, table in self._tables.items():
-            self.menus[name].setEnabled(table.enabled(now))
+            self.menus[name].setEnabled(holds(table.needs, now))
         self.bar.sync(now)
 
 
@@ -183,7 +183,7 @@ class ToolBar(QToolBar):
         session: Session = now.session
         mesh = session.mesh
         self.color.setEnabled(mesh is not None)
-        self.range.setEnabled(colored_by_value(now))
+        self.range.setEnabled(COMMANDS["fit_colors"].enabled(now))
         self.color.show_value(session.view.color_by)
         zones = mesh.zones if mesh is not None else 1
         one_by_one = {zone: f"{zone} of {zones}" for zone in range(1, zones + 1)}

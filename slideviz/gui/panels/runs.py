@@ -22,7 +22,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.commands import COMPARE, Command, fill_compare
+from slideviz.gui.commands import BY_NAME, RUN_MENU, Command, fill_compare
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
     ModelIndex,
@@ -257,9 +257,9 @@ class RunsPanel(Panel):
         self.tree = RunTree()
         menu = QMenu()
         menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
-        tip = f"{COMPARE.tip} Ctrl+click on a run does so too."
+        tip = f"{BY_NAME['compare'].tip} Ctrl+click on a run does so too."
         self.buttons = {"compare": tool_button(tip, image="beside", text="Compare", menu=menu)}
-        for command in filter(None, RUN_COMMANDS):
+        for command in RUN_MENU.commands():
             self.buttons[command.name] = tool_button(
                 command.tip, lambda _=False, command=command: command.do(self), image=command.image
             )
@@ -275,7 +275,7 @@ class RunsPanel(Panel):
         )
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
         every = list(self.buttons.values())
-        left = 1 + RUN_COMMANDS.index(None)
+        left = 1 + RUN_MENU.entries.index(None)
         row = WrappingRow(every[:left], every[left:], spacing=2)
         parts = (self.empty, self.tree, row)
         in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
@@ -294,7 +294,7 @@ class RunsPanel(Panel):
         self.tree.setVisible(bool(session.runs))
         run = session.run_shown
         self.buttons["compare"].setEnabled(run is not None and run.last is not None)
-        for command in filter(None, RUN_COMMANDS):
+        for command in RUN_MENU.commands():
             able = run is not None and command.enabled(run)
             selected = command.name in OF_ALL or self.tree.number != UNDEFORMED
             self.buttons[command.name].setEnabled(able and selected)
@@ -405,8 +405,8 @@ class RunsPanel(Panel):
             ("Rename\tF2", run is not None, lambda: self.tree.edit_name(number)),
         ):
             menu.addAction(text, function).setEnabled(can)
-        for command in RUN_COMMANDS:
-            if command is None:
+        for command in RUN_MENU.entries:
+            if not isinstance(command, Command):
                 menu.addSeparator()
                 continue
             act = menu.addAction(command.title, self._doing(command, number))
@@ -454,24 +454,3 @@ class RunsPanel(Panel):
         """Ask for a file name and write the table of all runs as CSV."""
         name = f"{self.services.files.stem()}_runs.csv"
         self.export_csv("Export the table of runs", name, table_rows(self.session.runs))
-
-
-# fmt: off
-RUN_COMMANDS: tuple[Command | None, ...] = (
-    Command("settings", "Put its settings back into the panels",
-            "Put its settings back into the panels", RunsPanel.take_settings, image="settings"),
-    Command("save", "Save its mesh…", "Save the mesh of this run", RunsPanel.save_mesh,
-            image="save", enabled=lambda run: bool(run.frames and run.end)),
-    Command("remove", "Remove", "Remove this run from the list", RunsPanel.remove,
-            image="remove", enabled=lambda run: bool(run.end)),
-    None,
-    Command("copy", "Copy the table", "Copy the table of all runs", RunsPanel.copy_table,
-            image="copy"),
-    Command("export", "Export the table…", "Export the table of all runs as CSV",
-            RunsPanel.export_table, image="table"),
-)
-# fmt: on
-"""The buttons' commands, which the menu of a row has too (None: a separator in the menu).
-
-``do`` is called with the panel, and from the menu with the number of its run; ``enabled``
-is called with a `Run`."""

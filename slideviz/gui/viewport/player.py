@@ -8,7 +8,7 @@ from qtpy.QtCore import QElapsedTimer, QSignalBlocker, QSize, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup, QResizeEvent, QTextDocument
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
 
-from slideviz.gui.commands import STEPS
+from slideviz.gui.commands import BY_NAME
 from slideviz.gui.responsiveness.timers import TICK_MS
 from slideviz.gui.widgets.build import ALIGN_RIGHT, Fitted, tool_button
 from slideviz.gui.widgets.theme import alarm, set_icon
@@ -47,7 +47,7 @@ class Player(QWidget):
         row.setContentsMargins(6, 3, 8, 3)
         row.setSpacing(1)
         self.buttons: dict[str, QToolButton] = {}
-        for command in STEPS.commands():
+        for command in BY_NAME["steps"].commands():
             name = command.name.removeprefix("step_")
             self.buttons[name] = button = tool_button(
                 command.button_tip,
