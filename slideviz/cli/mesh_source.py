@@ -6,11 +6,12 @@ import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from slideviz import read
+from slideviz.argument_types import record
 from slideviz.case.cfg import set_key
 from slideviz.case.check import idle_roles
 from slideviz.case.lines import entries_of, read_text
@@ -161,7 +162,7 @@ def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:
             yield f"{it}, which has {', '.join(periodic)} left; markers repeat in pairs: name both"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OpenMesh:
     """A mesh that a command reads, and the undeformed one if there is a reference."""
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli.mesh_source import open_mesh, optional_case, progress_of
@@ -34,7 +35,7 @@ from slideviz.streaming.source import cut_cells, join_blocks
 WALLS_OPTION = "--between HUB,SHROUD"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Scene:
     mesh: Mesh
     base: Mesh | None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import CAPTION_AT, TITLE
@@ -108,7 +109,7 @@ def _line_between(figure: Any, options: PictureOptions, start: int) -> None:
     figure.add_artist(Line2D([x, x], [0.0, 1.0], color=PAPER.edge, linewidth=wide, gid="between"))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Paint:
     """How cells are drawn: by values (m,) and a ScalarMappable, or in one color (None).
 

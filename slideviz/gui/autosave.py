@@ -13,7 +13,7 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from itertools import count
@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QLockFile, QObject
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.formats.openfoam_paths import shown_name
@@ -209,7 +210,7 @@ class Autosave(BackgroundJob):
         log.warning("the session could not be saved for a restart: %s", error)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OrphanedSession:
     """A session found in the file of a program that did not end properly."""
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.util.numpy_support import numpy_to_vtk
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
@@ -21,7 +21,7 @@ POINT = "vtkOriginalPointIds"
 LIFT = 1e-4  # height at which lines of a 2D mesh are drawn above its cells, relative to its extent
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DrawnBoundary:
     """A boundary in the scene: its surface, data set and actor."""
 
@@ -30,7 +30,7 @@ class DrawnBoundary:
     actor: Any
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Band:
     """What is drawn of a boundary besides its facets: data set and actor."""
 

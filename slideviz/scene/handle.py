@@ -8,7 +8,7 @@ camera, and what they move does not follow it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import pyvista as pv
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.errors import point_words
 from slideviz.ffd.box import Index
@@ -117,7 +118,7 @@ class Result(NamedTuple):
     turned: float = 0.0  # degrees since the drag began
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Drag:
     """A change that the mouse or keys make: what they hold, where, and how far they have moved."""
 
@@ -222,7 +223,7 @@ def _number(text: str) -> float | None:
 
 
 # What is drawn ----------------------------------------------------------------------------
-@dataclass(frozen=True, eq=False)
+@record
 class Part:
     """A part of a handle on the screen."""
 

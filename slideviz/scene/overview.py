@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import SlidevizError, not_one_of, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -56,7 +57,7 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
         raise SlidevizError(f"a detail about {place} misses the mesh, which has {box}")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Overview:
     """The default view of a deformed mesh: the cells that are drawn, and the camera's direction."""
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.vtkRenderingCore import vtkCellPicker
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.scene.actors import DrawnBoundary
 
 REACH = 9.0  # distance in pixels from a line up to which a click hits it
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Projection:
     """How a view shows points: parallel, or in perspective; pixels are from the lower left."""
 

@@ -7,11 +7,11 @@ lies in the largest gap between the angles of the points.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray, row_norms
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Section, round_middle
@@ -85,7 +85,7 @@ PlaceOnSection = tuple[float, float]
 the straight line of the surface at that angle."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Patch:
     """The part of a section about an axis that lies in a mesh (beside it where nothing is cut)."""
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
@@ -20,7 +20,7 @@ from slideviz.system.threads import in_parts
 BESIDE = 10.0  # most times as high as a cell that the next one is, across a section
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Block:
     """Cells of one type: VTK identifier, numbers (m,) and nodes (m, k)."""
 

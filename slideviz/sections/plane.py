@@ -7,11 +7,12 @@ The first line of a function says what it is for a plane; shapes of arrays are i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
@@ -121,7 +122,7 @@ _STEEP = 0.8
 """Planes whose unit normal has a larger z component than this are drawn with y up, not z."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Axes:
     """The camera's axes for looking straight at a plane."""
 

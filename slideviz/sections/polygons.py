@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
 from slideviz.mesh.topology import single_edges
 
@@ -53,7 +54,7 @@ def range_words(threshold: tuple[float, float]) -> str:
     return f"{threshold[0]:.3g} to {threshold[1]:.3g}"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Polygons:
     """Polygons, or lines where the mesh is 2D, each with the cell it belongs to."""
 

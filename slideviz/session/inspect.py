@@ -8,11 +8,11 @@ from 0 has them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Marker, Mesh
@@ -88,7 +88,7 @@ def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
 WORST = 100  # length of the list of the worst cells
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CellInfo:
     """The facts about one cell."""
 
@@ -104,7 +104,7 @@ class CellInfo:
     position: FloatArray  # (d,): the mean of its nodes, in the mesh's length unit
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WorstCells:
     """The worst cells of a frame, worst first."""
 

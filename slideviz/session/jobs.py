@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.check import check_case
 from slideviz.case.limits import (
     NUMBERS,
@@ -233,7 +234,7 @@ class JobProgress:
     fraction: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
@@ -42,7 +43,7 @@ PLACEHOLDER = Path("table")
 MOST_BYTES = 5_000_000  # most bytes of a file that can be edited by hand
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TableRows:
     """The nodes that a table of displacements may list."""
 

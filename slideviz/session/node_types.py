@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import MeshError, SlidevizError
@@ -19,7 +18,7 @@ from slideviz.system.weak_cache import WeakCache, weak_cache
 from slideviz.terms import NODE_TYPES, NodeType
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TypedNodes:
     """Nodes to be drawn as points, each with its type."""
 

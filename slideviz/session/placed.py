@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slideviz.argument_types import record
 from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
 from slideviz.case.motions.rigid import ByFormula, Radial, Rotate, Scale, Translate, rotated
@@ -73,7 +74,7 @@ def _in_space(numbers: ArrayLike) -> FloatArray:
     return padded(np.array([numbers]))[0]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Placed(ABC):
     """Something with a place in space, which a handle moves, turns or enlarges."""
 
@@ -180,7 +181,7 @@ def _axes(session: Session, origin: FloatArray) -> tuple[FloatArray, str]:
     return np.stack([*np.eye(3), along, arm / length, np.cross(along, arm / length)]), "xyzart"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PlacedBoundary(Placed):
     """Boundaries that motions move, turn and scale: the chosen one, others of the same target.
 
@@ -343,7 +344,7 @@ class PlacedRadius(PlacedBoundary):
         return Number(value, put, path)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PlacedControl(Placed):
     """Control points of a box, which a motion moves along the axes of the box's coordinates."""
 
@@ -379,7 +380,7 @@ class PlacedControl(Placed):
         return self.axes[axis] if self.system.kind == "CARTESIAN" else np.eye(3)[axis]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PlacedSection(Placed):
     """A section of the view; its axes are x, y, z, its normal or axis, and two across."""
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.motions.motion import Motion
 from slideviz.mesh.margin import SafeFraction, reach_words
 from slideviz.mesh.model import FloatArray
@@ -70,7 +71,7 @@ SAMPLES = 17  # fractions at which the curve is computed, besides steps
 FARTHEST_SHOWN = 3.0  # largest fraction of the curve
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Reach:
     """The lowest quality of a run along its steps, and straight on."""
 

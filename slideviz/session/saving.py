@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from slideviz.argument_types import record
 from slideviz.case.keys import SectionText, hyphened
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
@@ -19,7 +20,7 @@ from slideviz.session.state import Run, Session, ViewState
 from slideviz.terms import SHOWN
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Unsaved:
     """Unsaved work of a session."""
 

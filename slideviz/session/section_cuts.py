@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin
 from slideviz.mesh.periodic import Pair
@@ -37,7 +38,7 @@ MOST = 1 << 18  # most cells that are read at a time
 KEPT_SLABS = 8  # most slabs of a frame that are cached
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Groups:
     """Bounding balls of groups of `GROUP` cells, in the order of the file."""
 

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.case.check import effective
 from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
@@ -53,7 +54,7 @@ UNDEFORMED = 0
 LABEL = 20  # most characters of a run's name in a plot
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepFrame:
     """The mesh after a step, with its quality; the first frame is the undeformed mesh."""
 
@@ -172,7 +173,7 @@ _AT_WALLS: WeakKeyDictionary[StepFrame, dict[str, FloatArray]] = WeakKeyDictiona
 """The number of walls that was asked for last, in the cells of frames."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Preview:
     """The mesh that live fields give for a case, until its run is there."""
 
@@ -187,7 +188,7 @@ class Preview:
         return float(apart.max()) / largest, self.frame.quality.min - last.quality.min
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CheckedLimits:
     """The limits of a case, checked on a frame."""
 
@@ -208,7 +209,7 @@ def planned_steps(frames: Sequence[StepFrame]) -> int:
     return len(frames) + (0 if step is None else step.total - step.index)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Run:
     """A deformation that was computed: its case and its steps."""
 
@@ -386,7 +387,7 @@ class Guess:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Session:
     """The open mesh, its case, its runs, and the view of them."""
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
+from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.session.changes import (
     motion_words,
@@ -95,7 +96,7 @@ class UndoState:
         return session
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _OutsideChange:
     """The values before and after a change of something that is not part of the session.
 

@@ -17,6 +17,7 @@ from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
+from slideviz.argument_types import record
 from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.threads import start_thread
@@ -58,7 +59,7 @@ class AxesPlace:
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Picture:
     """A drawn figure; it is never drawn again, so any thread may read it."""
 
