@@ -66,14 +66,12 @@ class StartPage(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
-        self.page = QWidget()
-        self.page.setMaximumWidth(WIDEST)
+        self.page = QWidget(maximumWidth=WIDEST)
         self._outer = in_row(None, self.page, None)
         self._outer.setStretchFactor(self.page, 100)
         self.setWidget(as_widget(self._outer))
         self.hint = hint_label(HINT)
-        self.bar = QuietBar()
-        self.bar.setTextVisible(False)
+        self.bar = QuietBar(textVisible=False)
         self.bar.setFixedHeight(6)
         self.bar.hide()
         self._recent = in_column(spacing=0)
@@ -88,8 +86,7 @@ class StartPage(QScrollArea):
 
     # Parts -----------------------------------------------------------------------------
     def _make_head(self) -> QHBoxLayout:
-        picture = QLabel()
-        picture.setPixmap(logo().pixmap(QSize(64, 64)))
+        picture = QLabel(pixmap=logo().pixmap(QSize(64, 64)))
         title = rich_label(
             "<span style='font-size:22pt; font-weight:600'>slideviz</span><br>"
             "Deform CFD meshes, and see at once where and why their quality falls"

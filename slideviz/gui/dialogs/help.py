@@ -169,9 +169,7 @@ class SearchDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle(title)
         self.resize(size.boundedTo(self.screen().availableSize()))
-        self.search = QLineEdit()
-        self.search.setPlaceholderText(words)
-        self.search.setClearButtonEnabled(True)
+        self.search = QLineEdit(placeholderText=words, clearButtonEnabled=True)
         self.search.textChanged.connect(self.look_for)
         self.count = hint_label()
         self.count.setWordWrap(False)
@@ -307,8 +305,7 @@ class TextDialog(SearchDialog):
 
     def __init__(self, parent: QWidget, title: str, text: str) -> None:
         super().__init__(parent, title, QSize(860, 640), "Find (Enter: the next one)")
-        self.text = QPlainTextEdit(text)
-        self.text.setReadOnly(True)
+        self.text = QPlainTextEdit(text, readOnly=True)
         self.text.setFont(fixed_font())
         self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.search.returnPressed.connect(self.next)
@@ -335,15 +332,16 @@ class AboutDialog(QDialog):
         super().__init__(parent)
 
         self.setWindowTitle("About slideviz")
-        picture = QLabel()
-        picture.setPixmap(logo().pixmap(QSize(64, 64)))
+        picture = QLabel(pixmap=logo().pixmap(QSize(64, 64)))
         title = QLabel(
             f"<span style='font-size:18pt; font-weight:600'>slideviz</span> &nbsp;{__version__}<br>"
             "Deforms CFD meshes with radial basis functions,<br>"
             "with boundaries that slide and repeat."
         )
-        self.text = QLabel(f"<pre>{html.escape(versions())}</pre>")
-        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.text = QLabel(
+            f"<pre>{html.escape(versions())}</pre>",
+            textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse,
+        )
         licence = QLabel("MIT licence: use, change and pass it on freely; no warranty.")
         buttons = dialog_buttons(self, CLOSE)
         self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
@@ -446,8 +444,7 @@ class Pages(QTextBrowser):
     """A browser of the manual's pages, whose links lead to other pages."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setOpenExternalLinks(True)
+        super().__init__(openExternalLinks=True)
         self.sourceChanged.connect(lambda _: self._space())
 
     def doSetSource(  # type: ignore[override]  # Qt gives a URL, and both

@@ -316,10 +316,14 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
     menu.addSection(title)
     roles = {store.session.role(name) for name in names}
     for role in ROLES:
-        act = QAction(role_icon(role), f"&{role.capitalize()}", menu)
-        act.setToolTip(ROLES[role].tip)
-        act.setCheckable(True)
-        act.setChecked(roles == {role})
+        act = QAction(
+            role_icon(role),
+            f"&{role.capitalize()}",
+            menu,
+            toolTip=ROLES[role].tip,
+            checkable=True,
+            checked=roles == {role},
+        )
         act.setIconVisibleInMenu(roles != {role})  # in its place there is the check mark
         act.triggered.connect(_slot(store, changes.set_role, names, role))
         menu.addAction(act)

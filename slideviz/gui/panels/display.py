@@ -129,8 +129,7 @@ class DisplayPanel(Panel):
     def make(self) -> None:
         content = QWidget()
         in_column(PanelScroll(content), on=self)
-        self.form = QFormLayout(content)
-        self.form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
+        self.form = QFormLayout(content, rowWrapPolicy=QFormLayout.RowWrapPolicy.WrapLongRows)
         self.form.setContentsMargins(6, 6, 6, 4)
         grow_fields(self.form, 5)
         self._make_colors()

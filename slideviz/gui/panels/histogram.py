@@ -128,16 +128,16 @@ class HistogramPanel(Panel):
         self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._range_dragged)
         self.canvas.dragging.connect(self._dragged)
-        self.numbers = QLabel()
-        self.numbers.setTextFormat(Qt.TextFormat.RichText)
-        self.numbers.setWordWrap(True)
-        self.range_text = QLabel()
-        self.range_text.setWordWrap(True)
+        self.numbers = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
+        self.range_text = QLabel(wordWrap=True)
         parts = (self.area, self.numbers, self.range_text, self._make_buttons())
         in_column(*parts, wide=[self.area], spacing=3, on=self, margins=4)
         self._timer = single_shot(self, self._apply_range, SELECTING_MS)
-        escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
-        escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        escape = QShortcut(
+            QKeySequence(Qt.Key.Key_Escape),
+            self,
+            context=Qt.ShortcutContext.WidgetWithChildrenShortcut,
+        )
         escape.activated.connect(self.clear_range)
         self.follow(_shown, seen=True)
 

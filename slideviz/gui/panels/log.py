@@ -50,9 +50,7 @@ class LogPanel(QPlainTextEdit):
     """The panel with the newest lines of the log."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setReadOnly(True)
-        self.setMaximumBlockCount(2000)
+        super().__init__(readOnly=True, maximumBlockCount=2000)
         self.setFont(fixed_font())
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self.handler = LogHandler()

@@ -81,15 +81,13 @@ class TableDialog(QDialog):
         self.rows = rows
         self.setWindowTitle(f"Displacements of {rows.of}")
         self.resize(QSize(520, 560).boundedTo(self.screen().availableSize()))
-        about = QLabel(ABOUT)
-        about.setWordWrap(True)
+        about = QLabel(ABOUT, wordWrap=True)
         self.edit = QPlainTextEdit(text)
         self.edit.setObjectName("table")
         self.edit.setFont(fixed_font())
         self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.edit.setPlaceholderText(f"{rows.heading}\n…")
-        self.answer = QLabel()
-        self.answer.setWordWrap(True)
+        self.answer = QLabel(wordWrap=True)
         self.buttons = dialog_buttons(self)
         kind = QDialogButtonBox.ButtonRole
         self.fill = self.buttons.addButton("List all nodes", kind.ActionRole)

@@ -97,9 +97,7 @@ class _FirstLine(QStyledItemDelegate):
     ) -> QLineEdit | None:
         if index.column() != RUN or not index.data(NUMBER):
             return None  # the undeformed mesh has no name of its own
-        editor = QLineEdit(parent)
-        editor.setPlaceholderText(f"Name of run {index.data(NUMBER)}")
-        return editor
+        return QLineEdit(parent, placeholderText=f"Name of run {index.data(NUMBER)}")
 
     def setEditorData(self, editor: QWidget, index: ModelIndex) -> None:
         assert isinstance(editor, QLineEdit)

@@ -312,8 +312,11 @@ class SectionsPanel(Panel):
         self.list.itemChanged.connect(self._checked)
         self.list.currentRowChanged.connect(self._row_chosen)
         # For the list alone: elsewhere Delete does something else.
-        delete = QShortcut(QKeySequence(QKeySequence.StandardKey.Delete), self.list)
-        delete.setContext(Qt.ShortcutContext.WidgetShortcut)
+        delete = QShortcut(
+            QKeySequence(QKeySequence.StandardKey.Delete),
+            self.list,
+            context=Qt.ShortcutContext.WidgetShortcut,
+        )
         delete.activated.connect(self._remove)
         self.hint = hint_label(HINTS[3], Qt.AlignmentFlag.AlignTop)
         self.editor = SectionEditor()

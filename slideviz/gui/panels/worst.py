@@ -385,8 +385,7 @@ class WorstPanel(Panel):
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
         ):
-            shortcut = QShortcut(keys, self)
-            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut = QShortcut(keys, self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(function)
         self.follow(seen=True)
         self.follow(_listed, self._fill, seen=True, rests=True)

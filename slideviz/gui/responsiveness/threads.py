@@ -187,8 +187,7 @@ class GarbageCollector(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._timer = QTimer(self)
-        self._timer.setInterval(GARBAGE_MS)
+        self._timer = QTimer(self, interval=GARBAGE_MS)
         self._timer.timeout.connect(self.collect_if_due)
 
     def start(self) -> None:

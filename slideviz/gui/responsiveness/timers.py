@@ -122,8 +122,6 @@ def single_shot(parent: QObject | None, call: Callable[[], object], wait_ms: int
 
     At 0 ms it calls in the next turn of the event loop, once for all starts in this one.
     """
-    timer = QTimer(parent)
-    timer.setSingleShot(True)
-    timer.setInterval(wait_ms)
+    timer = QTimer(parent, singleShot=True, interval=wait_ms)
     timer.timeout.connect(call)
     return timer

@@ -472,8 +472,7 @@ class SectionViews(QSplitter):
     """The 3D views, and beside or below them the flat views of the selected section."""
 
     def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget) -> None:
-        super().__init__(Qt.Orientation.Vertical, parent)
-        self.setChildrenCollapsible(False)
+        super().__init__(Qt.Orientation.Vertical, parent, childrenCollapsible=False)
         self.viewing = viewing
         self.store = viewing.store
         self.addWidget(viewing)

@@ -52,9 +52,9 @@ class DetailsDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Details")
         self.resize(720, 380)
-        self.text = QPlainTextEdit(text)
-        self.text.setReadOnly(True)
-        self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.text = QPlainTextEdit(
+            text, readOnly=True, lineWrapMode=QPlainTextEdit.LineWrapMode.NoWrap
+        )
         buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
         self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
         self.copy.clicked.connect(lambda: QApplication.clipboard().setText(text))

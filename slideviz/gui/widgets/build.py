@@ -64,18 +64,14 @@ from slideviz.gui.widgets.theme import set_icon
 
 def rich_label(text: str) -> QLabel:
     """Return a label for rich text; names in it must be escaped."""
-    label = QLabel(text)
-    label.setTextFormat(Qt.TextFormat.RichText)
-    return label
+    return QLabel(text, textFormat=Qt.TextFormat.RichText)
 
 
 class LinkLabel(QLabel):
     """A word-wrapped label for rich text, whose links are reached by the tab key too."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setWordWrap(True)
-        self.setTextFormat(Qt.TextFormat.RichText)
+        super().__init__(wordWrap=True, textFormat=Qt.TextFormat.RichText)
 
     def setText(self, text: str) -> None:
         super().setText(text)
@@ -185,11 +181,12 @@ class WideLabel(Fitted, QScrollArea):
 
     def __init__(self, lines: int) -> None:
         super().__init__()
-        self.label = QLabel()
-        self.label.setTextFormat(Qt.TextFormat.PlainText)
-        self.label.setWordWrap(True)
-        self.label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
-        self.label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.label = QLabel(
+            textFormat=Qt.TextFormat.PlainText,
+            wordWrap=True,
+            alignment=Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop,
+            textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse,
+        )
         self._most = lines * self.label.fontMetrics().lineSpacing() + 2
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -328,8 +325,7 @@ class PanelScroll(QScrollArea):
     """A scroll area for a panel; a field reached by the tab key is scrolled into view."""
 
     def __init__(self, content: QWidget) -> None:
-        super().__init__()
-        self.setWidgetResizable(True)
+        super().__init__(widgetResizable=True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setWidget(content)
@@ -453,8 +449,7 @@ def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> 
 # Labels and bars ---------------------------------------------------------------------------
 def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
     """Return a label for a hint: word-wrapped, in the theme's soft color."""
-    label = QLabel(text)
-    label.setWordWrap(True)
+    label = QLabel(text, wordWrap=True)
     label.setProperty("hint", True)
     if align is not None:
         label.setAlignment(align)

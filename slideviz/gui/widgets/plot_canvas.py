@@ -167,8 +167,7 @@ class PlotCanvas(QWidget):
         self._timer = single_shot(self, self.fill)
         # The image is polled, not signalled: the thread must not refer to a widget that may be
         # deleted.
-        self._look_after = QTimer(self)
-        self._look_after.setInterval(LOOK_MS)
+        self._look_after = QTimer(self, interval=LOOK_MS)
         self._look_after.timeout.connect(self._show_image)
         self.setMinimumSize(120, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)

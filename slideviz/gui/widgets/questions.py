@@ -117,8 +117,7 @@ def ask_unsaved(
     smaller letters. ``can_save``: what can be saved now. ``now``: returns the question as it is
     now, for what goes on meanwhile; "" where it is to be asked again.
     """
-    box = QMessageBox(parent)
-    box.setIcon(QMessageBox.Icon.Question)
+    box = QMessageBox(parent, icon=QMessageBox.Icon.Question)
     box.setWindowTitle("Unsaved changes")
     box.setTextFormat(Qt.TextFormat.PlainText)
 
@@ -234,7 +233,6 @@ def _agreed(parent: QWidget, icon: QMessageBox.Icon, title: str, text: str) -> b
     """Return whether the user answers a question with yes; its text is plain text."""
     yes = QMessageBox.StandardButton.Yes
     no = QMessageBox.StandardButton.Cancel
-    box = QMessageBox(icon, title, text, yes | no, parent)
-    box.setTextFormat(Qt.TextFormat.PlainText)
+    box = QMessageBox(icon, title, text, yes | no, parent, textFormat=Qt.TextFormat.PlainText)
     box.setDefaultButton(no)
     return box.exec() == yes
