@@ -254,4 +254,4 @@ def _corners(session: Session) -> FloatArray:
     assert session.frame is not None
     assert session.view.marked_cell is not None
     mesh = session.frame.mesh
-    return np.asarray(mesh.points[nodes_of(mesh, session.view.marked_cell)])
+    return mesh.points[nodes_of(mesh, session.view.marked_cell)]

@@ -67,7 +67,7 @@ def on_path(
     step = pixel * pixel / moved  # a pixel across the line of sight
 
     def at(to: float) -> FloatArray:
-        return np.asarray(projection.pixels(path(to)[None])[0])
+        return projection.pixels(path(to)[None])[0]
 
     slope = at(value + step) - at(value)
     if float(np.linalg.norm(slope)) < STEEP:
@@ -400,7 +400,7 @@ def _distance(line: FloatArray, at: FloatArray) -> float:
 
 def _disc(radius: float) -> FloatArray:
     angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
-    return np.asarray(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def _arrow(root: FloatArray, tip: FloatArray, ratio: float) -> list[FloatArray]:
@@ -418,7 +418,7 @@ def _arrow(root: FloatArray, tip: FloatArray, ratio: float) -> list[FloatArray]:
 def _across(way: FloatArray) -> FloatArray:
     """Return the unit vectors (..., 2) to the left of vectors (..., 2)."""
     left = np.stack([-way[..., 1], way[..., 0]], axis=-1)
-    return np.asarray(left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-30))
+    return left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-30)
 
 
 def _bar(line: FloatArray, width: float) -> list[FloatArray]:
@@ -476,4 +476,4 @@ NAME = "handle:parts"
 def _wider(polygon: FloatArray) -> FloatArray:
     """Return a polygon (k, 2) grown by about a pixel and a half to all sides."""
     arm = polygon - polygon.mean(axis=0)
-    return np.asarray(polygon + 1.5 * arm / np.maximum(row_norms(arm)[:, None], 1e-30))
+    return polygon + 1.5 * arm / np.maximum(row_norms(arm)[:, None], 1e-30)

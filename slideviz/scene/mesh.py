@@ -99,7 +99,7 @@ class CellLayer(Layer):
         """Return the points (k, d) of the drawn shape in another state of the mesh."""
         if self.shape is None or mesh.dim == 2:
             return mesh.points
-        return np.asarray(mesh.points[self.shape.point_data[POINT]])
+        return mesh.points[self.shape.point_data[POINT]]
 
     def update(self, old: Session | None, new: Session) -> None:
         if self.actor is None or new.mesh is None or new.frame is None:
@@ -456,7 +456,7 @@ def outermost(points: FloatArray) -> FloatArray:
     directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
     # Scaled by the extents, so that they are evenly spread for a long or flat mesh too.
     directions /= np.maximum(np.ptp(points, axis=0), 1e-300)
-    return np.asarray(points[np.unique((directions @ points.T).argmax(axis=1))])
+    return points[np.unique((directions @ points.T).argmax(axis=1))]
 
 
 class PassageLayer(KeyedLayer):

@@ -100,7 +100,7 @@ def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
 
 def lengths(mesh: Mesh, base: Mesh) -> FloatArray:
     """Return the length of the displacement of each node, (n,)."""
-    return np.asarray(np.linalg.norm(mesh.points - base.points, axis=1))
+    return np.linalg.norm(mesh.points - base.points, axis=1)
 
 
 def _inner_bodies(base: Mesh, length: FloatArray) -> list[IntArray]:

@@ -35,7 +35,7 @@ class Projection:
     def pixels(self, points: FloatArray) -> FloatArray:
         """Return the pixels (n, 2) of points (n, 3)."""
         clip = np.column_stack([points, np.ones(len(points))]) @ self.matrix.T
-        return np.asarray((clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * self.size)
+        return (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * self.size
 
     def ray(self, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the line of sight through a pixel (2,): its nearest point, and its direction."""
@@ -49,7 +49,7 @@ class Projection:
     def on_plane(self, pixel: FloatArray, point: FloatArray, normal: FloatArray) -> FloatArray:
         """Return where (3,) the line of sight through a pixel meets a plane."""
         start, way = self.ray(pixel)
-        return np.asarray(start + (point - start) @ normal / (way @ normal) * way)
+        return start + (point - start) @ normal / (way @ normal) * way
 
     def sight(self, point: FloatArray) -> FloatArray:
         """Return the unit direction (3,) in which a point (3,) is seen."""
@@ -72,9 +72,7 @@ def distances(at: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the distances (...) of a place (d,) from straight lines (..., d)."""
     way = end - start
     share = ((at - start) * way).sum(-1) / np.maximum((way * way).sum(-1), 1e-30)
-    return np.asarray(
-        np.linalg.norm(start + np.clip(share, 0.0, 1.0)[..., None] * way - at, axis=-1)
-    )
+    return np.linalg.norm(start + np.clip(share, 0.0, 1.0)[..., None] * way - at, axis=-1)
 
 
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:

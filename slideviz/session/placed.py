@@ -119,7 +119,7 @@ class Placed(ABC):
 
     def at(self, numbers: FloatArray) -> FloatArray:
         """Return where (3,) `origin` is with other `numbers` (3,)."""
-        return np.asarray(self.origin + numbers - self.numbers)
+        return self.origin + numbers - self.numbers
 
     def along(self, axis: int) -> Number:
         """Return the number that moves it along one of its axes."""
@@ -140,7 +140,7 @@ class Placed(ABC):
 
     def way(self, axis: int) -> FloatArray:
         """Return the direction (3,) of its numbers along one of its axes."""
-        return np.asarray(self.axes[axis])
+        return self.axes[axis]
 
     def number(self, act: Act, axis: int | None) -> Number | None:
         """Return the number that an act changes along or about an axis; None where it has none."""
@@ -259,7 +259,7 @@ class PlacedBoundary(Placed):
         return self._with(place, replace(motion, vector=tuple(numbers[: self.dim].tolist())))
 
     def at(self, numbers: FloatArray) -> FloatArray:
-        return np.asarray(self.origin + self._shift[2] @ (numbers - self.numbers))
+        return self.origin + self._shift[2] @ (numbers - self.numbers)
 
     def turn(self, axis: int | None) -> Number:
         machine = machine_axis(self.session)
@@ -313,7 +313,7 @@ class PlacedBoundary(Placed):
 
         def path(factor: float, point: FloatArray) -> FloatArray:
             ratio = _in_space(np.where(mine, factor / value, 1.0))
-            return np.asarray(centre + (point - centre) * ratio)
+            return centre + (point - centre) * ratio
 
         return Number(value, put, path)
 
@@ -336,7 +336,7 @@ class PlacedRadius(PlacedBoundary):
         def path(distance: float, point: FloatArray) -> FloatArray:
             arm = point - _in_space(motion.point)
             arm = arm - (arm @ along) * along
-            return np.asarray(point + (distance - value) * arm / max(np.linalg.norm(arm), 1e-300))
+            return point + (distance - value) * arm / max(np.linalg.norm(arm), 1e-300)
 
         def put(distance: float) -> Session:
             return self._with(index, replace(motion, distance=distance))
@@ -439,7 +439,7 @@ class PlacedSection(Placed):
         def path(to: float, point: FloatArray) -> FloatArray:
             sizes = (size, float(np.clip(to, *limits)))
             ends = np.concatenate([section.surface(places, one) for one in sizes])
-            return np.asarray(point + ends[1] - ends[0])
+            return point + ends[1] - ends[0]
 
         return Number(size, lambda to: self._with(section.sized(float(np.clip(to, *limits)))), path)
 
@@ -447,7 +447,7 @@ class PlacedSection(Placed):
     def edge(self) -> FloatArray:
         if self.dim == 3:
             return self.origin
-        return np.asarray(self.origin + self.section.size * np.array([np.sqrt(0.5)] * 2 + [0.0]))
+        return self.origin + self.section.size * np.array([np.sqrt(0.5)] * 2 + [0.0])
 
     @cached_property
     def anchors(self) -> FloatArray:

@@ -187,7 +187,7 @@ def _middle_of_moving(session: Session) -> FloatArray:
     assert mesh is not None
     names = [name for name in mesh.marker_names if session.role(name) == "moving"]
     points = padded(mesh.points[mesh.nodes_of(names) if names else mesh.cells.nodes])
-    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0)
+    return (points.min(axis=0) + points.max(axis=0)) / 2.0
 
 
 def position_range(section: Section, points: FloatArray) -> tuple[float, float]:

@@ -372,7 +372,7 @@ def rotated(arm: FloatArray, angle_deg: float, axis: Vector) -> FloatArray:
 
 def _centre(point: Point, points: FloatArray) -> FloatArray:
     if point == "centroid":
-        return np.asarray(ordered_sum(points) / max(1, len(points)))
+        return ordered_sum(points) / max(1, len(points))
     return np.array(point)
 
 
