@@ -57,6 +57,10 @@ PALETTE = {
 }
 """Okabe and Ito's colors (2008), which color-blind people can distinguish."""
 
+Texts = tuple[str, ...]
+Numbers = tuple[float, ...]
+WholeNumbers = tuple[int, ...]
+
 _ROWS = tomllib.loads(Path(__file__).with_name("terms.toml").read_text(encoding="utf-8"))
 
 Kind = TypeVar("Kind", bound=Term)

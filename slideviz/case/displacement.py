@@ -19,6 +19,7 @@ from slideviz.case.words import COMMENT_SIGNS, number
 from slideviz.errors import CaseError, Message, Remark, raise_all, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.system.grouping import grouped
+from slideviz.terms import WholeNumbers
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
 _ZONE = re.compile(r"\s*(\d+):(.*)")
@@ -155,7 +156,7 @@ def in_zones(
 
 
 def parse_displacements(
-    text: str, path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
+    text: str, path: Path, nodes: IntArray, shape: WholeNumbers, of: str
 ) -> Displacements:
     """Return the displacements that the text of a file lists for ``nodes``, zero for others.
 
@@ -178,7 +179,7 @@ def parse_rows(
     text: str,
     path: Path,
     nodes: IntArray,
-    shape: tuple[int, ...],
+    shape: WholeNumbers,
     of: str,
     columns: Columns = DISPLACEMENT,
 ) -> FloatArray:

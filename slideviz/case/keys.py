@@ -56,7 +56,9 @@ from slideviz.terms import (
     ROLES,
     SHOWN,
     Method,
+    Numbers,
     Role,
+    Texts,
 )
 
 if TYPE_CHECKING:
@@ -195,10 +197,10 @@ def field_row(owner: Any, name: str, kind: Kind | None, **facts: Any) -> Key:
 def role(wanted: Role) -> Key:
     """Return the row of the key that lists the markers with the role ``wanted``."""
 
-    def put(case: Case, names: tuple[str, ...]) -> Case:
+    def put(case: Case, names: Texts) -> Case:
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})
 
-    def get(case: Case) -> tuple[str, ...] | None:
+    def get(case: Case) -> Texts | None:
         return case.markers_with(wanted) or None
 
     term = ROLES[wanted]
@@ -208,14 +210,14 @@ def role(wanted: Role) -> Key:
 
 HIDDEN = "hidden"  # the last word of a section that is not drawn
 
-SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
+SectionText = tuple[str, Numbers, bool, bool, bool]
 """A section: shape, numbers, whether whole cells are shown, has a flat view, and is drawn."""
 
 
 def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Kind:
     """Return the kind of ``count`` to ``count + more`` numbers; with ``rising`` each larger."""
 
-    def read(text: str) -> tuple[float, ...]:
+    def read(text: str) -> Numbers:
         values = tuple(number(item.text) for item in list_of(text))
         if not count <= len(values) <= count + more:
             raise CaseError(f"{shown(text)} has {len(values)} numbers; expected {allowed}")
@@ -226,11 +228,11 @@ def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Ki
     return Kind(allowed, read, vector_text)
 
 
-def words(known: tuple[str, ...]) -> Kind:
+def words(known: Texts) -> Kind:
     """Return the kind of a list of words out of ``known``; it is read in the order of these."""
     allowed = f"a list of {', '.join(known)}"
 
-    def read(text: str) -> tuple[str, ...]:
+    def read(text: str) -> Texts:
         words = [item.text.lower() for item in list_of(text)]
         for word in words:
             if word not in known:
@@ -330,7 +332,7 @@ _VIEW = (
 )
 
 
-Definition = tuple[str, tuple[float, ...]]
+Definition = tuple[str, Numbers]
 Degrees = tuple[int, int, int]
 NUMBERS = 24  # coordinates of the 8 corners of a box
 IN_2D = 12  # those of the 4 corners that 2D uses

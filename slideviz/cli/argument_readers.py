@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 from slideviz.errors import CaseError, not_one_of
-from slideviz.terms import AXES, RATED, Quantity, field_of
+from slideviz.terms import AXES, RATED, Quantity, Texts, WholeNumbers, field_of
 
 if TYPE_CHECKING:
     from slideviz.case.limits import Limit
@@ -145,7 +145,7 @@ def _section(
     return Section.of(kind, (x, y, z), (a, b, c), size)
 
 
-def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
+def _numbers(text: str, counts: WholeNumbers, form: str) -> list[float]:
     """Return the numbers of a list like ``form``, as many as one of ``counts``."""
     try:
         values = [float(word) for word in text.split(",")]
@@ -223,7 +223,7 @@ def quality_limits(text: str) -> tuple[Limit, ...]:
     return found
 
 
-def names_in(text: str) -> tuple[str, ...]:
+def names_in(text: str) -> Texts:
     """Return the names of a text, separated by commas."""
     return tuple(filter(None, (name.strip() for name in text.split(","))))
 

@@ -11,14 +11,15 @@ from slideviz.case.keys import KEYS
 from slideviz.cli.commands import COMMANDS
 from slideviz.cli.terminal import DONE
 from slideviz.samples.table import SAMPLES
+from slideviz.terms import Texts
 
 
 class Option(NamedTuple):
     """An argument of a command, as a shell sees it."""
 
-    flags: tuple[str, ...]  # none of a positional argument
+    flags: Texts  # none of a positional argument
     words: str  # its help
-    values: tuple[str, ...]  # values to choose from
+    values: Texts  # values to choose from
     takes: str  # what its value is called; "" of a switch
     is_path: bool
 

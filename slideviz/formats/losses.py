@@ -15,7 +15,7 @@ from slideviz.formats.su2.text import SEND_RECEIVE, Text
 from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import zones_of
-from slideviz.terms import FileFormat
+from slideviz.terms import FileFormat, Texts
 
 OTHER_ZONES = "the other zones"  # what a file of one zone loses
 DIVISION = "the division into zones"  # what a file without zones loses of a mesh of all
@@ -48,7 +48,7 @@ def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
     return lost
 
 
-def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
+def lost_of_mesh(mesh: Mesh) -> Texts:
     """Return what the file of a mesh has besides points, cells and boundaries, in words."""
     keys = []
     has_halo = mesh.halo is not None
@@ -65,7 +65,7 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
     )
 
 
-def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
+def lost_of_text(keys: Iterable[str], zones: int) -> Texts:
     """Describe which parts of an SU2 text a binary file cannot hold; empty if none.
 
     ``keys`` are those of sections that slideviz does not know, ``zones`` the number of zones.
@@ -80,7 +80,7 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
     return tuple(words for words, is_lost in lost.items() if is_lost)
 
 
-def lost_of_texts(texts: Sequence[Text]) -> tuple[str, ...]:
+def lost_of_texts(texts: Sequence[Text]) -> Texts:
     """Describe which parts of zones of an SU2 text a binary file of these cannot hold."""
     keys = (part.key for text in texts for part in text.zone.unknown)
     return lost_of_text(keys, texts[0].zone.bounds.zones if len(texts) == 1 else 1)

@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import to_display
 from slideviz.scene.stage import Stage
+from slideviz.terms import Numbers
 
 FILL = 0.92  # part of the free height or width that a fitted mesh takes
 DETAIL = 0.5
@@ -43,8 +44,8 @@ class Camera:
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
         self.stage = stage
         self._shapes = shapes
-        self._fitted: tuple[float, ...] = ()
-        self._restored: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+        self._fitted: Numbers = ()
+        self._restored: tuple[Numbers, Numbers] = ((), ())
         self.beside: Camera | None = None
         """The linked camera of the view beside this one, in the same position; both are fitted to
         the data sets of both."""
@@ -131,7 +132,7 @@ class Camera:
         ratio = ratio or self._ratio(self.stage)
         return float(max(extent[1], extent[0] / ratio, 1e-300) / 2.0 / FILL)
 
-    def is_fit(self, view: tuple[float, ...]) -> bool:
+    def is_fit(self, view: Numbers) -> bool:
         """Return whether a `view`, in which the camera is, was fitted to what is drawn."""
         shapes = self._shapes()
         if len(view) < 11 or not shapes:
@@ -154,7 +155,7 @@ class Camera:
         return self._fitted == self.place
 
     @property
-    def restored(self) -> tuple[float, ...]:
+    def restored(self) -> Numbers:
         """Return the `view` that `go` restored last, if the camera has not moved since; or ()."""
         view, place = self._restored
         return view if place == self.place else ()
@@ -280,7 +281,7 @@ class Camera:
         )
 
     @property
-    def place(self) -> tuple[float, ...]:
+    def place(self) -> Numbers:
         """Return ten numbers: position, focal point, up vector, and parallel scale.
 
         The scale is half the height of the view, in the mesh's length unit.
@@ -290,11 +291,11 @@ class Camera:
         return tuple(float(number) for number in numbers)
 
     @property
-    def view(self) -> tuple[float, ...]:
+    def view(self) -> Numbers:
         """Return the ten numbers of `place`, and the view's free width divided by its height."""
         return (*self.place, self._ratio(self.stage))
 
-    def move_to(self, place: tuple[float, ...]) -> None:
+    def move_to(self, place: Numbers) -> None:
         """Restore a `place` or a `view`; of a `view` all the width is seen, if need be smaller."""
         camera = self._camera
         camera.position = place[:3]

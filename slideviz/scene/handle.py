@@ -26,6 +26,7 @@ from slideviz.scene.pick import Projection, distances
 from slideviz.session.motions import chosen_control, lattices
 from slideviz.session.placed import Act, Grip, Number, Placed
 from slideviz.session.state import Session
+from slideviz.terms import WholeNumbers
 
 AXIS_COLORS = ("#d1495b", "#3c9d4e", "#2f6fb5", "#8a5fbf", "#c77f1a", "#1f9e9e")
 """Colors of the axes x, y, z and of the others; the ball in the middle has that of the third."""
@@ -125,7 +126,7 @@ class Drag:
     placed: Placed
     projection: Projection
     act: Act
-    axes: tuple[int, ...]  # along or about which; () for all, or its own
+    axes: WholeNumbers  # along or about which; () for all, or its own
     point: FloatArray  # (3,): what the mouse holds
     start: FloatArray  # (2,): the pixel where the mouse took it
     now: FloatArray  # (2,): and where it is now
@@ -183,7 +184,7 @@ class Drag:
             return rounded(size * round((start + value) / size), size / 10.0)
         return rounded(start + value, unit / 2.0 * (FINE if self.fine else 1.0))
 
-    def _shifted(self, axes: tuple[int, ...]) -> Result:
+    def _shifted(self, axes: WholeNumbers) -> Result:
         """Return the result of a drag in a plane: across the line of sight, or of two axes."""
         placed = self.placed
         projection = self.projection
@@ -365,7 +366,7 @@ def control_at(
     if mesh is None or "ffd" not in session.view.drawn:
         return None
     boxes, moved = lattices(session.case, mesh)
-    best: tuple[float, str, tuple[int, ...]] = (reach, "", ())
+    best: tuple[float, str, WholeNumbers] = (reach, "", ())
     for name, box in (boxes | moved).items():
         layers = box.points if mesh.dim == 3 else box.points[:, :, :1] * [1.0, 1.0, 0.0]
         seen = projection.pixels(layers.reshape(-1, 3)).reshape(*layers.shape[:3], 2)

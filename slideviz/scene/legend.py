@@ -19,7 +19,7 @@ from slideviz.plots.ticks import bar_ticks
 from slideviz.scene.actors import add_overlay, remove_actor
 from slideviz.scene.stage import STRIP, KeyedLayer, Stage
 from slideviz.session.state import Session
-from slideviz.terms import COLOR_BY, ROLES, ColorByTerm, Role
+from slideviz.terms import COLOR_BY, ROLES, ColorByTerm, Numbers, Role, WholeNumbers
 
 OPACITY = 0.82  # opacity of a plate, which covers the mesh
 Rect = tuple[float, float, float, float]
@@ -56,7 +56,7 @@ class LegendPlate:
         self._shape.point_data["color"] = np.array(colors, np.uint8)
         self._shape.set_active_scalars("color", preference="point")
 
-    def color_at(self, height: float) -> tuple[int, ...]:
+    def color_at(self, height: float) -> WholeNumbers:
         """Return red, green, blue and opacity (0 to 255) at a height from 0 to 1 of the view."""
         below = np.array(pv.Color(self._scheme.background).int_rgb, float)
         above = np.array(pv.Color(self._scheme.background_top).int_rgb, float)
@@ -264,7 +264,7 @@ class LegendLayer(KeyedLayer):
         self._mapper = pv.DataSetMapper()
         self._mapper.lookup_table = stage.table
         self._end = 0.0
-        self._placed: tuple[float, ...] = ()
+        self._placed: Numbers = ()
 
     def clear(self) -> None:
         super().clear()

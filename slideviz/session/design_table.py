@@ -25,6 +25,7 @@ from slideviz.design.sweeps.table import (
 )
 from slideviz.errors import CaseError
 from slideviz.system.csv_table import write_csv
+from slideviz.terms import Texts
 
 MOST = 100_000  # most designs of a table in the window
 FINE = 1e-5  # rounding error allowed for the values of a range, over the step between them
@@ -37,8 +38,8 @@ _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNO
 class DesignTable:
     """A table of designs and their results."""
 
-    columns: tuple[str, ...] = ()  # their names, as `slideviz.sweep` takes them
-    rows: tuple[tuple[str, ...], ...] = ()  # the values of each design, a text for each column
+    columns: Texts = ()  # their names, as `slideviz.sweep` takes them
+    rows: tuple[Texts, ...] = ()  # the values of each design, a text for each column
     results: Mapping[int, DesignRow] = field(default_factory=dict)
     """By the number of the design, from 1."""
 

@@ -36,7 +36,7 @@ from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.solver.rims import are_ready, on_walls
 from slideviz.system.atomic import write_whole
-from slideviz.terms import FfdSystem
+from slideviz.terms import FfdSystem, Numbers, Texts, WholeNumbers
 
 PLACEHOLDER = Path("table")
 """Stands for the file in messages of `parsed_displacements`; `TableRows.check` replaces it."""
@@ -129,7 +129,7 @@ DIGITS = 12
 """Significant digits of a centroid, relative to the extent of the mesh, and of a direction."""
 
 
-def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
+def centroid(mesh: Mesh, names: Iterable[str]) -> Numbers:
     """Return the mean of the nodes of some boundaries together, rounded to `DIGITS`."""
     digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
     nodes = mesh.nodes_of(set(names).intersection(mesh.marker_names))
@@ -146,7 +146,7 @@ def chord_of(mesh: Mesh, names: Iterable[str]) -> tuple[float, float]:
     return round(float(x.min()), digits) + 0.0, round(float(x.max()), digits)
 
 
-def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
+def radial(axis: Axis, point: Numbers) -> tuple[float, float, float] | None:
     """Return the unit direction from an axis to a point, perpendicular to it; None on the axis."""
     direction, origin = map(np.array, axis)
     arm = np.array((*point, 0.0)[:3]) - origin
@@ -198,7 +198,7 @@ def machine_axis(session: Session) -> Axis | None:
     return None if pair is None else (pair.axis, pair.origin)
 
 
-def wheel_passages(session: Session) -> tuple[int, ...]:
+def wheel_passages(session: Session) -> WholeNumbers:
     """Return how many passages make the wheel of each zone; () where a zone has none."""
     if session.mesh is None:
         return ()
@@ -209,7 +209,7 @@ def wheel_passages(session: Session) -> tuple[int, ...]:
     return counts if all(counts) and len(counts) == len(session.mesh.parts) else ()
 
 
-def box_names(session: Session) -> tuple[str, ...]:
+def box_names(session: Session) -> Texts:
     """Return the names of the FFD boxes that motions can use; () where boxes have mistakes."""
     if session.mesh is None:
         return ()

@@ -29,9 +29,10 @@ from slideviz.session import changes
 from slideviz.session.motions import lattices, machine_axis, new_target
 from slideviz.session.section_cuts import Cuts, can_cut
 from slideviz.session.state import Session
+from slideviz.terms import WholeNumbers
 
 Act = Literal["move", "turn", "grow"]
-Grip = tuple[Act, tuple[int, ...]]
+Grip = tuple[Act, WholeNumbers]
 """A part of a handle: what it does, and along or about which of `Placed.axes`; () where it is
 free."""
 Kind = TypeVar("Kind", bound=Motion)
@@ -85,7 +86,7 @@ class Placed(ABC):
     """The key that chooses each axis: x, y, z; a, r, t for axial, radial and tangential; n for a
     normal."""
 
-    free: ClassVar[tuple[int, ...]] = ()
+    free: ClassVar[WholeNumbers] = ()
     """The axes along which it moves where none was chosen; () for all."""
 
     @property
@@ -393,7 +394,7 @@ class PlacedSection(Placed):
         return not isinstance(self.section, AboutAxis)
 
     @property
-    def free(self) -> tuple[int, ...]:  # type: ignore[override]  # differs by shape
+    def free(self) -> WholeNumbers:  # type: ignore[override]  # differs by shape
         return (3,) if self.is_plane and self.dim == 3 else ()
 
     @property

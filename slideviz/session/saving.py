@@ -17,7 +17,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.sections.model import Section
 from slideviz.sections.span import between_walls, find_walls
 from slideviz.session.state import Run, Session, ViewState
-from slideviz.terms import SHOWN
+from slideviz.terms import SHOWN, Numbers, Texts
 
 
 @record
@@ -144,7 +144,7 @@ def title_of(session: Session) -> str:
     return f"{star}{shown_name(file)}{part} – slideviz" if file else "slideviz"
 
 
-Camera = tuple[float, ...]
+Camera = Numbers
 """Position, focal point and view-up (3 numbers each), and parallel scale (half the visible height);
 perhaps also width over height of the view."""
 
@@ -181,7 +181,7 @@ def view_to_case(session: Session, camera: Camera | None = None) -> Case:
     return session.case.change(view=changed)
 
 
-def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
+def view_from_case(case: Case, view: ViewState, names: Texts) -> ViewState:
     """Return the view that a case has; what it leaves out is taken from ``view``.
 
     ``names``: the boundaries of the mesh; other names of hidden boundaries are ignored.

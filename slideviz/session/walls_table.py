@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from slideviz.case.model import Case
 from slideviz.session.state import Session, StepFrame
+from slideviz.terms import Texts
 
 COLUMNS = ("Boundary", "First height", "Growth", "Equal", "Angle")
 """Titles of the columns in the window; each number is the worst of its boundary."""
@@ -31,9 +32,9 @@ class WallRow(NamedTuple):
 
     name: str
     layered: bool  # whether most of its facets have flat cells
-    before: tuple[str, ...]
-    after: tuple[str, ...]
-    change: tuple[str, ...]
+    before: Texts
+    after: Texts
+    change: Texts
     """`before`, `after`, `change`: of the undeformed mesh, the step that is shown, and both."""
     tip: str  # smallest, mean and largest of each number
 

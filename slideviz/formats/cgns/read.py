@@ -41,6 +41,7 @@ from slideviz.mesh.check import check_mesh
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.nearest import row_groups
+from slideviz.terms import Numbers, Texts
 
 JOINED = 1e-6
 """Largest distance of merged nodes, as a fraction of the extent: R4 coordinates are rounded so."""
@@ -57,7 +58,7 @@ class Interface:
     pairs: tuple[IntArray, IntArray] | None
     """((m,), (m,)) or None: nodes of the zone and of the donor that are the same point; None if it
     is not to be joined."""
-    period: tuple[float, ...] = ()
+    period: Numbers = ()
     """Centre and angles of the rotation, and translation; empty if it is not periodic."""
     why: str = ""  # reason why it cannot be joined, for a remark; empty if it can, or is periodic
 
@@ -143,7 +144,7 @@ def _interface(
     return Interface(node, zone, donor, None, why=why)
 
 
-def _period(node: Node) -> tuple[float, ...]:
+def _period(node: Node) -> Numbers:
     holder = node.child("GridConnectivityProperty_t")
     periodic = None if holder is None else holder.child("Periodic_t")
     if periodic is None:
@@ -242,7 +243,7 @@ class CgnsForm(Origin):
 
     ending = ".cgns"
     extras = "other contents that the CGNS file may have, such as zones and solutions"
-    datasets: tuple[tuple[str, ...], ...]
+    datasets: tuple[Texts, ...]
     """For each zone the paths of the datasets of its coordinates."""
     numbers: tuple[IntArray, ...]
     """tuple of (n_z,) int64: for each zone the index of each of its vertices among the points of
@@ -315,7 +316,7 @@ def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
 
 def _markers(
     mesh: Mesh, base: Node, zones: Sequence[CgnsZone], joined: Joined
-) -> tuple[tuple[Marker, ...], tuple[str, ...]]:
+) -> tuple[tuple[Marker, ...], Texts]:
     """Return the boundaries, and remarks (sentences) on those that are empty or not joined."""
     groups: dict[str, list[Cells]] = {}
     remarks: list[str] = []

@@ -19,6 +19,7 @@ from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import DIMS, ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums
+from slideviz.terms import Texts, WholeNumbers
 
 _NAMES = """
 Null UserDefined NODE BAR_2 BAR_3 TRI_3 TRI_6 QUAD_4 QUAD_8 QUAD_9 TETRA_4 TETRA_10 PYRA_5
@@ -185,14 +186,14 @@ class CgnsZone:
 
     node: Node  # its place in the tree
     dim: int  # the dimension of its cells
-    shape: tuple[int, ...]
+    shape: WholeNumbers
     """Vertices along i, j (and k) of a structured zone; their number in an unstructured one."""
     points: FloatArray  # (n, p): vertices, i running fastest; p is the number of coordinates
     cells: Cells  # its cells
     sides: CgnsElements | None
     """Elements of an unstructured zone with one dimension less; None for a structured zone."""
     sections: tuple[Node, ...]  # its sections of elements; empty for a structured zone
-    datasets: tuple[str, ...]  # paths of the datasets of the p coordinates
+    datasets: Texts  # paths of the datasets of the p coordinates
 
     @cached_property
     def outer(self) -> Cells:
@@ -249,7 +250,7 @@ def _refuse_rind(node: Node, words: str) -> None:
         raise rind.fault(words)
 
 
-def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:
+def _points(zone: Node, shape: WholeNumbers, count: int) -> tuple[FloatArray, Texts]:
     """Return the vertices (n, count) of a zone, and the paths of their datasets; or MeshError."""
     grid = zone.needed("GridCoordinates_t", "GridCoordinates")
     _refuse_rind(

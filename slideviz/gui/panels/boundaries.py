@@ -35,7 +35,7 @@ from slideviz.session import changes
 from slideviz.session.run_messages import idle_text
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import ROLES, labels
+from slideviz.terms import ROLES, Texts, labels
 
 NAME = 0  # the columns of the table
 COUNT = 1
@@ -256,7 +256,7 @@ class BoundariesPanel(Panel):
                 self.table.scrollTo(index)
 
     # Widgets to state ------------------------------------------------------------------
-    def selected(self) -> tuple[str, ...]:
+    def selected(self) -> Texts:
         rows = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
         return tuple(self._rows[row][0] for row in rows if self._rows[row][0])
 
@@ -277,14 +277,14 @@ class BoundariesPanel(Panel):
         if (choice := self._choices[row]) is not None:
             choice.showPopup()
 
-    def _boundaries(self, row: int) -> tuple[str, ...]:
+    def _boundaries(self, row: int) -> Texts:
         """Return the boundaries of a row: one, with those selected with it, or all of a zone."""
         name, zone = self._rows[row]
         if name:
             return self._with_selected(name)
         return tuple(name for name, other in self._rows if name and other == zone)
 
-    def _with_selected(self, name: str) -> tuple[str, ...]:
+    def _with_selected(self, name: str) -> Texts:
         """Return the selected boundaries if one is among them; else only this one."""
         chosen = self.selected()
         return chosen if name in chosen else (name,)
@@ -307,7 +307,7 @@ def _rows_of(session: Session) -> tuple[tuple[str, int], ...]:
     return tuple(rows)
 
 
-def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:
+def boundary_menu(parent: QWidget, store: Store, names: Texts) -> QMenu:
     """Return a new menu for the named boundaries: role, visibility. The 3D view shows it too."""
     menu = QMenu(parent)
     menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -36,7 +36,7 @@ from slideviz.gui.widgets.fields import (
 from slideviz.gui.widgets.panel import SpanWalls
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.session.motions import radial
-from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem
+from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem, Numbers, Texts, WholeNumbers
 
 ABOUT = {
     "centroid": "its centroid (mean of nodes)",
@@ -68,7 +68,7 @@ def _unchanged(value: Any) -> Any:
     return value
 
 
-def _integers(values: Sequence[float]) -> tuple[int, ...]:
+def _integers(values: Sequence[float]) -> WholeNumbers:
     return tuple(int(value) for value in values)
 
 
@@ -209,15 +209,15 @@ class MotionEditor(QWidget):
         self._motion: Any = None  # Motion | None
         self._dim = 3
         self._targets: tuple[Target, ...] = ()
-        self.centroid_of: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
+        self.centroid_of: Callable[[Target], Numbers] = lambda _: (0.0,) * self._dim
         """Returns a target's centroid, offered as the first fixed point."""
         self.chord_of: Callable[[Target], tuple[float, float]] = lambda _: (0.0, 1.0)
         """Returns from which x to which x a target goes."""
         self.machine: Axis | None = None
         """The axis about which the mesh repeats; None if it does not."""
-        self.boxes: tuple[str, ...] = ()
+        self.boxes: Texts = ()
         """The names of the boxes for free-form deformation that can be chosen."""
-        self.degrees: Mapping[str, tuple[int, ...]] = {}
+        self.degrees: Mapping[str, WholeNumbers] = {}
         """The degrees of those that are of the case, by name."""
         self.system: FfdSystem = "CARTESIAN"
         """The coordinates in which boxes are straight."""
@@ -492,7 +492,7 @@ class MotionEditor(QWidget):
         boxed = hasattr(self._motion, "box") and isinstance(value, tuple)
         return (*value, *before[len(value) :]) if boxed else value
 
-    def _degree_typed(self, values: tuple[float, ...]) -> None:
+    def _degree_typed(self, values: Numbers) -> None:
         before = self.degrees[self._motion.box]
         i, j, k = (*map(int, values), *before[len(values) :])
         self.box_changed.emit((i, j, k), None)

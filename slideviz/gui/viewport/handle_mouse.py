@@ -28,6 +28,7 @@ from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.placed import Act, Placed, placed
 from slideviz.session.store import Store
+from slideviz.terms import WholeNumbers
 
 ACTS: dict[int, Act] = {
     Qt.Key.Key_G: "move",
@@ -248,7 +249,7 @@ class HandleMouse(QObject):
             return
         axis = drag.placed.names.find(letter) if letter else -1
         if axis >= 0 and drag.placed.allows(drag.act, axis):
-            axes: tuple[int, ...] = (axis,)
+            axes: WholeNumbers = (axis,)
             across = modifiers & Qt.KeyboardModifier.ShiftModifier and drag.placed.dim == 3
             if across and axis < 3 and drag.act == "move":
                 axes = tuple(sorted({0, 1, 2} - {axis}))
@@ -262,7 +263,7 @@ class HandleMouse(QObject):
         self._follow(modifiers)
 
     # The drag --------------------------------------------------------------------------
-    def _begin(self, act: Act, axes: tuple[int, ...], start: FloatArray, point: FloatArray) -> None:
+    def _begin(self, act: Act, axes: WholeNumbers, start: FloatArray, point: FloatArray) -> None:
         now = self.placed()
         assert now is not None
         projection = Projection.of(self.view)
