@@ -16,7 +16,6 @@ from qtpy.QtWidgets import (
     QLabel,
     QPushButton,
     QScrollArea,
-    QSizePolicy,
     QToolButton,
     QWidget,
 )
@@ -34,6 +33,7 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
     rich_label,
+    set_policy,
     wrapped,
 )
 from slideviz.gui.widgets.theme import icon, logo, svg_pixmap
@@ -111,7 +111,7 @@ class StartPage(QScrollArea):
         )
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
-            button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+            set_policy(button, "Fixed", "Fixed")
         return WrappingRow([self.attempt], [self.open], spacing=10, apart=False)
 
     def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
@@ -128,7 +128,7 @@ class StartPage(QScrollArea):
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
             button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
             button.setCursor(Qt.CursorShape.PointingHandCursor)
-            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            set_policy(button, "Expanding", "Fixed")
             button.clicked.connect(lambda _=False, name=name: self.sample_wanted.emit(name))
             self.sample_buttons[name] = button
         self._place_cards()
@@ -217,7 +217,7 @@ class RecentButton(QPushButton):
         self.setProperty("recent", True)
         self.setAutoDefault(True)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        set_policy(self, "Ignored", "Fixed")
         when = when_changed(path)
         self.setEnabled(bool(when))
         self.setToolTip(wrapped(str(path) if when else f"{path} no longer exists."))

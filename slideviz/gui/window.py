@@ -16,7 +16,6 @@ from qtpy.QtWidgets import (
     QLineEdit,
     QMenu,
     QMenuBar,
-    QSizePolicy,
     QSpinBox,
     QToolBar,
     QWidget,
@@ -59,6 +58,7 @@ from slideviz.gui.widgets.build import (
     in_column,
     plain_labels,
     reveal,
+    set_policy,
     tool_button,
     wrapped,
 )
@@ -169,7 +169,7 @@ class ToolBar(QToolBar):
         self.addSeparator()
         self._add("fit", *(name for name, command in COMMANDS.items() if command.short))
         space = QWidget()
-        space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        set_policy(space, "Expanding", "Preferred")
         self.addWidget(space)
         self.zone = Choice({}, "Which zones of the file are open: all, or one.", "zone")
         self.zone.chosen.connect(window.files.open_zone)

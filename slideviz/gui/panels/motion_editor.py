@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QSizePolicy, QWidget
+from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QWidget
 
 from slideviz.case.motion_words import target_words
 from slideviz.case.motions.kinds import KINDS
@@ -23,7 +23,14 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.motions.span import curve_text, read_curve
 from slideviz.ffd.box import MOST_DEGREE
-from slideviz.gui.widgets.build import Choice, as_widget, grow_fields, in_row, push_button
+from slideviz.gui.widgets.build import (
+    Choice,
+    as_widget,
+    grow_fields,
+    in_row,
+    push_button,
+    set_policy,
+)
 from slideviz.gui.widgets.fields import (
     CheckedText,
     NumberField,
@@ -241,7 +248,7 @@ class MotionEditor(QWidget):
         self.browse.setMaximumWidth(30)
         tip = "Make a box of control points around the boundary: they are few, and can be moved."
         self.new_box = push_button("", tip, self.box_wanted, "new_box")
-        self.new_box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        set_policy(self.new_box, "Ignored", "Fixed")
         self.degree = VectorField((1, 1, 1), whole_degrees, "ijk", "Degree along each direction.")
         tip = "In which coordinates the boxes are straight, about an axis along x."
         self.coordinates = Choice({"CARTESIAN": "x, y, z", "CYLINDRICAL": "r, θ, x"}, tip)
@@ -281,7 +288,7 @@ class MotionEditor(QWidget):
             self.change,
             self.coordinates,
         ):
-            choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+            set_policy(choice, "Ignored", "Fixed")
 
     def _connect(self) -> None:
         self.kind.chosen.connect(self._kind_chosen)

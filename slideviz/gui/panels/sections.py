@@ -15,7 +15,6 @@ from qtpy.QtWidgets import (
     QListWidgetItem,
     QMenu,
     QPushButton,
-    QSizePolicy,
     QSlider,
     QWidget,
 )
@@ -35,6 +34,7 @@ from slideviz.gui.widgets.build import (
     in_column,
     in_row,
     push_button,
+    set_policy,
     tool_button,
     wrapped,
 )
@@ -357,7 +357,7 @@ class SectionsPanel(Panel):
         tools = (self.handle, self.flat, None, self.look, self.picture)
         self.tools = as_widget(in_row(*tools, spacing=5))
         self.rest = QWidget()
-        self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        set_policy(self.rest, "Preferred", "Expanding")
         parts = (*add, self.hint, self.list, self.editor, self.walls, self.tools, self.rest)
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=6)
 

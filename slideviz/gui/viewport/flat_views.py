@@ -10,14 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from qtpy.QtCore import QPoint, QRectF, Qt, Signal
 from qtpy.QtGui import QPainter, QPaintEvent, QPalette
-from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QSplitter, QWidget
+from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSplitter, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.viewing import CellMouse, TitleBar, Viewing
-from slideviz.gui.widgets.build import ALIGN_RIGHT, ElidedLabel, in_column
+from slideviz.gui.widgets.build import ALIGN_RIGHT, ElidedLabel, in_column, set_policy
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea
 from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of
 from slideviz.plots.section_paint import Paint, shown_paint
@@ -355,7 +355,7 @@ class FlatView(_SectionView):
         self.fit_button = self.title.add_button("fit", "Make the section fill this view", self.fit)
         self.view = View3D(self, multi_samples=multi_samples)
         self.view.setMinimumSize(120, 80)
-        self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        set_policy(self.view, "Ignored", "Ignored")
         self.view.set_flat(True)
         self.scene = FlatScene(self.view, cuts, scheme)
         self.across = Ruler(False)

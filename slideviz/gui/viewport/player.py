@@ -6,11 +6,11 @@ import math
 
 from qtpy.QtCore import QElapsedTimer, QSignalBlocker, QSize, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup, QResizeEvent, QTextDocument
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from slideviz.gui.commands import BY_NAME
 from slideviz.gui.responsiveness.timers import TICK_MS
-from slideviz.gui.widgets.build import ALIGN_RIGHT, Fitted, tool_button
+from slideviz.gui.widgets.build import ALIGN_RIGHT, Fitted, set_policy, tool_button
 from slideviz.gui.widgets.theme import alarm, set_icon
 from slideviz.session import changes
 from slideviz.session.run_messages import stopped_words
@@ -230,7 +230,7 @@ class ResultsLabel(Fitted, QLabel):
         self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.setAlignment(ALIGN_RIGHT)
         # Numbers that come and go may not take room from the view or the panels.
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        set_policy(self, "Ignored", "Preferred")
 
     def show_parts(self, forms: list[list[str]]) -> None:
         """Show numbers as rich text, given as a list of forms: each a list, the longest first."""

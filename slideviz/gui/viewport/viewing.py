@@ -11,7 +11,6 @@ from qtpy.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QMenu,
-    QSizePolicy,
     QToolButton,
     QToolTip,
     QWidget,
@@ -24,7 +23,7 @@ from slideviz.gui.panels.worst import info_text
 from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.handle_mouse import HandleMouse
-from slideviz.gui.widgets.build import ElidedLabel, Fitted, tool_button
+from slideviz.gui.widgets.build import ElidedLabel, Fitted, set_policy, tool_button
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.scene.stage import STRIP
@@ -163,12 +162,12 @@ class TitleBar(Fitted, QFrame):
         self.setObjectName(name)
         self._text = ""
         # A long title may not make one view wider than the other.
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        set_policy(self, "Ignored", "Fixed")
         self.setFixedHeight(26)
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(6, 0, 2, 0)
         self.label: ElidedLabel | QToolButton = self._drop_down(fill) if fill else ElidedLabel()
-        self.label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        set_policy(self.label, "Ignored", "Preferred")
         row.addWidget(self.label, 1)
         self.close_button = tool_button(closing, self.closed, text="✕")
         self.close_button.setAutoRaise(True)
@@ -307,7 +306,7 @@ class Viewing(QWidget):
         view = View3D(self, multi_samples=self._multi_samples)
         view.setMinimumSize(160, 120)
         # Two views get the same width, whatever their size hints are.
-        view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        set_policy(view, "Ignored", "Ignored")
         return view
 
     def _connect(self, view: View3D, scene: Scene) -> None:

@@ -19,7 +19,6 @@ from qtpy.QtWidgets import (
     QFrame,
     QPlainTextEdit,
     QPushButton,
-    QSizePolicy,
     QWidget,
 )
 
@@ -33,6 +32,7 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
     rich_label,
+    set_policy,
     set_style,
     tool_button,
 )
@@ -188,7 +188,7 @@ class MessageStrip(Fitted, QFrame):
         self.setObjectName("strip")
         self.text = LinkLabel()
         # A long sentence wraps; it must not make the window wider.
-        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        set_policy(self.text, "Ignored", "Preferred")
         self.count = tool_button("Show or hide the messages.", self.toggle, name="messages")
         self.rows: list[Banner] = []
         self._list = QWidget()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from qtpy.QtCore import (
     QEvent,
@@ -140,7 +140,7 @@ class ElidedLabel(QLabel):
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         # A long text must not make its container wider.
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        set_policy(self, "Ignored", "Fixed")
 
     @property
     def shown(self) -> str:
@@ -454,6 +454,14 @@ def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
     if align is not None:
         label.setAlignment(align)
     return label
+
+
+PolicyName = Literal["Fixed", "Preferred", "Expanding", "Ignored"]
+
+
+def set_policy(widget: QWidget, across: PolicyName, down: PolicyName) -> None:
+    """Set how a widget's width and height follow the space that there is, by Qt's names."""
+    widget.setSizePolicy(QSizePolicy.Policy[across], QSizePolicy.Policy[down])
 
 
 def set_style(widget: QWidget, name: str, value: bool) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 
 from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal, SignalInstance
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValidator, QWheelEvent
-from qtpy.QtWidgets import QApplication, QLabel, QLineEdit, QSizePolicy, QSpinBox, QWidget
+from qtpy.QtWidgets import QApplication, QLabel, QLineEdit, QSpinBox, QWidget
 
 from slideviz.errors import ROUNDING, SlidevizError
-from slideviz.gui.widgets.build import in_row, set_style, wrapped
+from slideviz.gui.widgets.build import in_row, set_policy, set_style, wrapped
 from slideviz.gui.widgets.services import main_window
 
 _ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")  # the letters that an expression may have
@@ -531,7 +531,7 @@ class VectorField(QWidget):
         self._good = self.value
         self._scale = 0.0
         self._compare()
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        set_policy(self, "Expanding", "Fixed")
 
     @property
     def value(self) -> tuple[float, ...]:

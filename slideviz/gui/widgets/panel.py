@@ -9,14 +9,14 @@ from contextlib import suppress
 
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtGui import QPaintEvent
-from qtpy.QtWidgets import QFormLayout, QLabel, QSizePolicy, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 
 from slideviz.case.keys import KEYS
 from slideviz.case.spans import span_ends
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import CaseError
 from slideviz.gui.responsiveness.timers import REST_MS, single_shot
-from slideviz.gui.widgets.build import Choice, in_row
+from slideviz.gui.widgets.build import Choice, in_row, set_policy
 from slideviz.gui.widgets.fields import CheckedField, NumberBox
 from slideviz.gui.widgets.plot_canvas import PlotCanvas, ask_and_write, is_seen
 from slideviz.gui.widgets.services import Services
@@ -207,7 +207,7 @@ class SpanWalls(Panel):
             lambda text: self.change(changes.set_case, span_axis=KEYS["SPAN_AXIS"].kind.read(text))
         )
         for end in self.ends:
-            end.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+            set_policy(end, "Ignored", "Fixed")
         self.along.setMinimumContentsLength(4)  # the names beside it need the room
         self._row = in_row(*self.ends, self.along, wide=self.ends, spacing=4)
         self._row.setContentsMargins(0, 0, 0, 0)

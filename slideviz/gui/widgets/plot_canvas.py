@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
-from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
+from qtpy.QtWidgets import QLabel, QStackedWidget, QWidget
 
 from slideviz.argument_types import record
 from slideviz.color_scheme import LIGHT, ColorScheme
@@ -23,7 +23,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.gui.responsiveness.timers import LOOK_MS, MOST_REST, REST_MS, REST_TIMES, single_shot
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.build import hint_label
+from slideviz.gui.widgets.build import hint_label, set_policy
 from slideviz.gui.widgets.services import main_window
 from slideviz.plots.figure_io import figure_bytes
 from slideviz.plots.style import PRINT, Style
@@ -170,7 +170,7 @@ class PlotCanvas(QWidget):
         self._look_after = QTimer(self, interval=LOOK_MS)
         self._look_after.timeout.connect(self._show_image)
         self.setMinimumSize(120, 100)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        set_policy(self, "Expanding", "Expanding")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
 
     @property

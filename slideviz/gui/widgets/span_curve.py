@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from qtpy.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from qtpy.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
-from qtpy.QtWidgets import QSizePolicy, QWidget
+from qtpy.QtWidgets import QWidget
 
 from slideviz.case.motions.span import SpanMotion, curve_text, read_curve
 from slideviz.gui.responsiveness.timers import single_shot
-from slideviz.gui.widgets.build import wrapped
+from slideviz.gui.widgets.build import set_policy, wrapped
 from slideviz.gui.widgets.fields import short_text
 from slideviz.machine.blade import curve_at
 from slideviz.mesh.model import FloatArray
@@ -61,7 +61,7 @@ class SpanCurveField(QWidget):
         self._range = self._fit()
         self._soon = single_shot(self, self._emit)
         self.setMinimumSize(120, 96)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        set_policy(self, "Expanding", "Expanding")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setToolTip(wrapped(TIP))
         self.setAccessibleName("Curve over the span")
