@@ -418,6 +418,9 @@ SERIES: Mapping[str, Callable[[], Iterable[Command | None]]] = {
 
 _TABLE = table_beside(__file__)
 _COPIES = _TABLE.pop("copies")
+PANEL_KEYS: Mapping[str, list[str]] = _TABLE.pop("panel_keys")
+MOUSE: Mapping[str, str] = _TABLE.pop("mouse")
+"""`PANEL_KEYS`, `MOUSE`: what keys and mouse do besides, for the palette."""
 BY_NAME: dict[str, Menu] = {}
 """All menus, also those in others."""
 RUN_MENU = _menu("of_run", **_TABLE.pop("of_run"))

@@ -16,7 +16,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui import running
-from slideviz.gui.dialogs.help import MOUSE, palette_entries
+from slideviz.gui.commands import MOUSE
+from slideviz.gui.dialogs.help import palette_entries
 from slideviz.gui.widgets.build import LETTERS, wrapped
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.session import changes
@@ -103,7 +104,7 @@ def test_words_explain_themselves_and_name_the_hovering(driver, passage_file, wi
     names = names[: names.index("About slideviz") + 1]
     assert len(set(names)) == len(names)
     assert {"Undeformed boundaries", "Undeformed mesh"} <= set(names)
-    assert any(keys.startswith("Rest on a cell") for keys, _what in MOUSE)
+    assert any(keys.startswith("Rest on a cell") for keys in MOUSE)
 
 
 def test_the_status_bar_follows_a_run_and_the_log_keeps_its_warnings(

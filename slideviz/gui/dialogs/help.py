@@ -39,7 +39,7 @@ from slideviz import __version__
 from slideviz.case.cfg import describe_keys
 from slideviz.case.keys import KEYS, Key
 from slideviz.case.words import counted
-from slideviz.gui.commands import COMMANDS, CommandState
+from slideviz.gui.commands import COMMANDS, MOUSE, PANEL_KEYS, CommandState
 from slideviz.gui.widgets.build import (
     dialog_buttons,
     fixed_font,
@@ -58,43 +58,6 @@ from slideviz.session.panes import run_title
 RECENT = 12  # entries that the palette has first, as they were chosen last
 LOG_LINES = 40  # number of the log's last lines in a bug report
 CLOSE = QDialogButtonBox.StandardButton.Close
-PANELS = (
-    ("Boundaries: choose the role", "F2, Return, Alt+Down", ""),
-    ("Motions: duplicate", "Ctrl+D", ""),
-    ("Motions: copy, paste", "Ctrl+C, Ctrl+V", "As in a case file."),
-    ("Motions: perform it earlier, later", "Ctrl+Up, Ctrl+Down", ""),
-    ("Motions: remove", "Del", ""),
-    ("Runs: give it a name", "F2", ""),
-    ("Sections: remove", "Del", ""),
-    ("Worst cells: fly to the cell", "Return", ""),
-    ("Worst cells: remove the mark", "Esc", ""),
-    ("Worst cells: copy", "Ctrl+C", "The selected rows, or all."),
-    ("Histogram: show all cells", "Esc", ""),
-    ("Handle: move, turn, enlarge what is chosen", "G, R, S", "While the mouse is in the view."),
-    ("Handle: along an axis; in a machine axial, radial, tangential", "X, Y, Z; A, R, T", ""),
-    ("Handle: in a plane", "Shift+X, Shift+Y, Shift+Z", ""),
-    ("Handle: type the number; snap; go finely", "0 to 9; Ctrl; Shift", ""),
-    ("Handle: keep what was done, take it back", "Return, Esc", ""),
-    ("A field: undo and redo typing", "Ctrl+Z, Ctrl+Y", ""),
-    ("A list: its menu", "Menu", ""),
-)
-"""The keys of the panels, for the panel that has the focus: action, keys, what it does."""
-MOUSE = (
-    ("Drag", "turn a 3D mesh, move a 2D one"),
-    ("Shift+Drag, middle button", "move"),
-    ("Click, Alt+Click on a box", "choose a control point, a row, a plane"),
-    ("Drag a handle", "move, turn or enlarge what is chosen"),
-    ("Wheel", "zoom about the mouse"),
-    ("Rest on a cell", "see its quality, shape and place"),
-    ("Double click, Alt+Click", "mark the cell below the mouse"),
-    ("Click", "select the boundary in front"),
-    ("Ctrl+Click", "select one more, or one less"),
-    ("Ctrl+Click on a run", "show it beside the one that is shown"),
-    ("Right click", "roles of the boundary, hide, isolate"),
-    ("Right click on a motion", "duplicate, copy, paste, order, remove"),
-    ("Drop a file", "open it"),
-)
-"""What the mouse does, and where."""
 
 
 class Help(QObject):
@@ -236,8 +199,9 @@ def palette_entries(helper: Help) -> Iterator[Entry]:
     folder = manual_folder()
     for _, path in manual_pages(folder) if folder is not None else ():
         yield Entry(page_title(path), "", "page of the manual", partial(helper.manual, path))
-    yield from (Entry(what, keys, about or "in its panel") for what, keys, about in PANELS)
-    yield from (Entry(what, keys, "mouse") for keys, what in MOUSE)
+    for what, (keys, *about) in PANEL_KEYS.items():
+        yield Entry(what, keys, "".join(about) or "in its panel")
+    yield from (Entry(what, keys, "mouse") for keys, what in MOUSE.items())
 
 
 class PaletteDialog(SearchDialog):
