@@ -69,6 +69,10 @@ class Displacements:
         return self.vectors[np.searchsorted(self.nodes, nodes)]
 
 
+PlacedDisplacements = dict[int, Displacements]
+"""Displacements from undeformed places, by the place of their motion in a case."""
+
+
 def read_displacements(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
     """Return the displacements that a file lists for ``nodes``, zero for those not in it.
 

@@ -42,7 +42,15 @@ from slideviz.case.values import (
     real,
     vector_text,
 )
-from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
+from slideviz.case.words import (
+    Words,
+    groups_of,
+    is_none,
+    list_of,
+    name_text,
+    number,
+    words_of,
+)
 from slideviz.errors import CaseError, Message, shown
 from slideviz.rbf.reduction import Reduction
 from slideviz.system.tables import table_beside
@@ -338,7 +346,7 @@ NUMBERS = 24  # coordinates of the 8 corners of a box
 IN_2D = 12  # those of the 4 corners that 2D uses
 
 
-def _groups(text: str) -> list[list[Word]]:
+def _groups(text: str) -> list[Words]:
     """Return the words of each box in a value, without brackets; none for ``NONE``."""
     words = words_of(text)
     return [] if is_none(words) else [group for group in groups_of(words) if group]
@@ -373,7 +381,7 @@ def _write_definition(boxes: tuple[Definition, ...]) -> str:
     )
 
 
-def _integers(words: list[Word], least: int) -> Degrees:
+def _integers(words: Words, least: int) -> Degrees:
     values = [number(word.text) for word in words]
     if len(values) != 3 or any(value != int(value) or value < least for value in values):
         listed = ", ".join(word.text for word in words)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from slideviz.case.motions.kinds import KIND_OF, KINDS
 from slideviz.case.motions.motion import ALL_MOVING, Motion, Target
 from slideviz.case.values import Kind
-from slideviz.case.words import Word, is_none, words_of
+from slideviz.case.words import Words, is_none, words_of
 from slideviz.errors import CaseError, Message, nearest, raise_all, shown
 
 
@@ -34,9 +34,9 @@ def write_motions(motions: tuple[Motion, ...]) -> str:
     return " ; \\\n    ".join(motion.text for motion in motions) or "( )"
 
 
-def _groups(words: list[Word], text: str) -> list[list[Word]]:
+def _groups(words: Words, text: str) -> list[Words]:
     """Return the words in each outer pair of brackets of ``text``, inner brackets as words."""
-    groups: list[list[Word]] = []
+    groups: list[Words] = []
     depth = 0
     if is_none(words):
         return []
@@ -60,7 +60,7 @@ def _groups(words: list[Word], text: str) -> list[list[Word]]:
     return groups
 
 
-def _read_motion(group: list[Word]) -> Motion:
+def _read_motion(group: Words) -> Motion:
     items = [word for word in group if not word.is_sign(",")]
     if len(items) < 2:
         raise CaseError(f"expected a marker and one of {', '.join(KIND_OF)}")
@@ -73,7 +73,7 @@ def _read_motion(group: list[Word]) -> Motion:
     return KIND_OF[verb].read(marker, verb, items[1:])
 
 
-def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
+def _read_target(items: Words) -> tuple[Target, Words]:
     head = items[0]
     if not head.is_sign("("):
         if not head.text or head.is_sign(")"):

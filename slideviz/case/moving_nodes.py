@@ -7,13 +7,13 @@ lost the last digits of a small displacement.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from slideviz.case.check import marker_problems, motion_problems
-from slideviz.case.displacement import Displacements, NodesOn
+from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.model import Case
 from slideviz.case.motions.file import Prescribed
 from slideviz.case.motions.kinds import FAMILIES
@@ -24,9 +24,6 @@ from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.zones import names_in
 
-PlacedDisplacements = Mapping[int, Displacements]
-"""Displacements from undeformed places, by the place of their motion in a case."""
-
 
 def placed_displacements(
     case: Case,
@@ -34,13 +31,13 @@ def placed_displacements(
     on: NodesOn,
     problems: list[Message],
     families: Iterable[type[Motion]] = FAMILIES,
-) -> dict[int, Displacements]:
+) -> PlacedDisplacements:
     """Return the displacements from undeformed places, by the place of their motion in a case.
 
     ``on`` has the nodes (k,) of each moving marker. Sentences on files that cannot be read or have
     mistakes, boxes without nodes and the like are added to ``problems``.
     """
-    found: dict[int, Displacements] = {}
+    found: PlacedDisplacements = {}
     for family in families:
         if isinstance(mesh, Assembly) and family.in_zones:
             found |= _of_zones(case, mesh, on, problems, family)
@@ -55,7 +52,7 @@ def _of_zones(
     on: NodesOn,
     problems: list[Message],
     family: type[Motion],
-) -> dict[int, Displacements]:
+) -> PlacedDisplacements:
     """Return what the displacements of each zone are together, by the place in the case."""
     parts: dict[int, list[Displacements]] = {}
     for part, (zone_case, zone) in zip(mesh.parts, each_zone(case, mesh), strict=True):
@@ -81,7 +78,7 @@ def _of_zones(
     }
 
 
-def required_displacements(case: Case, mesh: Mesh, on: NodesOn) -> dict[int, Displacements]:
+def required_displacements(case: Case, mesh: Mesh, on: NodesOn) -> PlacedDisplacements:
     """Return what `placed_displacements` does; CaseError with all problems, if there are any."""
     problems = list[Message]()
     try:

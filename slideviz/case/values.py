@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from slideviz.case.words import (
     Word,
+    Words,
     check_writable,
     counted,
     is_none,
@@ -164,7 +165,7 @@ def path_text(path: Path) -> str:
     return '"' + text.replace('"', '""') + '"'
 
 
-def _names(items: list[Word]) -> tuple[str, ...]:
+def _names(items: Words) -> tuple[str, ...]:
     names = [item.text for item in items]
     if "" in names:
         raise CaseError("a marker has an empty name; give one")
@@ -190,7 +191,7 @@ def _read_ends(text: str) -> tuple[str, str] | None:
     return names[0], names[1]
 
 
-def _is_su2_form(items: list[Word]) -> bool:
+def _is_su2_form(items: Words) -> bool:
     if not items or len(items) % _SU2_GROUP:
         return False
     groups = [items[i : i + _SU2_GROUP] for i in range(0, len(items), _SU2_GROUP)]
@@ -228,14 +229,14 @@ def _remark_pairs(text: str) -> str:
     )
 
 
-def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
+def read_vector(items: Words, what: str) -> tuple[float, ...]:
     """Return the 2 or 3 numbers of a vector, called ``what`` in messages; or raise CaseError."""
     if len(items) not in (2, 3):
         raise CaseError(f"{what} has {len(items)} values; expected 2 or 3 numbers")
     return tuple(number(item.text) for item in items)
 
 
-def read_axis(items: list[Word]) -> Vector:
+def read_axis(items: Words) -> Vector:
     """Return the direction ``x``, ``y``, ``z`` or of three numbers, of any length; or CaseError."""
     if len(items) == 1 and items[0].text.lower() in AXES:
         return AXES[items[0].text.lower()]

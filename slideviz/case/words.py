@@ -38,7 +38,10 @@ class Word:
         return not self.quoted and is_number(self.text)
 
 
-def words_of(text: str) -> list[Word]:
+Words = list[Word]
+
+
+def words_of(text: str) -> Words:
     """Return the words of a value, brackets and separators among them, or raise CaseError."""
     words = []
     for match in _WORD.finditer(text):
@@ -51,9 +54,9 @@ def words_of(text: str) -> list[Word]:
     return words
 
 
-def groups_of(words: Iterable[Word]) -> list[list[Word]]:
+def groups_of(words: Iterable[Word]) -> list[Words]:
     """Return the words of each part between semicolons, without brackets and commas."""
-    groups: list[list[Word]] = [[]]
+    groups: list[Words] = [[]]
     for word in words:
         if word.is_sign(";"):
             groups.append([])
@@ -73,7 +76,7 @@ def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
     return line
 
 
-def list_of(text: str) -> list[Word]:
+def list_of(text: str) -> Words:
     """Return the items of ``(A, B)``, ``A, B`` or ``A B``; [] for ``( )``, ``(NONE)``."""
     words = words_of(text)
     opened = bool(words) and words[0].is_sign("(")

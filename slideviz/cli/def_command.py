@@ -7,7 +7,6 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 from slideviz import write
 from slideviz.case.model import Case
@@ -21,6 +20,7 @@ from slideviz.cli.output_paths import (
 )
 from slideviz.cli.report import (
     CELLS,
+    Report,
     print_remarks,
     report_outcome,
     run_report,
@@ -139,7 +139,7 @@ def _relaxation_told(config: Su2Config) -> Iterator[None]:
         raise
 
 
-def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
+def variable_rows(surface: MovingSurface) -> list[Report]:
     """Return the entry of the report for each value of the design variables."""
     variables = surface.config.variables
     idle = surface.idle

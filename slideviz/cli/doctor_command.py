@@ -24,7 +24,7 @@ from slideviz.system.platform import free_memory, needs_server
 
 Problem = tuple[str, str]
 """What is missing or wrong, and the line that mends it."""
-Rows = Iterator[tuple[str, object] | Problem]
+Rows = Iterator[tuple[str, object]]
 
 LEAST_MEMORY = 2 << 30  # bytes below which a window with a small mesh may not start
 LEAST_DISK = 1 << 29  # bytes; compiled loops take a tenth of it
@@ -41,7 +41,7 @@ class Report:
         self.sections: dict[str, dict[str, object]] = {}
         self.problems: list[Problem] = []
 
-    def add(self, name: str, look: Callable[[Report], Iterator[tuple[str, object]]]) -> None:
+    def add(self, name: str, look: Callable[[Report], Rows]) -> None:
         """Add the rows of a section; that it cannot be examined is a problem."""
         rows: dict[str, object] = {}
         try:
@@ -75,14 +75,14 @@ def main(arguments: Namespace) -> int:
     return DONE
 
 
-def _program(_: Report) -> Iterator[tuple[str, object]]:
+def _program(_: Report) -> Rows:
     frozen = ", in a folder of its own" if getattr(sys, "frozen", False) else ""
     yield "slideviz", f"{__version__}, {Path(__file__).parents[1]}"
     yield "Python", f"{platform.python_version()}{frozen}, {sys.executable}"
     yield "system", platform.platform()
 
 
-def _packages(report: Report) -> Iterator[tuple[str, object]]:
+def _packages(report: Report) -> Rows:
     needed = [line for line in metadata.requires("slideviz") or () if "extra ==" not in line]
     for name in dict.fromkeys(re.split(r"[^\w.-]", line)[0] for line in needed):
         try:
@@ -98,7 +98,7 @@ def _packages(report: Report) -> Iterator[tuple[str, object]]:
     yield "mpirun", shutil.which("mpirun") or "not installed (optional)"
 
 
-def _threads(_: Report) -> Iterator[tuple[str, object]]:
+def _threads(_: Report) -> Rows:
     # Late: Numba takes 0.3 s, and may be missing.
     import scipy.linalg  # noqa: F401  # loads its BLAS
     from threadpoolctl import threadpool_info
@@ -113,7 +113,7 @@ def _threads(_: Report) -> Iterator[tuple[str, object]]:
         yield f"{pool['user_api']} of {pool['prefix']}", words
 
 
-def _memory(report: Report) -> Iterator[tuple[str, object]]:
+def _memory(report: Report) -> Rows:
     free = free_memory()
     yield "free", _size(free)
     if free < LEAST_MEMORY:
@@ -121,7 +121,7 @@ def _memory(report: Report) -> Iterator[tuple[str, object]]:
         report.problems.append((f"only {_size(free)} of memory are free", remedy))
 
 
-def _caches(report: Report) -> Iterator[tuple[str, object]]:
+def _caches(report: Report) -> Rows:
     # Late: Numba takes 0.3 s, and may be missing.
     from slideviz.rbf.compiled import sum_plain
 
@@ -137,7 +137,7 @@ def _caches(report: Report) -> Iterator[tuple[str, object]]:
             report.problems.append((f"only {_size(free)} are free for {name}", remedy))
 
 
-def _drawing(report: Report) -> Iterator[tuple[str, object]]:
+def _drawing(report: Report) -> Rows:
     # Late: VTK takes 0.6 s, and may be missing.
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
@@ -170,7 +170,7 @@ def _drawing(report: Report) -> Iterator[tuple[str, object]]:
     yield "GPU", "none used: OpenGL draws in software" if software else "used for drawing"
 
 
-def _computing(_: Report) -> Iterator[tuple[str, object]]:
+def _computing(_: Report) -> Rows:
     # Late: SciPy takes 0.1 s, and may be missing.
     from slideviz.system.device import card_name, why_no_card
 

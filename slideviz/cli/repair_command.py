@@ -5,12 +5,11 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
-from typing import Any
 
 from slideviz import quality, read, repair, write
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, quality_lines, save_report
+from slideviz.cli.report import Report, print_remarks, quality_lines, save_report
 from slideviz.cli.terminal import DONE, INVERTED, say
 from slideviz.formats.files import quality_data
 from slideviz.formats.losses import warning_of_losses
@@ -54,7 +53,7 @@ def main(arguments: Namespace) -> int:
     found = quality(done.mesh, reference, arguments.metric)
     data = quality_data(output, found)
     write(output, done.mesh, overwrite=arguments.force, cell_data=data, base=mesh)
-    report: dict[str, Any] = {
+    report: Report = {
         "mesh": str(path),
         "output": str(output),
         "reference": str(arguments.reference) if arguments.reference else None,
@@ -79,7 +78,7 @@ def main(arguments: Namespace) -> int:
     return DONE
 
 
-def _print(report: dict[str, Any], words: str, found: Quality, before: Quality) -> None:
+def _print(report: Report, words: str, found: Quality, before: Quality) -> None:
     print(f"{report['mesh']}: {words}")
     print(quality_lines(found, before, "before"))
     print(f"  {report['seconds']['total']:.2f} s")

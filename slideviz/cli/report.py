@@ -38,6 +38,8 @@ from slideviz.system.atomic import atomic_write, write_whole
 from slideviz.system.csv_table import write_csv
 from slideviz.terms import NO_REFERENCE, WALL_VALUES, Metric, Quantity, field_of
 
+Report = dict[str, Any]
+ReportPart = Mapping[str, Any]
 LISTED = 100  # most inverted cells listed in a report
 MOST_WALLS = 6  # most boundaries whose layers a summary has
 WORST = 10  # cells of lowest quality listed in a report
@@ -53,7 +55,7 @@ CYCLE_KEYS = ("cycle", "level", "error", "control_nodes", "seconds")
 """The fields of `Cycle` that a report has, under the same keys."""
 
 
-def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> dict[str, Any]:
+def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> Report:
     """Return the JSON object of ``run --json``; ``seconds``: by phase, besides the steps' own."""
     mesh = done.mesh
     steps = done.steps
@@ -120,7 +122,7 @@ def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> dic
 
 def limits_report(
     results: Sequence[LimitResult], before: Sequence[LimitResult] = ()
-) -> list[dict[str, Any]]:
+) -> list[Report]:
     """Return the JSON array of limits, with ``before`` deforming if known, and the worst cells."""
 
     def actual(result: LimitResult | None) -> float | None:
@@ -145,16 +147,16 @@ def limits_report(
     ]
 
 
-def metrics_report(found: Mapping[Metric, MetricValues]) -> dict[str, Any]:
+def metrics_report(found: Mapping[Metric, MetricValues]) -> Report:
     """Return the summaries of metrics of a mesh, by the names of their fields."""
     return {field_of(name): values.summary() for name, values in found.items()}
 
 
 def metric_lines(
     names: Sequence[Quantity],
-    after: Mapping[str, Any],
-    before: Mapping[str, Any] | None = None,
-    walls: Mapping[str, Any] | None = None,
+    after: ReportPart,
+    before: ReportPart | None = None,
+    walls: ReportPart | None = None,
 ) -> str:
     """Return the metrics of a mesh and of the undeformed one: a heading and a table.
 
@@ -182,17 +184,17 @@ def metric_lines(
     return "\n".join(["metrics:", *lines])
 
 
-def _ends(one: Mapping[str, Any]) -> tuple[str, ...]:
+def _ends(one: ReportPart) -> tuple[str, ...]:
     return tuple("inf" if one[k] is None else f"{one[k]:.6g}" for k in ("min", "mean", "max"))
 
 
-def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
+def limit_lines(report: Sequence[ReportPart]) -> str:
     """Return the limits of a report as a text table."""
     rows = [(entry["limit"], *limit_words(entry)) for entry in report]
     return table(rows if any(row[2] for row in rows) else [(*row[:2], row[3]) for row in rows])
 
 
-def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
+def limit_words(entry: ReportPart) -> tuple[str, str, str]:
     """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4`` or "", ``not met``."""
     names = entry["boundaries"]
     value = value_words(entry["actual"], entry["failing"], names)
@@ -226,11 +228,11 @@ def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[in
     return dict(zip(cells.tolist(), zip(types, when, strict=True), strict=True))
 
 
-def _fields(value: object, keys: Iterable[str]) -> dict[str, Any]:
+def _fields(value: object, keys: Iterable[str]) -> Report:
     return {key: getattr(value, key) for key in keys}
 
 
-def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> dict[str, Any]:
+def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> Report:
     """Return the JSON object of ``quality --json``; ``worst`` has numbers and types of cells."""
     counts, edges = quality.histogram()
     return {
@@ -246,9 +248,7 @@ def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]
     }
 
 
-def info_report(
-    mesh: Mesh, pairs: Sequence[Any], counts: CellCounts, quality: Quality
-) -> dict[str, Any]:
+def info_report(mesh: Mesh, pairs: Sequence[Any], counts: CellCounts, quality: Quality) -> Report:
     """Return the JSON object of ``info --json``; ``mesh`` may be only the skin of the mesh."""
     low = mesh.points.min(axis=0)
     high = mesh.points.max(axis=0)
@@ -316,7 +316,7 @@ def _text(value: object) -> str:
     raise TypeError(f"a report cannot have {value!r}")
 
 
-def save_report(arguments: Namespace, report: Mapping[str, Any]) -> bool:
+def save_report(arguments: Namespace, report: ReportPart) -> bool:
     """Write a report to the file of --json, or print it; return whether words are printed, too."""
     path = arguments.json
     text = json.dumps(report, indent=2, default=_text) + "\n" if path else ""
@@ -328,7 +328,7 @@ def save_report(arguments: Namespace, report: Mapping[str, Any]) -> bool:
     return not arguments.quiet
 
 
-def save_history(path: Path, report: Mapping[str, Any]) -> None:
+def save_history(path: Path, report: ReportPart) -> None:
     """Write the convergence of the data reduction as CSV, a row for each cycle."""
     columns = ("step", *CYCLE_KEYS)
     rows = [[repr(row[name]) for name in columns] for row in report["convergence"]]
@@ -424,7 +424,7 @@ def report_outcome(
     return report_limits(report["limits"], advice)
 
 
-def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
+def report_limits(limits: Sequence[ReportPart], advice: str = "") -> int:
     """Print the limits of a report that are not met to stderr, and advice; return the exit code."""
     missed = [entry for entry in limits if not entry["passed"]]
     for entry in missed:
@@ -513,13 +513,13 @@ def _print_run(
             print(f"{name}: {path}")
 
 
-def _trial_words(trial: Mapping[str, Any]) -> str:
+def _trial_words(trial: ReportPart) -> str:
     halved = f", halved to {trial['steps']}" if trial["steps"] != trial["planned"] else ""
     result = f"{trial['inverted']} inverted" if trial["inverted"] else f"minimum {trial['min']:.3g}"
     return f"{trial['planned']} ({result}{halved})"
 
 
-def _advice(case: Case, done: RunResult, limits: Sequence[Mapping[str, Any]]) -> str:
+def _advice(case: Case, done: RunResult, limits: Sequence[ReportPart]) -> str:
     """Return what may help against inverted cells or missed limits: remedies, with keys.
 
     ``limits`` are those of the report. Of a mesh in a file neither the pitch nor boundaries beside

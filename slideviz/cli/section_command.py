@@ -6,7 +6,6 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli.mesh_source import open_mesh, optional_case, progress_of
 from slideviz.cli.output_paths import OutputPath, require_output_paths
-from slideviz.cli.report import reference_words, save_report
+from slideviz.cli.report import Report, reference_words, save_report
 from slideviz.cli.terminal import DONE, INVERTED
 from slideviz.errors import CaseError
 from slideviz.export.flat_section import section as draw
@@ -114,7 +113,7 @@ def _report(arguments: Namespace, scene: _Scene, shown: SectionInRun) -> int:
     chosen = scene.chosen
     summary = shown.paint.summary(shown.ids)
     summary["worst_cell"] = mesh.cell_number(int(summary["worst_cell"]))
-    report: dict[str, Any] = {
+    report: Report = {
         "mesh": mesh.name,
         "section": _as_json(chosen),
         "color": shown.paint.label,
@@ -169,7 +168,7 @@ def _meridional(arguments: Namespace, case: Case | None) -> int:
         }
         for one in bins
     ]
-    report: dict[str, Any] = {
+    report: Report = {
         "mesh": mesh.name,
         "color": painted.label,
         "reference": str(reference) if reference else None,
@@ -239,7 +238,7 @@ def _section_and_passages(
     return chosen, passages(pair, arguments.copies)
 
 
-def _between(walls: SpanWalls | None) -> dict[str, Any]:
+def _between(walls: SpanWalls | None) -> Report:
     """Return hub and shroud of each zone with a span."""
     pairs = [[one.hub, one.shroud] for one in walls.channels] if walls is not None else []
     if not pairs:
@@ -247,7 +246,7 @@ def _between(walls: SpanWalls | None) -> dict[str, Any]:
     return {"between": pairs[0] if len(pairs) == 1 else pairs}
 
 
-def _as_json(chosen: Section) -> dict[str, Any]:
+def _as_json(chosen: Section) -> Report:
     size = chosen.terms.size
     sizes = {} if size is None else {size.field: chosen.size}
     return {

@@ -18,7 +18,7 @@ from slideviz.case.words import counted, first_of
 from slideviz.cli.mesh_source import read_case, read_mesh, require_mesh_file
 from slideviz.cli.output_paths import OutputPath, require_output_paths
 from slideviz.cli.progress import Bar
-from slideviz.cli.report import print_remarks, save_report, table
+from slideviz.cli.report import Report, print_remarks, save_report, table
 from slideviz.cli.terminal import DONE
 from slideviz.design.sweeps.table import (
     RESULTS,
@@ -149,7 +149,7 @@ def _pulled(
 
 def _report(
     arguments: Namespace, designs: Designs, rows: Sequence[DesignRow], seconds: float
-) -> dict[str, Any]:
+) -> Report:
     done = sorted((row for row in rows if not row.problem), key=lambda row: (-row.min, row.design))
     fresh = [row for row in rows if not row.earlier]
     return {
@@ -168,7 +168,7 @@ def _report(
     }
 
 
-def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
+def _missed(rows: Sequence[DesignRow]) -> list[Report]:
     """Return the entry of a report for each limit that designs miss: limit and their numbers."""
     missed = grouped(
         (text.rpartition(": ")[0], row.design)
@@ -179,11 +179,11 @@ def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     return [{"limit": limit, "designs": designs} for limit, designs in missed.items()]
 
 
-def _named(row: DesignRow) -> dict[str, Any]:
+def _named(row: DesignRow) -> Report:
     return {"design": row.design, "min": row.min, "mean": row.mean, "values": dict(row.values)}
 
 
-def _print_sweep(report: dict[str, Any]) -> None:
+def _print_sweep(report: Report) -> None:
     seconds = report["seconds"]
     fresh = report["designs"] - report["earlier"]
     earlier = f" ({report['earlier']} were there)" if report["earlier"] else ""

@@ -31,7 +31,7 @@ from slideviz.export.titles import (
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
 from slideviz.session.changes import show_frame
-from slideviz.session.pieces import CheckCancelled, InThread, run_inline
+from slideviz.session.pieces import CheckCancelled, InThread, Pieces, run_inline
 from slideviz.session.state import Session, StepFrame, planned_steps
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
@@ -126,7 +126,7 @@ class FilmProgress:
     total: int
 
 
-def draw_images(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
+def draw_images(pieces: Pieces) -> Generator[FilmProgress, None, None]:
     """Do all pieces of a film here, without threads, and yield its progress after each image."""
     run = run_inline(pieces)
     try:
@@ -140,7 +140,7 @@ def render_frames(
     file: Path,
     film_options: FilmOptions,
     draw: Callable[[float], Generator[object, Any, Pixels]],
-) -> Generator[object, Any, None]:
+) -> Pieces:
     """Draw and encode all images; yield `FilmProgress` after each one, and between its pieces.
 
     Encoding is yielded as `InThread`, to be done in a thread. ``frames``: number of the undeformed
@@ -238,7 +238,7 @@ def film_steps(
     *,
     named: bool = True,
     overwrite: bool = False,
-) -> Generator[object, Any, None]:
+) -> Pieces:
     """Write a film drawn by a renderer; yield `FilmProgress` after each image, and between pieces.
 
     The rest is as for `film`. ``renderer``: holds the session, whose steps are shown, and the
@@ -274,9 +274,7 @@ def film_steps(
     yield from render_frames(len(longest.frames), file, film_options, draw)
 
 
-def aim_at_largest(
-    renderer: OffscreenRenderer, options: PictureOptions
-) -> Generator[object, Any, None]:
+def aim_at_largest(renderer: OffscreenRenderer, options: PictureOptions) -> Pieces:
     """Aim a renderer's camera so that the largest step is seen whole, yielding between pieces."""
     yield from renderer.prepare_steps()
     frames = renderer.session.frames

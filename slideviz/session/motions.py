@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.case.displacement import Displacements, parsed_displacements
+from slideviz.case.displacement import Displacements, PlacedDisplacements, parsed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case
 from slideviz.case.motions.box import (
@@ -399,7 +399,7 @@ class Ghosts:
             for name in case.markers_with("moving")
             if name in self._nodes and any(applies_to(motion, name) for motion in case.motions)
         }
-        placed: dict[int, Displacements] = {}
+        placed: PlacedDisplacements = {}
         for family in FAMILIES:
             if family.takes_time and not (wait or is_laid(case, self.mesh)):
                 continue

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 CheckCancelled = Callable[[], None]
 """A function that is called often, and raises `slideviz.errors.Cancelled` to end the work."""
 Result = TypeVar("Result")
+Pieces = Generator[object, Any, None]
 
 PART_CELLS = 10_000  # faces that are sent to the graphics card in one piece
 

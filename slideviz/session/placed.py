@@ -33,19 +33,20 @@ from slideviz.terms import WholeNumbers
 
 Act = Literal["move", "turn", "grow"]
 Grip = tuple[Act, WholeNumbers]
+Grips = tuple[Grip, ...]
 """A part of a handle: what it does, and along or about which of `Placed.axes`; () where it is
 free."""
 Kind = TypeVar("Kind", bound=Motion)
 
-_PLANES: tuple[Grip, ...] = (("move", (0, 1)), ("move", (1, 2)), ("move", (0, 2)))
-_SHOVES: tuple[Grip, ...] = (("move", (0,)), ("move", (1,)), ("move", (2,)))
-_RINGS: tuple[Grip, ...] = (("turn", (0,)), ("turn", (1,)), ("turn", (2,)))
-_TILTS: tuple[Grip, ...] = (("turn", (4,)), ("turn", (5,)))
+_PLANES: Grips = (("move", (0, 1)), ("move", (1, 2)), ("move", (0, 2)))
+_SHOVES: Grips = (("move", (0,)), ("move", (1,)), ("move", (2,)))
+_RINGS: Grips = (("turn", (0,)), ("turn", (1,)), ("turn", (2,)))
+_TILTS: Grips = (("turn", (4,)), ("turn", (5,)))
 _BALL: Grip = ("move", ())
 _SIZE: Grip = ("grow", ())
-SPACE: tuple[Grip, ...] = (_BALL, *_PLANES, *_SHOVES)
+SPACE: Grips = (_BALL, *_PLANES, *_SHOVES)
 """Grips that move something in space; `FLAT`: in the plane of a 2D mesh."""
-FLAT: tuple[Grip, ...] = (_BALL, *_SHOVES[:2])
+FLAT: Grips = (_BALL, *_SHOVES[:2])
 _ALONG = 1.0 - 1e-9  # cosine from which two directions are the same
 _LEAST = 1e-3
 """Least factor or size, relative to that before; distance from the largest one, relative to it."""
@@ -106,7 +107,7 @@ class Placed(ABC):
 
     @property
     @abstractmethod
-    def grips(self) -> tuple[Grip, ...]:
+    def grips(self) -> Grips:
         """Return the parts of its handle."""
 
     @property
@@ -198,11 +199,11 @@ class PlacedBoundary(Placed):
         return self.session.case.motions
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def grips(self) -> Grips:
         if self.dim == 2:
             return *FLAT, _RINGS[2], ("grow", (0,)), ("grow", (1,))
         chosen = None if self.index is None else self.motions[self.index]
-        mine: tuple[Grip, ...] = (("turn", ()),) if isinstance(chosen, Rotate) else ()
+        mine: Grips = (("turn", ()),) if isinstance(chosen, Rotate) else ()
         return *SPACE, *mine, *_RINGS, ("grow", (0,)), ("grow", (1,)), ("grow", (2,))
 
     def _find(self, kind: type[Kind], fits: Callable[[Any], bool], new: Kind) -> tuple[int, Kind]:
@@ -323,7 +324,7 @@ class PlacedRadius(PlacedBoundary):
     """Boundaries that a motion pushes away from an axis."""
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def grips(self) -> Grips:
         return (("grow", ()),)
 
     def grow(self, axis: int | None) -> Number | None:
@@ -361,7 +362,7 @@ class PlacedControl(Placed):
         return motion
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def grips(self) -> Grips:
         if self.dim == 2:
             return FLAT
         return SPACE if self.system.kind == "CARTESIAN" else (_BALL, *_SHOVES)
@@ -398,7 +399,7 @@ class PlacedSection(Placed):
         return (3,) if self.is_plane and self.dim == 3 else ()
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def grips(self) -> Grips:
         if self.is_plane:
             return _BALL, ("move", (3,)), *(_RINGS[2:] if self.dim == 2 else _TILTS)
         return (*FLAT, _SIZE) if self.dim == 2 else (_SIZE,)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from slideviz import terms
-from slideviz.case.displacement import Displacements, NodesOn
+from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
     NewMotion,
@@ -22,7 +22,7 @@ from slideviz.case.motions.motion import (
     vector_words,
     without_brackets,
 )
-from slideviz.case.words import Word, counted, number
+from slideviz.case.words import Words, counted, number
 from slideviz.errors import CaseError, Doubt, Message, not_one_of
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -102,8 +102,8 @@ class OnAirfoil(Motion):
     @classmethod
     def placed(
         cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
-    ) -> dict[int, Displacements]:
-        found: dict[int, Displacements] = {}
+    ) -> PlacedDisplacements:
+        found: PlacedDisplacements = {}
         for place, motion in enumerate(case.motions):
             markers = [name for name in on if applies_to(motion, name)]
             if not markers or not isinstance(motion, OnAirfoil):
@@ -129,7 +129,7 @@ class OnAirfoil(Motion):
 
     @classmethod
     def numbers(
-        cls, words: list[Word], before: int, allowed: tuple[int, ...], side: str = ""
+        cls, words: Words, before: int, allowed: tuple[int, ...], side: str = ""
     ) -> tuple[list[float], tuple[float, float]]:
         """Return ``before`` numbers of shape and height, and the two of the chord, in words.
 
@@ -169,7 +169,7 @@ class OneSided(OnAirfoil):
 
     @classmethod
     def sided_numbers(
-        cls, words: list[Word], before: int
+        cls, words: Words, before: int
     ) -> tuple[terms.Side, list[float], tuple[float, float]]:
         """Return the side, and what `numbers` returns of the words after it."""
         items = without_brackets(words)
@@ -228,7 +228,7 @@ class HicksHenne(_WithPeak, OneSided):
     form = "hicks-henne, {side}, peak, height, or besides x0, x1 of the chord"
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         side, (peak, height), chord = cls.sided_numbers(words, 2)
         require_peak(peak)
         return cls(marker, height, peak, side, chord)
@@ -266,7 +266,7 @@ class Cst(OneSided):
     form = "cst, {side}, k, n, height, or besides x0, x1 of the chord"
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         side, (k, n, height), chord = cls.sided_numbers(words, 3)
         return cls(marker, height, term_of(k, n), side, chord)
 
@@ -300,7 +300,7 @@ class Bump(_WithPeak):
     form = "bump, peak, height, x0, x1"
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         (peak, height), chord = cls.numbers(without_brackets(words), 2, (4,))
         require_peak(peak)
         return cls(marker, height, peak, chord)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.displacement import Displacements, NodesOn
+from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
     NewMotion,
@@ -24,7 +24,7 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
-from slideviz.case.words import Word, angle_deg, name_text, number
+from slideviz.case.words import Words, angle_deg, name_text, number
 from slideviz.errors import CaseError, Message, SlidevizError, nearest, note
 from slideviz.ffd.box import (
     CARTESIAN,
@@ -221,10 +221,10 @@ class BoxMotion(Motion):
     @classmethod
     def placed(
         cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
-    ) -> dict[int, Displacements]:
+    ) -> PlacedDisplacements:
         motions = box_motions(case)
         boxes = boxes_for(case, mesh) if motions else {}
-        found: dict[int, Displacements] = {}
+        found: PlacedDisplacements = {}
         outside: dict[int, Message] = {}
         alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
         for name, changes in box_changes(case, mesh, boxes).items():
@@ -277,7 +277,7 @@ class Ffd(BoxMotion):
     proportional = ("vector",)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         _require_words(
             items,
@@ -331,7 +331,7 @@ class _Column(BoxMotion):
     proportional = ("amount",)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         _require_words(
             items,
@@ -445,7 +445,7 @@ class FfdTwist(BoxMotion):
     only_3d = True
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         n_axis = axis_length(items, 3, 0)
         _require_words(
@@ -499,7 +499,7 @@ class FfdTwist(BoxMotion):
             )
 
 
-def _require_words(items: list[Word], counts: tuple[int, ...], after_box: str) -> None:
+def _require_words(items: Words, counts: tuple[int, ...], after_box: str) -> None:
     """Raise CaseError where the name of a box and what follows it are not in one of the counts."""
     if len(items) not in counts or not items[0].text:
         raise CaseError(f"expected the box, {after_box}")
@@ -518,7 +518,7 @@ def _last_index(start: NewMotion) -> int:
     return 0 if start.dim == 3 else -1
 
 
-def _integers(words: list[Word]) -> list[int]:
+def _integers(words: Words) -> list[int]:
     values = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in values):
         text = ", ".join(word.text for word in words)

@@ -12,10 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.argument_types import record
-from slideviz.case.displacement import Displacements, NodesOn, read_displacements
+from slideviz.case.displacement import (
+    Displacements,
+    NodesOn,
+    PlacedDisplacements,
+    read_displacements,
+)
 from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named, nodes_moved
 from slideviz.case.values import path_text
-from slideviz.case.words import Word
+from slideviz.case.words import Words
 from slideviz.errors import CaseError, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.system.weak_cache import WeakCache
@@ -54,7 +59,7 @@ class FromFile(Motion):
         object.__setattr__(self, "path", Path(self.path))
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         if len(words) != 1:
             words = []
         return cls(read_path(words), marker)
@@ -78,8 +83,8 @@ class FromFile(Motion):
     @classmethod
     def placed(
         cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
-    ) -> dict[int, Displacements]:
-        found: dict[int, Displacements] = {}
+    ) -> PlacedDisplacements:
+        found: PlacedDisplacements = {}
         for place, motion in enumerate(case.motions):
             if not isinstance(motion, FromFile) or type(motion) is not cls:
                 continue
@@ -124,7 +129,7 @@ class FromFile(Motion):
         yield from ()
 
 
-def read_path(words: list[Word]) -> Path:
+def read_path(words: Words) -> Path:
     """Return the path that begins some words; raise CaseError if there is none."""
     if not words or not words[0].text:
         raise CaseError(

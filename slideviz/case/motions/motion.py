@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from slideviz.argument_types import CheckedFields
-from slideviz.case.displacement import Displacements, NodesOn
-from slideviz.case.words import Word, name_text
+from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
+from slideviz.case.words import Words, name_text
 from slideviz.errors import ROUNDING, CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
 from slideviz.terms import AXES, Term, Vector
@@ -136,7 +136,7 @@ class Motion(CheckedFields):
         return self.verbs[0] if self.verbs else ""
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         """Return the motion of the words after its verb; raise CaseError with a sentence."""
         raise NotImplementedError
 
@@ -190,7 +190,7 @@ class Motion(CheckedFields):
     @classmethod
     def placed(
         cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
-    ) -> dict[int, Displacements]:
+    ) -> PlacedDisplacements:
         """Return the displacements by all motions of this family, by their place in the case.
 
         ``on`` has the nodes (k,) of each moving marker. Sentences on motions that are impossible
@@ -299,12 +299,12 @@ def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def without_brackets(words: list[Word]) -> list[Word]:
+def without_brackets(words: Words) -> Words:
     """Return the words that are not brackets."""
     return [word for word in words if not (word.is_sign("(") or word.is_sign(")"))]
 
 
-def axis_length(words: list[Word], place: int, room: int) -> int:
+def axis_length(words: Words, place: int, room: int) -> int:
     """Return how many words from ``place`` on name an axis: a letter, three numbers, or none.
 
     Numbers name one where more than ``room`` words are there.

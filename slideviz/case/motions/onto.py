@@ -17,7 +17,7 @@ from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
 from slideviz.case.spans import periodic_pairs
-from slideviz.case.words import Word, number
+from slideviz.case.words import Words, number
 from slideviz.errors import CaseError, MeshError, Message, printable
 from slideviz.formats.files import read as read_mesh
 from slideviz.formats.files import read_surface
@@ -96,7 +96,7 @@ class Onto(FromFile):
             )
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         if len(words) not in (1, 2) or not words[0].text:
             raise CaseError(
                 "expected (MARKER, onto, path) or (MARKER, onto, path, limit), where the limit is "

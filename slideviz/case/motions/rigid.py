@@ -29,7 +29,7 @@ from slideviz.case.motions.motion import (
     without_brackets,
 )
 from slideviz.case.values import axis_text, read_axis, read_vector, vector_text
-from slideviz.case.words import Word, angle_deg, number
+from slideviz.case.words import Word, Words, angle_deg, number
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -69,7 +69,7 @@ class Translate(ByFormula):
     proportional = ("vector",)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         return cls(marker, read_vector(without_brackets(words), "the shift"))
 
     @classmethod
@@ -146,7 +146,7 @@ class Rotate(_AboutPoint):
     words = (("degrees", "angle_deg"),)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         if not items:
             raise CaseError("the angle is missing; write rotate, angle in degrees, centroid")
@@ -217,11 +217,11 @@ class Scale(_AboutPoint):
     ratios = ("factors",)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         if items and _is_centroid(items[-1]):
             factors = items[:-1]
-            place: list[Word] = []
+            place: Words = []
         else:
             opened = [i for i, word in enumerate(words) if word.is_sign("(")]
             if opened and words[-1].is_sign(")"):
@@ -296,7 +296,7 @@ class Radial(_AboutPoint):
     words = (("dr", "distance"),)
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         items = without_brackets(words)
         n_axis = axis_length(items, 2, 5)
         place = items[2 + n_axis :]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.case.displacement import Displacements, NodesOn
+from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Amount,
     Motion,
@@ -22,7 +22,7 @@ from slideviz.case.motions.motion import (
 )
 from slideviz.case.spans import periodic_pairs, span_field
 from slideviz.case.values import read_vector, vector_text
-from slideviz.case.words import Word, angle_deg, number
+from slideviz.case.words import Words, angle_deg, number
 from slideviz.errors import CaseError, MeshError, Message, SlidevizError, shown
 from slideviz.machine.blade import TOTALS, BladeSections, change_of
 from slideviz.machine.smallest_distances import bodies
@@ -104,7 +104,7 @@ class SpanMotion(Motion):
         return self.kind
 
     @classmethod
-    def read(cls, marker: Target, verb: str, words: list[Word]) -> Motion:
+    def read(cls, marker: Target, verb: str, words: Words) -> Motion:
         start = next((place for place, word in enumerate(words) if word.is_sign("(")), len(words))
         point = without_brackets(words[start:])
         if point and len(point) != 3:
@@ -150,8 +150,8 @@ class SpanMotion(Motion):
     @classmethod
     def placed(
         cls, case: Case, mesh: Mesh, on: NodesOn, problems: list[Message]
-    ) -> dict[int, Displacements]:
-        found: dict[int, Displacements] = {}
+    ) -> PlacedDisplacements:
+        found: PlacedDisplacements = {}
         try:
             blades = blades_of(case, mesh, on)
         except CaseError as problem:

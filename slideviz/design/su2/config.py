@@ -29,7 +29,7 @@ from slideviz.case.lines import (
 )
 from slideviz.case.model import NEW, Case
 from slideviz.case.values import MAX_STEPS, YES_NO, integer, real
-from slideviz.case.words import Word, counted, first_of, groups_of, list_of, number, words_of
+from slideviz.case.words import Words, counted, first_of, groups_of, list_of, number, words_of
 from slideviz.case.zone_cases import renamed, with_marker_names
 from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, note, raise_all, shown
 from slideviz.formats.files import read
@@ -178,7 +178,7 @@ def _strange(kinds: list[str]) -> list[str]:
 
 def _groups(
     rows: Mapping[str, Entry], kinds: list[str], problems: list[Message], warnings: list[Remark]
-) -> list[list[Word]]:
+) -> list[Words]:
     """Return the words of each variable's parameters; none where DV_PARAM is wrong."""
     entry = rows.get("DV_PARAM")
     if entry is None:
@@ -212,7 +212,7 @@ def _groups(
     return groups
 
 
-def _variable(name: str, group: list[Word]) -> DesignVariable:
+def _variable(name: str, group: Words) -> DesignVariable:
     kind = KINDS[name]
     names = KINDS[name].parameters
     if not names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +57,7 @@ from slideviz.gui.widgets.build import (
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.mesh.zones import zones_of
 from slideviz.session import changes
+from slideviz.session.pieces import Pieces
 from slideviz.session.state import UNDEFORMED, Session
 from slideviz.terms import SHOWN
 
@@ -141,7 +142,7 @@ class PreviewDialog(QDialog):
         """Begin to draw the previews."""
         self.drawer.start(self.drawing())
 
-    def drawing(self) -> Generator[object, Any, None]:
+    def drawing(self) -> Pieces:
         """Yield pieces of the work that draws the previews: of a large mesh it takes a second."""
         raise NotImplementedError
 
@@ -398,7 +399,7 @@ class PictureDialog(PixelFields, PreviewDialog):
             self.soon.start()
 
     # Picture ---------------------------------------------------------------------------
-    def drawing(self) -> Generator[object, Any, None]:
+    def drawing(self) -> Pieces:
         options = self.preview_options(self.picture_options)
         pixels = yield from self.renderer.render_steps(options)
         self.put(pixels, self.picture)
@@ -622,7 +623,7 @@ class FilmDialog(PreviewDialog):
         if not self.filming:
             super().draw()
 
-    def drawing(self) -> Generator[object, Any, None]:
+    def drawing(self) -> Pieces:
         options = self.preview_options(self.form.picture_options)
         yield from aim_at_largest(self.renderer, options)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
@@ -742,7 +743,7 @@ class WheelDialog(PreviewDialog):
         self.words.setText(f"{cells:,} cells; nodes are merged where passages meet.")
         self.draw()
 
-    def drawing(self) -> Generator[object, Any, None]:
+    def drawing(self) -> Pieces:
         shown = -1 if self.count == "all" else self.count // 2
         sides = self._session.case.markers_with("periodic")  # inside of the wheel
         bare = changes.show_boundaries(self._session, sides, False)
