@@ -60,6 +60,7 @@ PALETTE = {
 Texts = tuple[str, ...]
 Numbers = tuple[float, ...]
 WholeNumbers = tuple[int, ...]
+Range = tuple[float, float]  # the lowest and the highest number
 
 _ROWS = tomllib.loads(Path(__file__).with_name("terms.toml").read_text(encoding="utf-8"))
 

@@ -10,6 +10,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
 from slideviz.mesh.topology import single_edges
+from slideviz.terms import Range
 
 ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
@@ -24,7 +25,7 @@ class CellsInRange:
     words: str = field(compare=False)  # the range in words
 
     @classmethod
-    def of(cls, values: FloatArray, threshold: tuple[float, float]) -> CellsInRange:
+    def of(cls, values: FloatArray, threshold: Range) -> CellsInRange:
         """Return the cells whose value is in a range (see `cells_in_range`)."""
         mask = np.zeros(len(values), bool)
         mask[cells_in_range(values, threshold)] = True
@@ -36,7 +37,7 @@ class CellsInRange:
         return polygons.take(np.flatnonzero(self.mask[polygons.cells]))
 
 
-def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
+def cells_in_range(values: FloatArray, threshold: Range) -> IntArray:
     """Return the ascending numbers of the cells whose value is in a closed range.
 
     ``values`` (m,): nan for an inverted cell, as ``StepFrame.shown_values`` has them. Inverted
@@ -47,7 +48,7 @@ def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArr
     return np.flatnonzero(inside | np.isnan(values) if low <= 0.0 else inside)
 
 
-def range_words(threshold: tuple[float, float]) -> str:
+def range_words(threshold: Range) -> str:
     """Return a threshold in words."""
     if threshold[1] < 0.0:
         return "inverted cells"

@@ -10,7 +10,7 @@ from slideviz.mesh.metrics import is_known
 from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes import set_view, undoable
 from slideviz.session.state import Session, outwards, second_view
-from slideviz.terms import COLOR_BY, DIFFERENCES, METRICS
+from slideviz.terms import COLOR_BY, DIFFERENCES, METRICS, Range
 
 
 @undoable("color range")
@@ -60,7 +60,7 @@ def usual_range(session: Session) -> str:
     return f"{low:g} to {high:g}"
 
 
-def _limits(session: Session, every: bool) -> tuple[float, float] | None:
+def _limits(session: Session, every: bool) -> Range | None:
     what = session.view.color_by
     if what == "role" or session.mesh is None:
         return None

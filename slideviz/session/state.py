@@ -36,6 +36,7 @@ from slideviz.terms import (
     WALL_VALUES,
     ColorBy,
     PointsShown,
+    Range,
     Role,
     Shown,
     field_of,
@@ -141,7 +142,7 @@ class StepFrame:
             known[name] = none if layers is None else layers.with_layers().at_cells(name)
         return known[name]
 
-    def ends(self, what: ColorBy, reference: Mesh | Quality | None) -> tuple[float, float] | None:
+    def ends(self, what: ColorBy, reference: Mesh | Quality | None) -> Range | None:
         """Return the smallest and largest finite value of a quantity; None where there is none."""
         values = self.values(what, reference)
         values = values[np.isfinite(values)]
@@ -311,11 +312,11 @@ class ViewState:
     """The view of a session: colors, threshold, sections, step, things drawn."""
 
     color_by: ColorBy = "role"  # the quantity that cells are colored by
-    color_range: tuple[float, float] | None = None
+    color_range: Range | None = None
     """(float, float) or None: values at the ends of the color bar; None: 0 to 1 for quality, and 0
     to a round number above the largest of all runs for the displacement."""
     color_map: str = "viridis"  # one of `slideviz.terms.COLOR_MAPS`
-    threshold: tuple[float, float] | None = None
+    threshold: Range | None = None
     """(float, float) or None: draw only the cells whose value is in this range; None draws all."""
     points: PointsShown = "none"  # which nodes are drawn as points
     drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
@@ -331,7 +332,7 @@ class ViewState:
     beside: int | None = None
     """The number of a run shown in a second view beside the first; 0 is the undeformed mesh."""
     swapped: bool = False  # whether the second view is to the left of the first
-    ranges: tuple[tuple[ColorBy, tuple[float, float]], ...] = ()
+    ranges: tuple[tuple[ColorBy, Range], ...] = ()
     """tuple of (str, (float, float)): the color ranges of other quantities that the view was
     colored by before."""
     section_index: int | None = None  # the place in ``sections`` of the one that is selected
@@ -567,7 +568,7 @@ class Session:
         return COLOR_BY[self.view.color_by].color_map or self.view.color_map
 
     @property
-    def color_range(self) -> tuple[float, float]:
+    def color_range(self) -> Range:
         """Return the values at the ends of the color bar."""
         what = self.view.color_by
         if what == "role":
@@ -587,7 +588,7 @@ class Session:
         return low, high if low < high < np.inf else low + 1.0
 
     @cached_property
-    def _wall_range(self) -> tuple[float, float]:
+    def _wall_range(self) -> Range:
         """Return round numbers around the values at walls of the first and the last frame."""
         ends = [
             pair
@@ -604,7 +605,7 @@ class Session:
         return (0.0, 2.0 * low) if low > 0 else (low, low + 1.0)
 
     @cached_property
-    def _difference_range(self) -> tuple[float, float]:
+    def _difference_range(self) -> Range:
         """Return round numbers around the differences at the last step, with 0 in their middle."""
         what = self.view.color_by
         # With a color range: `second_view` would ask for this one.
@@ -675,7 +676,7 @@ _PARTS = 100.0
 """A color range is rounded outwards to a power of ten, about its length over this number."""
 
 
-def outwards(low: float, high: float) -> tuple[float, float]:
+def outwards(low: float, high: float) -> Range:
     """Return two numbers rounded to few digits, the lower one down and the upper one up."""
     unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
     first = np.floor(low / unit + 1e-6) * unit

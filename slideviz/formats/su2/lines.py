@@ -21,6 +21,8 @@ from slideviz.formats.source import Source
 from slideviz.formats.su2 import KEYWORD
 from slideviz.mesh.model import IntArray
 
+FirstAndEnd = tuple[int, int]  # of bytes or rows
+
 _KEY = re.compile(rb"[A-Za-z_]\w*")
 _COUNT = re.compile(rb"\+?\d{1,18}")  # the value of a key that counts
 KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
@@ -248,7 +250,7 @@ class Lines:
             begin = line_end(self.raw, begin)
         return begin
 
-    def bytes_of(self, *ranges: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+    def bytes_of(self, *ranges: FirstAndEnd) -> tuple[FirstAndEnd, ...]:
         """Return first byte and end of each of ``ranges`` of lines (first, end)."""
         return tuple((self.byte(a), self.byte(b)) for a, b in ranges)
 

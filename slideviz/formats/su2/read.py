@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
-from slideviz.formats.su2.lines import Lines, Rows, boxes_elsewhere
+from slideviz.formats.su2.lines import FirstAndEnd, Lines, Rows, boxes_elsewhere
 from slideviz.formats.su2.numbers import parse_cells, parse_points
 from slideviz.formats.su2.text import SendRows, Text, TextZone, boundaries_elsewhere, find_texts
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
@@ -193,9 +193,9 @@ class Document(Origin):
     points: FloatArray  # (n, d): the points as read
     cells: Cells  # the cells as read
     markers: tuple[Marker, ...]  # the boundaries as read
-    zone: tuple[int, int]  # (int, int): first byte and end of the zone, without its ``IZONE`` line
-    sends: tuple[tuple[int, int], ...]
-    unknown: tuple[tuple[int, int], ...]
+    zone: FirstAndEnd  # (int, int): first byte and end of the zone, without its ``IZONE`` line
+    sends: tuple[FirstAndEnd, ...]
+    unknown: tuple[FirstAndEnd, ...]
     """`sends`, `unknown`: first byte and end of each ``SEND_RECEIVE`` marker, and of each unknown
     section."""
 

@@ -19,6 +19,7 @@ from slideviz.formats.su2.lines import (
     ALIASES,
     KNOWN,
     Bounds,
+    FirstAndEnd,
     KeywordBlock,
     Lines,
     Rows,
@@ -321,7 +322,7 @@ class Text:
         return number_of(self.zone.points)
 
     @property
-    def unknown(self) -> tuple[tuple[int, int], ...]:
+    def unknown(self) -> tuple[FirstAndEnd, ...]:
         """Return first byte and end of each section that slideviz does not know."""
         return self.lines.bytes_of(*((part.line, part.stop) for part in self.zone.unknown))
 
@@ -389,7 +390,7 @@ def scan(raw: Source, progress: Tick) -> Lines:
     the fraction done after each block; may raise to stop.
     """
 
-    def scanned(bounds: tuple[int, int]) -> tuple[IntArray, int, bool]:
+    def scanned(bounds: FirstAndEnd) -> tuple[IntArray, int, bool]:
         text = text_of(raw, *bounds)
         if b"\0" in text:
             raise MeshError(
@@ -417,7 +418,7 @@ def scan(raw: Source, progress: Tick) -> Lines:
     return Lines(raw, np.append(begins, raw.size), np.append(firsts, line), kinds, rows, nodes)
 
 
-def _blocks(raw: Source) -> list[tuple[int, int]]:
+def _blocks(raw: Source) -> list[FirstAndEnd]:
     bounds = []
     begin = 0
     while begin < raw.size:

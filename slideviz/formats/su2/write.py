@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.source import Source
-from slideviz.formats.su2.lines import Piece, Rows, is_ffd
+from slideviz.formats.su2.lines import FirstAndEnd, Piece, Rows, is_ffd
 from slideviz.formats.su2.loops import print_cells, print_changed, print_points
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.text import BLOCK_BYTES, SEND_RECEIVE
@@ -125,7 +125,7 @@ class PointChange:
     before: Callable[[slice], FloatArray]
     after: Callable[[slice], FloatArray]
     """`before`, `after`: return the points (m, d) of some rows, as read and as to be written."""
-    unknown: Sequence[tuple[int, int]]
+    unknown: Sequence[FirstAndEnd]
     end: int
     """`unknown`, `end`: first byte and end of each unknown section, and the end of the zone."""
     ffd: bytes | None  # the new boxes for free-form deformation; None: those it had
@@ -145,12 +145,12 @@ def patched_blocks(raw: Source, changes: Sequence[PointChange]) -> Iterator[byte
     )
     change = {piece: one for one in changes for piece in one.rows}
     done = 0
-    tasks: list[tuple[int, int] | Piece | bytes] = []
+    tasks: list[FirstAndEnd | Piece | bytes] = []
     for piece in sorted(change, key=lambda piece: piece.begin):
         tasks += [*_around(edits, done, piece.begin), piece]
         done = piece.end
 
-    def text(task: tuple[int, int] | Piece | bytes) -> bytes:
+    def text(task: FirstAndEnd | Piece | bytes) -> bytes:
         if isinstance(task, bytes):
             return task
         if isinstance(task, tuple):
@@ -163,7 +163,7 @@ def patched_blocks(raw: Source, changes: Sequence[PointChange]) -> Iterator[byte
     raw.require_same()
 
 
-def _box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
+def _box_edits(raw: Source, unknown: Sequence[FirstAndEnd], end: int, ffd: bytes) -> list[Edit]:
     """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
 
     If the zone has none, ``ffd`` is put at its end. ``unknown``: first byte and end of each unknown
@@ -175,7 +175,7 @@ def _box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: b
     return [(end, end, ffd if raw[end - 1 : end] == b"\n" else b"\n" + ffd)]
 
 
-def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, int] | bytes]:
+def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[FirstAndEnd | bytes]:
     """Yield the parts of a range of bytes in order: blocks (first byte, end) and texts of edits."""
     for first, after, text in edits:
         if begin <= first < end:
@@ -260,7 +260,7 @@ def _some(cells: Cells, i: int, j: int) -> tuple[NDArray, ...]:
     return cells.types[i:j], cells.connectivity[slice(*cells.offsets[[i, j]])]
 
 
-def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
+def _point_rows(points: PointsOf, block: FirstAndEnd) -> bytes:
     mine = points(*block)
     numbers = _digits(mine)
     out = np.empty(len(numbers) + _NUMBER_BYTES * len(mine), np.uint8)
@@ -279,7 +279,7 @@ def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
     yield from ordered_map(partial(_cell_rows, cells, numbered), cuts(0, count, _BLOCK_ROWS))
 
 
-def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
+def _cell_rows(cells: CellsOf, numbered: bool, block: FirstAndEnd) -> bytes:
     types, nodes = cells(*block)[:2]
     out = np.empty(_NUMBER_BYTES * (len(nodes) + 2 * len(types)), np.uint8)
     return out[: print_cells(types, nodes, block[0] if numbered else -1, out)].tobytes()

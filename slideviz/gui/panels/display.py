@@ -38,6 +38,7 @@ from slideviz.terms import (
     POINTS_SHOWN,
     RANKED,
     SHOWN,
+    Range,
     Shown,
     labels,
     quantity_of,
@@ -266,7 +267,7 @@ def _shown(session: Session) -> object:
     return session.reference, session.pairs, style, periodic, runs
 
 
-def _worse_half(session: Session) -> tuple[float, float]:
+def _worse_half(session: Session) -> Range:
     """Return the worse half of the color range, which is the first threshold."""
     low, high = session.color_range
     middle = low + 0.5 * (high - low)

@@ -25,14 +25,12 @@ from slideviz.plots.session_plots import (
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import Session
-from slideviz.terms import RANKED, SIZE_SKEW, WALL_VALUES
+from slideviz.terms import RANKED, SIZE_SKEW, WALL_VALUES, Range
 
 END_PX = 6  # distance in pixels up to which a press moves an end of the range
 
 
 BRUSH = "Drag over values to show only the cells that have them; click to end it."
-
-Range = tuple[float, float]
 
 
 class BrushCanvas(PlotCanvas):
