@@ -22,6 +22,7 @@ from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.theme import NAMES, set_icon
 from slideviz.session import changes
 from slideviz.session.colors import fit_colors, usual_range
+from slideviz.session.measure import toggle_measure
 from slideviz.session.motions import box_names, wheel_passages
 from slideviz.session.panes import choices, panes, show_in
 from slideviz.session.run_messages import to_mend
@@ -206,6 +207,11 @@ class CommandState:
     live: bool = False
     """Whether the mesh follows the hand."""
 
+    @property
+    def measures(self) -> bool:
+        """Return whether clicks pick points to be measured."""
+        return self.session.view.picks is not None
+
 
 def has_mesh(now: CommandState) -> bool:
     """Return whether a mesh is open."""
@@ -279,6 +285,11 @@ def _add_section(kind: str, window: MainWindow) -> None:
     panel.add[kind].click()
 
 
+def _measure(window: MainWindow) -> None:
+    window.store.change(toggle_measure)
+    window.view.setFocus()  # where Esc takes points back
+
+
 def _fill_recent(window: MainWindow, menu: QMenu) -> None:
     menu.clear()
     for path in window.files.recent():
@@ -316,6 +327,7 @@ ACTS: Mapping[str, Callable[[MainWindow], object]] = {
     "show_all": lambda w: w.store.change(
         changes.show_boundaries, w.store.session.mesh.marker_names
     ),
+    "measure": _measure,
 }
 """What commands do that call no method with fixed values, by the names of these in the table."""
 

@@ -69,6 +69,7 @@ from slideviz.gui.widgets.theme import redraw_icons
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes, jobs
 from slideviz.session.colors import not_drawable
+from slideviz.session.measure import measure_words
 from slideviz.session.motions import boxes_hint, support_case, support_key, support_words
 from slideviz.session.run_messages import Requirement, run_requirements
 from slideviz.session.saving import title_of
@@ -92,6 +93,7 @@ class Actions:
         window.addToolBar(self.bar)
         window.store.listen(self._explain_colors)
         window.store.listen(self._explain_support)
+        window.store.listen(self._explain_measure)
 
     def _make(self, above: QMenu | QMenuBar, table: Menu) -> None:
         menu = self.menus[table.name] = above.addMenu(table.title)
@@ -128,6 +130,13 @@ class Actions:
         changed = before is not now and support_key(before, new.mesh) != support_key(now, new.mesh)
         if changed or "support" not in old.view.drawn:
             self.window.show_status(support_words(new))
+
+    def _explain_measure(self, old: Session, new: Session) -> None:
+        if new.view.picks is None and old.view.picks is None:
+            return
+        before = old.view.picks, old.frame, old.frame_beside
+        if before != (new.view.picks, new.frame, new.frame_beside):
+            self.window.statusBar().showMessage(measure_words(new))
 
     def sync(self, now: CommandState) -> None:
         for name, command in COMMANDS.items():

@@ -190,7 +190,8 @@ class FlatScene:
             return None
         shown = [self._shown.actor, *self._instances.drawn.values()]
         cells = self.polygons.cells
-        return pick.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
+        found = pick.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
+        return None if found is None else found[0]
 
     # Camera ----------------------------------------------------------------------------
     def set_scheme(self, scheme: ColorScheme) -> None:

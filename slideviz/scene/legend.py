@@ -137,25 +137,29 @@ def _line(stage: Stage, sign: str, color: str, word: str, *, down: float) -> Non
     prefix, right, size = _SIGNS[sign]
     signs = [(sign, color, STRIP - 8, 1.4 * size)] if color else []
     for what, shade, edge, letters in (*signs, (word, stage.scheme.text, right, size)):
-        text = _write(stage, what, f"{prefix}{word}:{what}", (1.0, 1.0), (-edge, -down), letters)
+        text = write(stage, what, f"{prefix}{word}:{what}", (1.0, 1.0), (-edge, -down), letters)
         text.prop.color = shade
 
 
-def _write(
+def write(
     stage: Stage,
     word: str,
     name: str,
-    corner: tuple[float, float],
+    corner: Sequence[float],
     at: tuple[float, float],
     size: float,
 ) -> Any:
     """Write a word over the view, centred vertically; return its actor.
 
-    It begins ``at`` pixels (at normal letter size) from a place relative to the view (0 to 1).
+    It begins ``at`` pixels (at normal letter size) from a place relative to the view (0 to 1), or
+    from a point of the scene.
     """
     text = pv.Text(word)
     reference = vtkCoordinate()
-    reference.SetCoordinateSystemToNormalizedViewport()
+    if len(corner) == 2:
+        reference.SetCoordinateSystemToNormalizedViewport()
+    else:
+        reference.SetCoordinateSystemToWorld()
     reference.SetValue(*corner)
     place = text.GetPositionCoordinate()
     place.SetReferenceCoordinate(reference)
@@ -213,7 +217,7 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     bar.SetDrawAboveRangeSwatch(False)
     if inverted:  # VTK's own annotation would be to the bar's left, over the mesh
         at = _BAR + _GAP + _INDENT + 14 - STRIP, _NAN / 2.0
-        _write(stage, "inverted", "legend:inverted:", (1.0, _BOTTOM), at, 12)
+        write(stage, "inverted", "legend:inverted:", (1.0, _BOTTOM), at, 12)
 
 
 def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
@@ -348,7 +352,7 @@ class PreviewLayer(KeyedLayer):
         return self.stage.scheme, self.stage.pixel_scale, self.stage.font_scale
 
     def draw(self, _session: Session) -> None:
-        word = _write(self.stage, "Preview", "preview", (0.0, 1.0), (14, -14), 15)
+        word = write(self.stage, "Preview", "preview", (0.0, 1.0), (14, -14), 15)
         word.prop.SetVerticalJustificationToTop()
 
 

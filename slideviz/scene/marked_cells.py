@@ -17,9 +17,11 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
 from slideviz.scene.actors import VALUES, draw_in_front, part_shape
+from slideviz.scene.legend import OPACITY, write
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import KeyedLayer, Layer, Stage
 from slideviz.session.inspect import cell_centers, nodes_of
+from slideviz.session.measure import measure
 from slideviz.session.node_types import NOTHING, TypedNodes, typed_nodes
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import NODE_TYPES
@@ -236,6 +238,47 @@ def _wanted(session: Session) -> bool:
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
         return False
     return view.threshold is None or view.threshold[0] <= 0.0
+
+
+class MeasureLayer(KeyedLayer):
+    """The picked points, the line through them, and the number that they measure."""
+
+    names = ("measure:rim", "measure:line", "measure:points", "measure:label")
+
+    def key(self, session: Session) -> object:
+        """Return the points and the style, if there are points."""
+        if not session.view.picks:
+            return ()
+        stage = self.stage
+        return session.frame, session.view.picks, stage.scheme, stage.pixel_scale, stage.has_plate
+
+    def draw(self, session: Session) -> None:
+        """Draw them in front of everything, in the colors of letters and background."""
+        found = measure(session)
+        assert found is not None
+        assert session.frame is not None
+        assert session.view.picks is not None
+        stage = self.stage
+        rim, line, dots, label = self.names
+        points = lifted(found.points, 5.0 * stage.lift(session.frame.mesh))
+        ends = np.arange(len(points) - 1)
+        lines = facet_connectivity(np.column_stack([ends, ends + 1]))
+        through = pv.PolyData(points, lines=lines)
+        picked = pv.PolyData(points[: len(session.view.picks)])
+        text = stage.scheme.text
+        for name, shape, color, width in (
+            (rim, through, stage.scheme.background, 5.0),
+            (line, through, text, 2.0),
+            (dots, picked, SELECTED_COLOR, 11.0),
+        ):
+            size = width * stage.pixel_scale
+            draw_in_front(stage.mark(shape, name, color, size, size).mapper)
+        middle = len(session.view.picks) == 2
+        place = points[:2].mean(axis=0) if middle else points[:2][-1]
+        words = write(stage, found.label, label, place, (0.0, 18.0), 14)
+        words.prop.SetJustificationToCentered()
+        words.prop.SetBackgroundColor(*pv.Color(stage.scheme.background).float_rgb)
+        words.prop.SetBackgroundOpacity(OPACITY)
 
 
 CELLS_BEFORE = "repair:cells"

@@ -103,8 +103,8 @@ def meets(plotter: Any, x: float, y: float, actors: Sequence[Any]) -> bool:
 
 def _foremost(
     plotter: Any, x: float, y: float, actors: Iterable[Any], tolerance: float = 0.0
-) -> tuple[Any, int]:
-    """Return the foremost of some actors at a pixel, or None, and the number of its polygon there.
+) -> tuple[Any, int, FloatArray]:
+    """Return the foremost of some actors at a pixel, or None, its polygon there, and the point.
 
     ``tolerance``: distance up to which the actor is hit, relative to the view's diagonal.
     """
@@ -114,7 +114,7 @@ def _foremost(
     for actor in actors:
         picker.AddPickList(actor)
     picker.Pick(x, y, 0.0, plotter.renderer)
-    return picker.GetActor(), picker.GetCellId()
+    return picker.GetActor(), picker.GetCellId(), np.array(picker.GetPickPosition())
 
 
 def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
@@ -125,12 +125,12 @@ def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
 
 def front_cell(
     plotter: Any, x: float, y: float, shown: Sequence[tuple[Any, IntArray | FloatArray]]
-) -> int | None:
-    """Return the index of the cell of the foremost polygon at a pixel; None if there is none.
+) -> tuple[int, FloatArray] | None:
+    """Return the index of the cell of the foremost polygon at a pixel, and the point (3,), or None.
 
     ``x`` and ``y``: pixels from the lower left. ``shown``: the actors to look at, each with the
     index of the cell that each of its polygons is of.
     """
     owners = dict(shown)
-    actor, polygon = _foremost(plotter, x, y, owners)
-    return int(owners[actor][polygon]) if actor in owners else None
+    actor, polygon, point = _foremost(plotter, x, y, owners)
+    return (int(owners[actor][polygon]), point) if actor in owners else None

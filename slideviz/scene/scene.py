@@ -20,13 +20,20 @@ from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.camera import Camera
 from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, PreviewLayer, TriadLayer
-from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, PointLayer, RepairLayer
+from slideviz.scene.marked_cells import (
+    InvertedLayer,
+    MarkLayer,
+    MeasureLayer,
+    PointLayer,
+    RepairLayer,
+)
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, PassageLayer, ThresholdLayer
 from slideviz.scene.overview import Overview
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.colors import with_drawable_colors
-from slideviz.session.inspect import cell_at, surroundings
+from slideviz.session.inspect import cell_at, nodes_of, surroundings
+from slideviz.session.measure import Pick
 from slideviz.session.state import Session
 from slideviz.session.store import notify
 
@@ -60,6 +67,7 @@ class Scene:
             PointLayer(self.stage),
             InvertedLayer(self.stage, self.sections),
             RepairLayer(self.stage),
+            MeasureLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
             PreviewLayer(self.stage),
@@ -245,6 +253,39 @@ class Scene:
 
         In 3D it is that of the foremost face. With a threshold, only cells within it are picked.
         """
+        found = self._pick_place(x, y)
+        return None if found is None else found[0]
+
+    def pick_point(self, x: float, y: float) -> Pick | None:
+        """Return the node near a pixel from the lower left, else the place on the cell there.
+
+        Beside the mesh it is the nearest node of a boundary; None if none is near.
+        """
+        if self.session.frame is None:
+            return None
+        mesh = self.session.frame.mesh
+        found = self._pick_place(x, y)
+        shown = [
+            one.surface.nodes for name, one in self.drawn.items()
+            if name not in self.session.view.hidden
+        ]  # fmt: skip
+        nodes = np.concatenate([np.empty(0, np.int64), *shown])
+        if found is not None:
+            nodes = nodes_of(mesh, found[0])
+        if not len(nodes):
+            return None
+        pixels = pick.to_display(self.plotter, padded(mesh.points[nodes]))
+        away = np.linalg.norm(pixels - (x, y), axis=1)
+        if found is None:
+            near = int(away.argmin())
+        else:  # not one behind it
+            near = int(np.linalg.norm(mesh.points[nodes] - found[1], axis=1).argmin())
+        if away[near] <= pick.REACH * self.stage.pixel_scale:
+            return Pick((int(nodes[near]),))
+        return None if found is None else Pick.between(mesh, nodes, found[1])
+
+    def _pick_place(self, x: float, y: float) -> tuple[int, FloatArray] | None:
+        """Return the index of the cell at a pixel, and the point (d,) of it that is seen there."""
         session = self.session
         if session.mesh is None or session.frame is None:
             return None
@@ -256,7 +297,8 @@ class Scene:
             if only is not None:
                 rank = np.where(only.mask, rank, np.nan)
             at = pick.on_plane(self.plotter, x, y)
-            return cell_at(session.frame.mesh, *at, rank)
+            cell = cell_at(session.frame.mesh, *at, rank)
+            return None if cell is None else (cell, np.array(at))
         if self.sections.from_file:
             # The sections' cells have no index in memory, and the boundaries are transparent.
             return None

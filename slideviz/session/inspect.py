@@ -8,14 +8,13 @@ from 0 has them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, Quality, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
@@ -56,33 +55,46 @@ def decimals(values: FloatArray) -> int:
     return 0 if not largest > 0 else int(np.clip(3 - np.floor(np.log10(largest)), 0, 12))
 
 
-def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
-    """Return the name of the boundary nearest to a point (d,) and its distance, or None."""
-    distances = [(_distance(mesh, marker, point), marker.name) for marker in mesh.markers]
-    far, name = min(distances, default=(np.inf, ""))
-    return (name, far) if np.isfinite(far) else None
+def nearest_boundary(
+    mesh: Mesh, point: FloatArray, beyond: float = -1.0
+) -> tuple[str, float, FloatArray] | None:
+    """Return the name of the boundary nearest to a point (d,), its distance and closest point (d,).
+
+    Only boundaries farther than ``beyond`` count; None if there is none.
+    """
+    best: tuple[str, float, FloatArray] | None = None
+    for marker in mesh.markers:
+        if len(marker.nodes):
+            closest = _closest(mesh, marker, point)
+            far = float(np.linalg.norm(closest - point))
+            if beyond < far < np.inf and (best is None or far < best[1]):
+                best = marker.name, far, closest
+    return best
 
 
-def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
-    """Return the distance from a point (d,) to the elements at a boundary's nearest nodes."""
+def _closest(mesh: Mesh, marker: Marker, point: FloatArray) -> FloatArray:
+    """Return the point (d,) closest to a point (d,) on the elements at a boundary's nearest nodes.
+
+    The boundary has nodes.
+    """
     nodes = marker.nodes
     cells = marker.cells
-    if not len(nodes):
-        return float("inf")
     shifts = mesh.points[nodes] - point
     squares = np.einsum("nd,nd->n", shifts, shifts)
     some = min(NEAR, len(nodes))
     near = nodes[np.argpartition(squares, some - 1)[:some]]
     at = np.flatnonzero(np.isin(cells.connectivity, near))
     elements = np.unique(np.searchsorted(cells.offsets, at, side="right") - 1)
-    pieces: list[list[FloatArray]] = []
-    for element in elements:
-        begin, end = cells.offsets[element : element + 2]
-        first, *rest = mesh.points[cells.connectivity[begin:end]]
-        # The last corner again: of a segment that is all.
-        pieces += ([first, one, other] for one, other in pairwise([*rest, rest[-1]]))
-    (closest,) = ClosestPoints(np.array(pieces)).query(point[None])
-    return float(np.linalg.norm(closest - point))
+    return ClosestPoints(mesh.points[triangles(cells.take(elements))]).query(point[None])[0]
+
+
+def triangles(facets: Cells) -> IntArray:
+    """Return the triangles (t, 3), as nodes, of a boundary's facets; of a segment its end twice."""
+    parts: list[IntArray] = []
+    for _, table in facets.by_type.values():
+        corners = np.column_stack([table, table[:, -1:]])
+        parts += [corners[:, [0, k, k + 1]] for k in range(1, table.shape[1])]
+    return np.concatenate(parts)
 
 
 WORST = 100  # length of the list of the worst cells

@@ -44,6 +44,7 @@ from slideviz.terms import (
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
+    from slideviz.session.measure import Pick
 
 
 Handle = Literal["", "section", "motion", "boundary"]
@@ -338,6 +339,8 @@ class ViewState:
     section_index: int | None = None  # the place in ``sections`` of the one that is selected
     handle: Handle = ""  # what has a handle
     motion_index: int = 0  # the place of the motion that is chosen
+    picks: tuple[Pick, ...] | None = None
+    """The points that are measured; None while clicks pick none."""
 
     @property
     def flat_index(self) -> int | None:
@@ -353,7 +356,7 @@ class ViewState:
     def in_style(self, style: ViewState) -> ViewState:
         """Return ``style`` with step, selection, marked cell and second view of this view."""
         marked = ("marked_cell", "marked_in")
-        kept = ("selected", "frame", *marked, "beside", "swapped", "motion_index")
+        kept = ("selected", "frame", *marked, "beside", "swapped", "motion_index", "picks")
         return replace(style, **{name: getattr(self, name) for name in kept})
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.viewport import viewing as view_mouse
 from slideviz.mesh import surfaces
+from slideviz.mesh.surfaces import padded
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
+from slideviz.scene.pick import to_display
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.measure import HINT
 from tests.windows import come_to_rest
 
 pytestmark = pytest.mark.window("shared")
@@ -132,3 +136,72 @@ def test_a_section_that_is_dragged_goes_with_fewer_facets_and_what_changes_meanw
     every, some = shown(scene)
     assert not some
     assert name not in every
+
+
+def click(window, node, view=None):
+    """Click where a node is seen, as a user does: the mouse has to be there."""
+    view = view or window.view
+    view.snapshot()
+    place = padded(window.store.session.frame.mesh.points[[node]])
+    x, y = to_display(view, place)[0] / view.devicePixelRatioF()
+    where = QPoint(round(x), round(view.height() - 1 - y))
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=where)
+
+
+def picks(window):
+    return [pick.nodes for pick in window.store.session.view.picks]
+
+
+def test_points_are_measured_by_clicks_copied_and_taken_back_by_esc(driver, with_runs):
+    with_runs({"sliding": "ps", "steps": 1})
+    window = driver.window
+    acts = window.actions_table.by_name
+    assert not acts["copy_measure"].isEnabled()
+    assert "Pick points first" in acts["copy_measure"].toolTip()
+    window.view.setFocus()
+    QTest.keyClick(window.view, Qt.Key.Key_D, Qt.KeyboardModifier.ShiftModifier)
+    assert acts["measure"].isChecked()
+    assert window.statusBar().currentMessage() == HINT
+    assert window.view.cursor().shape() == Qt.CursorShape.CrossCursor
+    mesh = driver.session.frame.mesh
+    corners = [int((mesh.points @ np.array(way)).argmin()) for way in ((1, 1), (-1, 1), (1, -1))]
+    selected = driver.session.view.selected
+    click(window, corners[0])
+    assert picks(window) == [(corners[0],)]
+    assert "the nearest other boundary" in window.statusBar().currentMessage()
+    click(window, corners[1])
+    length = np.linalg.norm(np.diff(mesh.points[corners[:2]], axis=0))
+    assert window.statusBar().currentMessage().startswith(f"Distance {length:.6g}: Δx ")
+    QTest.keyClick(
+        window.view,
+        Qt.Key.Key_D,
+        Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier,
+    )
+    assert QApplication.clipboard().text().startswith(f"Distance {length:.6g}: Δx ")
+    assert window.statusBar().currentMessage().startswith("Copied: Distance")
+    click(window, corners[2])
+    assert picks(window) == [(corner,) for corner in corners]
+    assert window.statusBar().currentMessage().startswith("Angle ")
+    assert driver.session.view.selected == selected, "a click selects no boundary meanwhile"
+    window.store.change(changes.show_beside, changes.UNDEFORMED)
+    driver.qtbot.waitUntil(lambda: window.viewing.second.isVisible())
+    assert "in the other view" in window.statusBar().currentMessage()
+    window.viewing.second_scene.fit()
+    click(window, corners[1], window.viewing.view)
+    assert picks(window) == [(corners[1],)], "the fourth is a first one"
+    window.store.change(changes.show_beside, None)
+    QTest.keyClick(window.view, Qt.Key.Key_Escape)
+    assert picks(window) == []
+    assert window.statusBar().currentMessage() == HINT
+    QTest.keyClick(window.view, Qt.Key.Key_Escape)
+    assert driver.session.view.picks is None
+    assert window.statusBar().currentMessage() == ""
+    assert window.view.cursor().shape() != Qt.CursorShape.CrossCursor
+    names = ("airfoil", "inflow")
+    window.store.change(changes.select, names)
+    acts["measure"].trigger()
+    assert len(picks(window)) == 2
+    assert window.statusBar().currentMessage().startswith("Distance ")
+    acts["measure"].trigger()
+    click(window, int(mesh.marker("inflow").nodes[3]))
+    assert driver.session.view.selected == ("inflow",), "clicks select again"

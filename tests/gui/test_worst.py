@@ -260,7 +260,7 @@ def test_what_is_told_of_a_cell(full):
     assert "inverted" in text
     assert " to " in text.split("corner Jacobians: ")[1]
     assert "x " in text.split("<br>")[2]
-    name, far = nearest_boundary(session.frame.mesh, cell_info(session.frame, cell).position)
+    name, far, _ = nearest_boundary(session.frame.mesh, cell_info(session.frame, cell).position)
     assert f"{far:.4g} from {name}" in text
     every = info_text(session, cell, every=True)
     assert every.split("corner Jacobians: ")[1].count(",") == 3

@@ -53,7 +53,7 @@ def one_cell(points, side, vtk):
 )
 def test_the_nearest_boundary_of_a_plane_mesh(point, wanted):
     mesh = one_cell(np.array([[0.0, 0.0], [1.0, 0.0]]), (0, 1), 3)
-    name, far = nearest_boundary(mesh, np.array(point))
+    name, far, _ = nearest_boundary(mesh, np.array(point))
     assert name == "near"
     assert far == pytest.approx(wanted)
 
@@ -71,7 +71,7 @@ def test_the_nearest_boundary_of_a_plane_mesh(point, wanted):
 def test_the_nearest_face(point, wanted):
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
     mesh = one_cell(corners, (0, 1, 2, 3), 9)
-    name, far = nearest_boundary(mesh, np.array(point))
+    name, far, _ = nearest_boundary(mesh, np.array(point))
     assert name == "near"
     assert far == pytest.approx(wanted)
 

@@ -32,6 +32,7 @@ from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services
 from slideviz.plots.section_picture import SectionStyle
 from slideviz.session import changes, jobs
+from slideviz.session.measure import measure_words
 from slideviz.session.motions import shown_case, wheel_passages
 from slideviz.session.scripts import SCRIPTS
 from slideviz.session.state import Session
@@ -124,6 +125,12 @@ class Exports(QObject):
             QApplication.clipboard().setText(made[place])
             line = made[place].splitlines()[-place]  # a command's first line, a program's last
             self.window.show_status("Copied: " + line.removesuffix(" \\"))
+
+    def copy_measure(self) -> None:
+        """Copy the numbers of the measured points as text."""
+        words = measure_words(self._session)
+        QApplication.clipboard().setText(words)
+        self.window.show_status(f"Copied: {words}")
 
     def section(self, paper: SectionStyle) -> None:
         """Ask for a file name, and write a picture of the selected section."""

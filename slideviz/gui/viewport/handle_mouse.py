@@ -155,6 +155,8 @@ class HandleMouse(QObject):
             self._end(keep=left)
             self._by_key = False
             return True
+        if self.store.session.view.picks is not None:
+            return False
         part = self.part_at(where) if left else None
         if left and (part is None or row) and self._choose_control(where, row=row):
             part = next((one for one in self.parts if one.grip == ("move", ())), None)

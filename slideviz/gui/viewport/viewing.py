@@ -28,6 +28,7 @@ from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.scene.stage import STRIP
 from slideviz.session import changes, jobs
+from slideviz.session.measure import add_pick, drop_pick
 from slideviz.session.motions import Ghosts
 from slideviz.session.panes import choices, close_pane, panes
 from slideviz.session.section_cuts import Cuts
@@ -97,9 +98,11 @@ class CellMouse(QObject):
         self.store.change(changes.mark_cell, None if cell == marked else cell)
 
     def _escape(self) -> bool:
-        """Remove the mark of a cell, else the threshold, else the handle; return whether any."""
+        """Take back a measured point, else the mark of a cell, the threshold or the handle."""
         view = self.store.session.view
-        if view.marked_cell is not None:
+        if view.picks is not None:
+            self.store.change(drop_pick)
+        elif view.marked_cell is not None:
             self.store.change(changes.mark_cell, None)
         elif view.threshold is not None:
             self.store.change(changes.set_view, threshold=None)
@@ -125,6 +128,11 @@ class BoundaryMouse(QObject):
         view.signals.menu_wanted.connect(self._show_menu)
 
     def _select(self, where: QPoint, modifiers: Qt.KeyboardModifier) -> None:
+        if self.store.session.view.picks is not None:
+            picked = self.scene.pick_point(*self.view.to_pixels(where))
+            if picked is not None:
+                self.store.change(add_pick, picked)
+            return
         name = self.scene.pick(*self.view.to_pixels(where))
         selected = self.store.session.view.selected
         if modifiers & Qt.KeyboardModifier.ControlModifier and name:
@@ -441,6 +449,11 @@ class Viewing(QWidget):
             moved = self._ghosts.moved(new.case)
             for scene in self._scenes():
                 scene.set_motion_ghosts(moved)
+        for view, _ in self.views_and_scenes():
+            if new.view.picks is not None:
+                view.setCursor(Qt.CursorShape.CrossCursor)
+            elif old.view.picks is not None:
+                view.unsetCursor()
         if old.mesh is not new.mesh:
             return
         if self.store.dragging:  # the mouse drags a section, for example
