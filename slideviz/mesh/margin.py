@@ -27,9 +27,11 @@ from slideviz.mesh.jacobians import (
     LANES,
     LEVELS,
     add3,
+    column3,
     cross3,
     dot3,
     gather,
+    scaled3,
     write_coefficients,
 )
 from slideviz.mesh.model import BoolArray, Cells, Signs, largest_coordinate
@@ -304,7 +306,7 @@ def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
             modes[6, axis, c] = 0.25 * ((e - d) - (b - a))
     for k in range(7):
         for c in range(count):
-            mode = modes[k, 0, c], modes[k, 1, c], modes[k, 2, c]
+            mode = column3(modes[k], c)
             lengths[k, c] = np.sqrt(dot3(mode, mode))
 
 
@@ -312,12 +314,12 @@ def _write_modes(at, count, modes, lengths):  # type: ignore[no-untyped-def]
 def _write_spare(modes, lengths, turn, far, end, spare):  # type: ignore[no-untyped-def]
     """Write by how much the coefficients of cells, if positive, surely exceed 0 up to ``end``."""
     for c in range(len(turn)):
-        u = modes[0, 0, 0, c], modes[0, 0, 1, c], modes[0, 0, 2, c]
-        v = modes[0, 1, 0, c], modes[0, 1, 1, c], modes[0, 1, 2, c]
-        w = modes[0, 2, 0, c], modes[0, 2, 1, c], modes[0, 2, 2, c]
-        f = end * modes[1, 0, 0, c], end * modes[1, 0, 1, c], end * modes[1, 0, 2, c]
-        g = end * modes[1, 1, 0, c], end * modes[1, 1, 1, c], end * modes[1, 1, 2, c]
-        h = end * modes[1, 2, 0, c], end * modes[1, 2, 1, c], end * modes[1, 2, 2, c]
+        u = column3(modes[0, 0], c)
+        v = column3(modes[0, 1], c)
+        w = column3(modes[0, 2], c)
+        f = scaled3(end, column3(modes[1, 0], c))
+        g = scaled3(end, column3(modes[1, 1], c))
+        h = scaled3(end, column3(modes[1, 2], c))
         uv = cross3(u, v)
         fg = cross3(f, g)
         mixed = add3(cross3(u, g), cross3(f, v))

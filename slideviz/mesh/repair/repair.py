@@ -36,6 +36,7 @@ from slideviz.mesh.repair.energy import Targets, targets
 from slideviz.mesh.repair.freedom import Freedom, places
 from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.mesh.skew import EXPONENTS
+from slideviz.mesh.surfaces import lifted, padded
 from slideviz.system.threads import Tick, cores, equal_shares
 from slideviz.terms import SkewMetric
 
@@ -653,13 +654,15 @@ def _local_lengths(points: FloatArray, tables: Mapping[int, IntArray]) -> FloatA
 
 
 _H = np.sqrt(3) / 2
+_TRIANGLE = np.array([[0, 0], [1, 0], [0.5, _H]])
+_SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 IDEAL: dict[int, FloatArray] = {
-    5: np.array([[0, 0], [1, 0], [0.5, _H]]),
-    9: np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),
-    10: np.array([[0, 0, 0], [1, 0, 0], [0.5, _H, 0], [0.5, _H / 3, np.sqrt(2 / 3)]]),
-    12: np.array([[i, j, k] for k in (0.0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]),
-    13: np.array([[i, j, k] for k in (0.0, 1) for i, j in ((0, 0), (1, 0), (0.5, _H))]),
-    14: np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, np.sqrt(0.5)]]),
+    5: _TRIANGLE,
+    9: _SQUARE,
+    10: np.array([*padded(_TRIANGLE), [0.5, _H / 3, np.sqrt(2 / 3)]]),
+    12: np.concatenate([lifted(_SQUARE, z) for z in (0, 1)]),
+    13: np.concatenate([lifted(_TRIANGLE, z) for z in (0, 1)]),
+    14: np.array([*padded(_SQUARE), [0.5, 0.5, np.sqrt(0.5)]]),
 }
 """Nodes (n, d) of the ideal cell with edges of length 1, by VTK identifier."""
 
