@@ -24,7 +24,7 @@ from slideviz.argument_types import record
 from slideviz.case.model import Case
 from slideviz.case.words import wrong_by
 from slideviz.errors import ConditionWarning, DeformError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate, row_numbers
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf import tape
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
@@ -784,7 +784,7 @@ class _Run:
         slid = _plus_unless_rounding(
             tape.transform(matrix, free), away, ROUNDING * largest_coordinate(setup.coords)
         )
-        copy, origin, turn = self._kept(f"ties of {name}", lambda: self._ties(nodes))
+        copy, origin, turn = self._kept(f"ties of {name}", lambda: setup.ties(nodes))
         if len(copy):
             slid = tape.put(slid, copy, tape.transform(turn, tape.take(slid, origin)))
         held = np.ones((len(nodes), matrix.shape[-1]))
@@ -812,25 +812,6 @@ class _Run:
                 tracks.tracks[index].simplices(which), at[rows], found
             )
         return anchor, matrix
-
-    def _ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return copies among ``nodes``, the nodes that they follow, both as places, and rotations.
-
-        Rotations (t, d, d) turn displacements of the latter into those of the copies, in the frame.
-        """
-        setup = self._setup
-        halo = self._setup.halo
-        d = self._setup.coords.shape[1]
-        if halo is None:
-            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, d, d))
-        row = row_numbers(len(setup.coords), nodes)
-        copy = row[halo.receivers]
-        origin = row[halo.donors]
-        both = (copy >= 0) & (origin >= 0)
-        turn = halo.rotations[both]
-        if setup.frame.cylindrical:
-            turn = np.broadcast_to(np.eye(d), turn.shape)
-        return copy[both], origin[both], turn
 
 
 def _plus_unless_rounding(slid: Array, away: Array, least: float) -> Array:

@@ -242,6 +242,11 @@ class Cells:
             entries = ranges(self.offsets[which], sizes[which])
         return Cells.from_types(self.types[which], self.connectivity[entries])
 
+    def means(self, values: FloatArray) -> FloatArray:
+        """Return the means (m, ...) of values (n, ...) at nodes over the nodes of each cell."""
+        totals = np.add.reduceat(values[self.connectivity], self.offsets[:-1])
+        return (totals.T / np.diff(self.offsets)).T
+
     def same_as(self, other: Cells) -> bool:
         """Return whether both have the same types and connectivity."""
         return np.array_equal(self.types, other.types) and np.array_equal(

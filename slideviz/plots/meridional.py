@@ -87,8 +87,7 @@ def _zone_bins(whole: Mesh, walls: SpanChannel) -> MeridionalBins:
     n = _bins_of(mesh, used[:, 1])
     at = np.full((len(mesh.points), 2), np.nan)
     at[cells.nodes] = used
-    middle = np.add.reduceat(at[cells.connectivity], cells.offsets[:-1])
-    middle /= np.diff(cells.offsets)[:, None]
+    middle = cells.means(at)
     at_row, at_column = np.minimum(middle * (k, n), (k - 1, n - 1)).astype(np.int64).T
     span, share = np.meshgrid(np.linspace(0, 1, k + 1), np.linspace(0, 1, n + 1), indexing="ij")
     low = np.polyval(ends[0], span)

@@ -174,7 +174,5 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
             "the displacement is measured from the undeformed mesh; give that mesh as reference"
         )
     length = row_norms(mesh.points - reference.points)
-    cells = mesh.cells
-    total = np.add.reduceat(length[cells.connectivity], cells.offsets[:-1])
-    values = total / np.diff(cells.offsets)
+    values = mesh.cells.means(length)
     return Paint(by, values, inverted, (0.0, 1.0)).up_to(np.arange(len(values)))

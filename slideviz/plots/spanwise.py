@@ -100,7 +100,7 @@ def in_layers(
         raise SlidevizError(f"{mesh.name} has no extent along {coordinate}; choose another")
     at = height[cells.connectivity]
     first = cells.offsets[:-1]
-    middle = np.add.reduceat(at, first) / np.diff(cells.offsets)
+    middle = cells.means(height)
     usual = np.median(np.maximum.reduceat(at, first) - np.minimum.reduceat(at, first))
     layers = layers or round(min(max((high - low) / max(usual, 1e-300), 1.0), MOST_LAYERS))
     layer = np.clip(((middle - low) / (high - low) * layers).astype(np.int64), 0, layers - 1)

@@ -145,14 +145,12 @@ def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
         free = along < 0.5 * along.max()
         across = int(np.argmax(np.where(free, extent, -1.0))) if free.any() else int(along.argmin())
     # By undeformed positions, so that a layer of cells of a structured mesh stays together.
-    cells = base.cells
-    total = np.add.reduceat(base.points[cells.connectivity, across], cells.offsets[:-1])
-    middle = total / np.diff(cells.offsets)
+    middle = base.cells.means(base.points[:, across])
     behind = np.flatnonzero(middle <= centre[across] + 1e-3 * extent[across])
     normal = np.zeros(3)
     normal[across] = 1.0
     up = np.array([0.0, 1.0, 0.0]) if across == 2 else np.array([0.0, 0.0, 1.0])
-    shown = behind if len(behind) else np.arange(len(cells))
+    shown = behind if len(behind) else np.arange(len(middle))
     return shown, normal + 0.4 * np.cross(up, normal) + 0.3 * up, up
 
 

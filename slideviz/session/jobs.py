@@ -15,8 +15,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from slideviz.argument_types import record
 from slideviz.case.check import check_case
 from slideviz.case.limits import (
@@ -93,8 +91,7 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
     mesh = frame.mesh
     found = frame.quality
     cells = frame.mesh.cells
-    totals = np.add.reduceat(mesh.points[cells.connectivity], cells.offsets[:-1], axis=0)
-    middles = totals / np.diff(cells.offsets)[:, None]
+    middles = cells.means(mesh.points)
     names = {vtk: ELEMENTS[vtk].name for vtk in cells.by_type}
     tick = _tick(f"Writing {path.name}", report, stopped)
 

@@ -21,6 +21,7 @@ from slideviz.errors import Message, note
 from slideviz.machine.span import Span
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import (
+    NO_NODES,
     FloatArray,
     IntArray,
     Mesh,
@@ -292,23 +293,29 @@ class Setup(Domain):
         ``free`` (m, d): their displacements in the step, which may lead off the boundary.
         """
         out = self.tracks.project(coords, nodes, free)
-        self._tie(nodes, out)
+        copy, origin, turn = self.ties(nodes)
+        out[copy] = np.einsum("hij,hj->hi", turn, out[origin])
         out[self.axis[nodes], :2] = 0.0
         out[np.isin(nodes, self.held)] = 0.0
         return out
 
-    def _tie(self, nodes: IntArray, slid: FloatArray) -> None:
-        """Overwrite ``slid`` (m, d) of sliding halo copies by their donors', turned as the halo."""
-        if self.halo is None:
-            return
+    def ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return copies among ``nodes``, the nodes that they follow, both as places, and rotations.
+
+        Rotations (t, d, d) turn displacements of the latter into those of the copies, in the frame.
+        """
+        halo = self.halo
+        d = self.coords.shape[1]
+        if halo is None:
+            return NO_NODES, NO_NODES, np.empty((0, d, d))
         row = row_numbers(len(self.coords), nodes)
-        copy = row[self.halo.receivers]
-        origin = row[self.halo.donors]
+        copy = row[halo.receivers]
+        origin = row[halo.donors]
         both = (copy >= 0) & (origin >= 0)
-        moved = slid[origin[both]]
-        if not self.frame.cylindrical:
-            moved = np.einsum("hij,hj->hi", self.halo.rotations[both], moved)
-        slid[copy[both]] = moved
+        turn = halo.rotations[both]
+        if self.frame.cylindrical:
+            turn = np.broadcast_to(np.eye(d), turn.shape)
+        return copy[both], origin[both], turn
 
 
 def make_setup(prepared: Prepared, moved: Displacements | None = None) -> Setup:
