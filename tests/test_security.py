@@ -62,6 +62,7 @@ def test_the_page_states_the_limits_of_the_code():
     assert (files._MEMORY, files._MEMORY_PER_BYTE) == (2 << 30, 400)
     assert session_file._LARGEST_TEXT == 100_000_000
     assert (foam_file.UNPACKED, foam_file._SPARE) == (200, 1 << 20)
+    assert foam_file.LARGEST_FACE == 100
     assert "private advisories of GitHub" in PAGE
     assert not re.search(r"[\w.]+@[\w.]+", PAGE)
 

@@ -21,6 +21,7 @@ from slideviz.session.opening import guess_roles
 from slideviz.session.state import Guess
 from tests.builders import grid
 from tests.polymesh_files import (
+    HEADER,
     Form,
     extruded,
     honeycomb,
@@ -383,6 +384,43 @@ def test_regions_of_other_folders_are_not_read(tmp_path, name):
     file = case / "constant" / "regionProperties"
     file.write_text(file.read_text().replace("(solid)", f"({name})"))
     with pytest.raises(MeshError, match="regionProperties: names a region of another folder, "):
+        sv.read(case)
+
+
+HEAD = HEADER.format(form="ascii", arch="", kind="labelList", name="x").encode()
+ENDLESS = {
+    "comments": ("points", b"/**/" * 99, "has no header FoamFile"),
+    "slashes": ("points", b"/" * 999 + b"\n x", "has no header FoamFile"),
+    "blanks": ("points", b"FoamFile{a" + b" " * 99_999 + b"}", "expected a list"),
+    "words": ("points", b"FoamFile{" + b"a " * 99_999 + b"}", "expected a list"),
+    "gaps": ("owner", HEAD + b"/**/" * 99, "expected a list, N"),
+    "open": ("boundary", HEAD + b"/* " * 99_999, "its list says '', but has 0 patches"),
+    "bomb": ("owner", HEAD + b"99999999{0}" + b" " * 999_999, "says 99999999, but has 1"),
+}
+
+
+@pytest.mark.parametrize(("name", "content", "message"), ENDLESS.values(), ids=ENDLESS)
+def test_files_that_would_take_forever_are_refused(tmp_path, name, content, message):
+    case = write_mesh(tmp_path, grid((2, 2, 2)))
+    (case / POLY / name).write_bytes(content)
+    with pytest.raises(MeshError, match=message):
+        sv.read(case)
+
+
+def test_a_face_of_too_many_nodes_is_refused(tmp_path):
+    angles = 2 * np.pi * np.arange(101) / 101
+    circle = np.stack([np.cos(angles), np.sin(angles)], 1)
+    points, cells = extruded(circle, [list(range(101))], [0.0, 1.0])
+    write_polymesh(tmp_path / POLY, points, cells, {"all": lambda _: True})
+    with pytest.raises(MeshError, match="has 101 nodes, more than 100; write the mesh again"):
+        sv.read(tmp_path)
+
+
+def test_a_region_is_named_once(tmp_path):
+    case = regions_case(tmp_path / "case")
+    file = case / "constant" / "regionProperties"
+    file.write_text(file.read_text().replace("(solid)", "(solid solid)"))
+    with pytest.raises(MeshError, match="regionProperties: names the region 'solid' twice; name"):
         sv.read(case)
 
 

@@ -128,22 +128,28 @@ def divided(corners: FloatArray, hinges: BoolArray) -> IntArray:
     best = np.full((size, size, count), np.inf)
     split = np.zeros((size, size, count), np.int64)
 
-    def shape(*nodes: int) -> FloatArray:
-        a, b, c = np.moveaxis(corners[:, nodes], 1, 0)
+    def shapes(first: int, last: int) -> FloatArray:
+        """Return the shapes (count, k) of the triangles on a chord, with each corner between."""
+        b = corners[:, first + 1 : last]
+        a = np.broadcast_to(corners[:, [first]], b.shape)
+        c = np.broadcast_to(corners[:, [last]], b.shape)
         squares = row_norms(b - a) ** 2 + row_norms(c - b) ** 2 + row_norms(a - c) ** 2
-        shapes = row_dots(np.cross(b - a, c - a), normal) / np.fmax(squares, np.finfo(float).tiny)
-        cut = [node for node in nodes if {(node - 1) % size, (node + 1) % size} < {*nodes}]
-        return np.where(hinges[:, cut].any(axis=1), shapes - 1.0, shapes)
+        areas = np.cross(b - a, c - a).reshape(-1, 3)
+        found = row_dots(areas, np.repeat(normal, b.shape[1], axis=0)).reshape(squares.shape)
+        found /= np.fmax(squares, np.finfo(float).tiny)
+        cut = np.zeros(found.shape, bool)
+        if last - first == 2:
+            cut[:, 0] |= hinges[:, first + 1]
+        if last - first == size - 1:
+            cut[:, 0] |= hinges[:, first]
+            cut[:, -1] |= hinges[:, last]
+        return np.where(cut, found - 1.0, found)
 
     for length in range(2, size):
         for first in range(size - length):
             last = first + length
-            worst = np.array(
-                [
-                    np.minimum(np.minimum(best[first, k], best[k, last]), shape(first, k, last))
-                    for k in range(first + 1, last)
-                ]
-            )
+            sides = np.minimum(best[first, first + 1 : last], best[first + 1 : last, last])
+            worst = np.minimum(sides, shapes(first, last).T)
             split[first, last] = worst.argmax(axis=0) + first + 1
             best[first, last] = worst.max(axis=0)
     rows = np.arange(count)

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +26,16 @@ from slideviz.system.file_checks import require_regular_file
 UNPACKED = 200
 """Most bytes that a byte of a compressed file is unpacked to, besides `_SPARE`."""
 _SPARE = 1 << 20
-_GAP = rb"(?:\s|//[^\n]*|/\*.*?\*/)*"
-_HEADER = re.compile(_GAP + rb"FoamFile\s*\{(.*?)\}", re.DOTALL)
-_ENTRY = re.compile(r"(\w+)\s+(\"[^\"]*\"|[^;\"]*?)\s*;")
-_LIST = re.compile(_GAP + rb"(\d{1,18})\s*([({])", re.DOTALL)
-_WORDS = re.compile(r"\"[^\"]*\"|[{}();]|[^\s{}();\"]+")
-_COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
+LARGEST_FACE = 100
+"""Most nodes of a face: the time to divide one is in proportion to the third power of them."""
+# Every repetition is possessive, and what is not closed goes on to the end: so no file makes them
+# try again and again.
+_REMARK = rb"//[^\n]*+|/\*(?>.*?(?:\*/|\Z))"
+_GAP = rb"(?>\s++|" + _REMARK + rb")*+"
+_HEADER = re.compile(_GAP + rb"FoamFile\s*+\{([^}]*+)\}", re.DOTALL)
+_LIST = re.compile(_GAP + rb"(\d{1,18})\s*+([({])", re.DOTALL)
+_WORDS = re.compile(r"\"[^\"]*+\"|[{}();]|[^\s{}();\"]++|\"")
+_COMMENT = re.compile(_REMARK, re.DOTALL)
 _BARE = bytes.maketrans(b"()", b"  ")
 
 
@@ -95,7 +102,7 @@ class FoamFile:
         ends = b"}" if uniform else b")"
         last = self.data.rfind(ends) if width > 1 else self.data.find(ends, first)
         values = self._parsed(self.data[first : max(last, first)].translate(_BARE), dtype)
-        if uniform and len(values) == width and count <= UNPACKED * len(self.data) + _SPARE:
+        if uniform and len(values) == width and count <= _SPARE:
             values = np.tile(values, items)
         if len(values) != count or last < first:
             raise self.fault(f"its list says {items}, but has {len(values) // width}")
@@ -130,8 +137,13 @@ class FoamFile:
                 raise self.fault(f"face {wrong} has another number of nodes than it says")
             offsets = offsets_of(sizes)
             nodes = np.delete(values, np.concatenate([marks, marks - 1]))
-        if (np.diff(offsets) < 3).any():
-            raise self.fault(f"face {np.argmax(np.diff(offsets) < 3)} has fewer than 3 nodes")
+        sizes = np.diff(offsets)
+        if (sizes < 3).any():
+            raise self.fault(f"face {np.argmax(sizes < 3)} has fewer than 3 nodes")
+        if (sizes > LARGEST_FACE).any():
+            raise self.fault(
+                f"face {np.argmax(sizes)} has {sizes.max():,} nodes, more than {LARGEST_FACE}"
+            )
         return offsets, nodes
 
     def patches(self) -> list[Patch]:
@@ -139,10 +151,9 @@ class FoamFile:
         text = _COMMENT.sub(b" ", self.data[self.begin :]).decode("utf-8", "backslashreplace")
         count, _, body = text.partition("(")
         patches = []
-        while (word := _WORDS.match(body := body.lstrip())) and word[0] != ")":
-            name = word[0]
-            inside, _, body = body[len(name) :].lstrip().removeprefix("{").partition("}")
-            entries = dict(_ENTRY.findall(inside))
+        words = (word[0] for word in _WORDS.finditer(body))
+        for name in iter(partial(next, words, ")"), ")"):
+            entries = _entries(takewhile(lambda word: word != "}", words))
             try:
                 start = int(entries["startFace"])
                 faces = int(entries["nFaces"])
@@ -175,7 +186,7 @@ def read_foam_file(path: Path) -> FoamFile:
     header = _HEADER.match(data)
     if header is None:
         raise path_error(path, "has no header FoamFile { ... }; expected a file of OpenFOAM")
-    entries = dict(_ENTRY.findall(header[1].decode("latin-1")))
+    entries = _entries(word[0] for word in _WORDS.finditer(header[1].decode("latin-1")))
     arch = entries.get("arch", "")
     order = ">" if "MSB" in arch else "<"
     label = 8 if "label=64" in arch else 4
@@ -189,6 +200,20 @@ def read_foam_file(path: Path) -> FoamFile:
         np.dtype(f"{order}i{label}"),
         np.dtype(f"{order}f{scalar}"),
     )
+
+
+def _entries(words: Iterable[str]) -> dict[str, str]:
+    """Return the entries ``key value;`` of a dictionary by their keys: the first word of each."""
+    entries = {}
+    entry: list[str] = []
+    for word in words:
+        if word not in ";{":
+            entry.append(word)
+            continue
+        if word == ";" and len(entry) > 1:
+            entries[entry[0]] = entry[1]
+        entry = []
+    return entries
 
 
 def _unpacked(path: Path, data: bytes) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,6 +67,9 @@ def read_polymesh(path: Path, zone: int | None, progress: Tick) -> Mesh:
                 f"names a region of another folder, {printable(name)!r}, which is not read; put it "
                 "into the same folder",
             )
+    if len(set(names)) < len(names):
+        [(often, _)] = Counter(names).most_common(1)
+        raise path_error(path, f"names the region {printable(often)!r} twice; name each once")
     numbers = range(1, len(names) + 1) if zone is None else (zone,)
     if not names or not 1 <= numbers[0] <= len(names):
         raise path_error(path, f"there is no zone {zone or 1}: its regions are {', '.join(names)}")
