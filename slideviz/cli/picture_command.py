@@ -12,7 +12,7 @@ from slideviz.cli.progress import Bar
 from slideviz.cli.report import print_remarks
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
-from slideviz.export.offscreen import check_drawable, check_png
+from slideviz.export.offscreen import check_drawable, check_picture
 from slideviz.mesh.model import Mesh
 from slideviz.scene.overview import require_detail
 from slideviz.solver.deform import Step
@@ -20,7 +20,7 @@ from slideviz.solver.deform import Step
 
 def main(arguments: Namespace) -> int:
     """Deform a mesh as a case says, and write a picture of a step; return the exit code."""
-    check_png(arguments.output)
+    check_picture(arguments.output)
     check_drawable(arguments.size)
     if arguments.step == 0 and arguments.beside:
         raise CaseError(

@@ -235,10 +235,10 @@ def _require_output_paths(
         )
     if arguments.picture:
         # Late: VTK takes 0.6 s.
-        from slideviz.export.offscreen import check_drawable, check_png
+        from slideviz.export.offscreen import check_drawable, check_picture
         from slideviz.export.offscreen_renderer import PICTURE_SIZE
 
-        check_png(arguments.picture)
+        check_picture(arguments.picture)
         check_drawable(arguments.picture_size or PICTURE_SIZE)
     require_output_paths(
         arguments,

@@ -133,10 +133,17 @@ def png_bytes(image: NDArray[np.uint8], **known: Any) -> bytes:
     return data.getvalue()
 
 
-def check_png(file: Path) -> None:
-    """Raise SlidevizError if the name of a picture does not end with .png."""
-    if file.suffix.lower() != ".png":
-        raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
+WEB_PAGE = ".html"
+"""The ending of a picture that can be turned in a browser."""
+
+
+def check_picture(file: Path) -> None:
+    """Raise SlidevizError if the name of a picture does not end with .png or .html."""
+    if file.suffix.lower() not in (".png", WEB_PAGE):
+        raise SlidevizError(
+            f"{file}: pictures are PNG, or web pages that can be turned; end the name with .png "
+            f"or {WEB_PAGE}"
+        )
 
 
 def display_fault() -> str:

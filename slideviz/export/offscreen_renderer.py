@@ -20,8 +20,9 @@ from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import (
     LETTERS,
     TITLE,
+    WEB_PAGE,
     check_drawable,
-    check_png,
+    check_picture,
     image_of,
     offscreen,
     png_bytes,
@@ -30,6 +31,7 @@ from slideviz.export.offscreen import (
 )
 from slideviz.export.picture_options import PictureOptions, headings, line_between, panes
 from slideviz.export.titles import DETAIL, caption, label_marked_cell
+from slideviz.export.web_page import web_page
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
@@ -232,10 +234,15 @@ class OffscreenRenderer:
     def write(self, options: PictureOptions, file: Path) -> None:
         """Write the picture as a PNG file, whole or not at all; that of a view with its case.
 
-        Raises SlidevizError if the size cannot be drawn, the name does not end with .png, or the
-        file cannot be written.
+        With a name that ends with .html it is a web page that can be turned. Raises SlidevizError
+        if the size cannot be drawn, the name has another ending, or the file cannot be written.
         """
-        check_png(file)
+        check_picture(file)
+        if file.suffix.lower() == WEB_PAGE:
+            one = replace(options, both=False)
+            words, _ = headings((self.session,), one)
+            write_whole(file, web_page(self.aim(one), self.session, words[0]))
+            return
         known: dict[str, Any] = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}
         if self.like is not None and options.case:
             shown = replace(self.session, case=shown_case(self.session))
@@ -320,12 +327,12 @@ _SMALL = 10  # mean size of cells in pixels below which they are drawn without e
 def picture(
     session: Session, file: str | Path, size: tuple[int, int] = PICTURE_SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of what a session shows, a run or a mesh alone, for `slideviz.picture`.
+    """Write what a session shows, a run or a mesh alone, for `slideviz.picture`: PNG or HTML.
 
     With the zoom ``view``, it is the picture of the view that the case has. Raises SlidevizError if
     the size cannot be drawn, or the file cannot be written.
     """
-    check_png(Path(file))
+    check_picture(Path(file))
     assert session.frame is not None
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         words = caption(Path(session.frame.mesh.name).name, session.frame.quality)

@@ -37,7 +37,7 @@ def picture(
     zoom: Zoom = "auto",
     beside: tuple[Case, Step] | Literal["undeformed"] | None = None,
 ) -> None:
-    """Write a PNG of a mesh in the colors of its quality, with name and quality as title.
+    """Write a picture of a mesh in the colors of its quality, with name and quality as title.
 
     A 2D mesh is shown whole. Of a 3D mesh, the whole cells behind a plane are shown, which goes
     through the boundary that moved most, along its displacement.
@@ -45,7 +45,8 @@ def picture(
     Parameters
     ----------
     path : str or Path
-        The PNG file; one that exists is replaced.
+        The PNG file, or with the ending ``.html`` a web page that can be turned by the mouse; one
+        that exists is replaced.
     mesh : Mesh
         What to show.
     reference : Mesh, optional

@@ -61,7 +61,9 @@ def test_the_half_of_a_3d_mesh_shows_the_hole_that_moved(tmp_path, cube):
 
 
 def test_other_endings_are_refused(tmp_path, square):
-    with pytest.raises(SlidevizError, match=r"pictures are PNG; end the name with \.png"):
+    with pytest.raises(
+        SlidevizError, match=r"pictures are PNG, or web pages .*; end the name with \.png or \.html"
+    ):
         picture(shown(square), tmp_path / "a.jpg", size=(100, 80))
     assert not list(tmp_path.iterdir())
 

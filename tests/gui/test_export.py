@@ -925,6 +925,15 @@ def test_a_report_has_the_view_and_all_runs(with_runs, tmp_path, answers):
     assert str(path) in driver.window.statusBar().currentMessage()
 
 
+def test_the_view_becomes_a_web_page(ran, tmp_path, answers):
+    answers("ask_save", tmp_path / "view")
+    ran.window.actions_table.by_name["export_page"].trigger()
+    text = (tmp_path / "view.html").read_text(encoding="utf-8")
+    assert "<canvas" in text
+    assert "min 0." in text, "the title has the quality"
+    assert "view.html" in ran.window.statusBar().currentMessage()
+
+
 def test_a_report_that_cannot_be_written_says_so(ran, tmp_path, answers):
     answers("ask_save", tmp_path / "no" / "all.html")
     ran.window.actions_table.by_name["export_report"].trigger()

@@ -13,7 +13,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.export.flat_section import save_section
 from slideviz.export.html_report import write_html_report
-from slideviz.export.offscreen import LETTERS
+from slideviz.export.offscreen import LETTERS, WEB_PAGE
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import SUFFIXES, write_vector
@@ -149,6 +149,13 @@ class Exports(QObject):
                 with self._renderer() as renderer, wait_cursor():
                     write_html_report(path, renderer)
                 self._written(path)
+
+    def web_page(self) -> None:
+        """Ask for a file name, and write the view as a web page that can be turned."""
+        if path := self._ask("Save web page", WEB_PAGE, "HTML page (*.html)"):
+            with self._renderer() as renderer:
+                options = PictureOptions(title=True, fill=False).like(self._session.view)
+                self._write_picture(renderer, options, path.with_suffix(WEB_PAGE))
 
     # Films -----------------------------------------------------------------------------
     def make_film(self) -> None:
