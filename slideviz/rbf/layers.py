@@ -111,9 +111,10 @@ class Wall:
     sides: IntArray
     """(f, 2 or 4): numbers of the smooth sides of the wall at its nodes: at a sharp edge a node has
     several, each of which turns by itself."""
-    thickness: float  # of its zone, in the mesh's length unit
+    thickness: FloatArray
     first: FloatArray
-    """(w,): at its nodes, ascending, the height of the first layer, which is wholly in the zone."""
+    """`thickness`, `first` (w,): at its nodes, ascending, the thickness of its zone in the mesh's
+    length unit, and the height of the first layer, which is wholly in the zone."""
     moves: bool  # whether its nodes are moving ones; others stay
 
 
@@ -252,8 +253,10 @@ class WallNodes:
         count = min(ALIKE, tree.n)
         heights = np.append(np.tile(wall.first, images), 0.0)
         height = np.full(len(targets), -1.0)
+        depths = np.append(np.tile(wall.thickness, images), 0.0)
+        depth = np.ones(len(targets))
         size = row_norms(np.ptp(closest.corners, axis=1)).max(initial=0.0)
-        reach = float(np.hypot(heights.max() + wall.thickness, CORNER * size))
+        reach = float(np.hypot(heights.max() + depths.max(), CORNER * size))
 
         def find(part: slice) -> None:
             gap, index = tree.query(targets[part], k=count, distance_upper_bound=reach)
@@ -262,15 +265,19 @@ class WallNodes:
             alike = gap <= (1.0 + 1e-9) * gap[:, :1]
             highest = np.where(alike, heights[index], 0.0).max(axis=1)
             height[part] = np.where(np.isfinite(gap[:, 0]), highest, -1.0)
+            near = np.clip(gap, TINY, 1.0 / TINY)
+            weight = (near[:, :1] / near) ** POWER
+            weight *= _faded(near, np.isfinite(gap), count < tree.n)
+            depth[part] = (weight * depths[index]).sum(axis=1) / weight.sum(axis=1)
 
         in_parts(find, len(targets))
         some = np.flatnonzero(height >= 0.0)
         gap = row_norms(closest.query(targets[some]) - targets[some])
-        inside = gap < height[some] + wall.thickness
+        inside = gap < height[some] + depth[some]
         some = some[inside]
         gap = gap[inside]
-        share = 1.0 - smooth((gap - height[some]) / wall.thickness)
-        limit = height[some] + wall.thickness
+        share = 1.0 - smooth((gap - height[some]) / depth[some])
+        limit = height[some] + depth[some]
         gap = np.maximum(gap, np.maximum(1e-9 * limit, TINY))
         return some, gap, share, (limit / gap) ** POWER
 
@@ -563,7 +570,7 @@ class LayerZone:
         ``height`` (z,): parts of the heights that are left; None: all of them are.
         ``points`` (n, d): where the nodes are.
         """
-        walls = tuple((wall.names, wall.thickness) for wall, *_ in self.walls.walls)
+        walls = tuple((wall.names, float(wall.thickness.max())) for wall, *_ in self.walls.walls)
         gave_way = []
         if height is not None:
             low = (height < GIVEN) & (self.share[:, 0] > RIGID)

@@ -2,7 +2,8 @@
 
 The thickness is found from the cells at the boundary alone, as a streamed mesh has them: a layer of
 height h on facets of length l, growing by a fifth from cell to cell, is 2 l - 6 h thick where its
-cells are a third as high as long; where they are h from the beginning, the zone fades over h.
+cells are a third as high as long; where they are h from the beginning, the zone fades over h. Of a
+wall it is the median of its facets, and less where these are shorter.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ TOUCHING = 1e-9  # distance over the thickness of a zone up to which walls touch
 ALONG = 0.5  # cosine to the normal of the wall from which an edge leads out of its layers
 LEAST = 0.02  # least part of the heights of layers that is left
 SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
+NARROW = 1.5  # largest thickness of a zone at a node over that by the facets there
 
 
 def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> LayerZone | None:
@@ -140,20 +142,35 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
             some = np.flatnonzero(chosen)[part == label]
             extent = np.ptp(points[np.unique(boundary.facets[some])], axis=0).max()
             flat = some[height[some] > 0.0]
-            fading = np.maximum(2.0 * length[flat] - 6.0 * height[flat], height[flat])
-            thickness = np.median(fading) if len(flat) else np.inf
+            fading = np.maximum(2.0 * length[some] - 6.0 * height[some], height[some])
+            fading[height[some] == 0.0] = np.inf
+            usual = np.median(fading[np.isfinite(fading)]) if len(flat) else np.inf
+            thickness = _thickness(boundary.facets[some], fading, min(SIZE * extent, usual))
+            if case.layer_thickness:
+                thickness[:] = min(case.layer_thickness, mesh.extent)
             walls.append(
                 Wall(
                     tuple(boundary.names[m] for m in np.unique(boundary.marker[some])),
                     boundary.facets[some],
                     sides[some],
-                    min(case.layer_thickness, mesh.extent)
-                    or min(SIZE * float(extent), float(thickness)),
+                    thickness,
                     _first_heights(columns, rise, some, height[flat]),
                     role == "moving",
                 )
             )
     return walls
+
+
+def _thickness(facets: IntArray, fading: FloatArray, most: float) -> FloatArray:
+    """Return how thick the zone is at the nodes of ``facets`` (f, 2 or 4), ascending, (w,).
+
+    At most ``most``, and `NARROW` times the least ``fading`` (f,) of the facets at each: where
+    these are short, as at a leading edge, cells are round near the wall, and would be held.
+    """
+    nodes, corners = np.unique(facets, return_inverse=True)
+    out = np.full(len(nodes), most)
+    np.minimum.at(out, corners.reshape(facets.shape), NARROW * fading[:, None])
+    return out
 
 
 def _sides(domain: Domain, chosen: np.ndarray) -> IntArray:
@@ -211,7 +228,7 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
     if zone is None:
         return []
     if not len(zone.nodes) and not isinstance(mesh, Skin):  # which may have none
-        thickness = max(wall.thickness for wall, *_ in zone.walls.walls)
+        thickness = max(float(wall.thickness.max()) for wall, *_ in zone.walls.walls)
         sentence = (
             f"LAYERS= {case.layers.upper()} has no effect, since no node is nearer to a wall than "
             f"{thickness:.3g}; write a LAYER_THICKNESS of several cells"
@@ -234,7 +251,8 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
     warnings = []
     for wall, *_ in zone.walls.walls:
         first = float(np.median(wall.first))
-        if wall.thickness < first:
+        thickness = float(wall.thickness.max())
+        if thickness < first:
             warnings.append(
                 f"LAYER_THICKNESS= {case.layer_thickness:g} is less than the height of the first "
                 f"layer at {' and '.join(wall.names)}, {first:.3g}: only this layer goes with the "
@@ -246,8 +264,8 @@ def thickness_warnings(case: Case, mesh: Mesh, domain: Domain, zone: LayerZone |
         tree = cKDTree(frame.points(coords[mine]))
         points = (frame.points(coords[some] + k * frame.shift()) for some, k in near)
         gaps = [np.min(tree.query(each)[0], initial=np.inf) for each in points]
-        room = min((gap for gap in gaps if gap > TOUCHING * wall.thickness), default=np.inf)
-        if wall.thickness > room:
+        room = min((gap for gap in gaps if gap > TOUCHING * thickness), default=np.inf)
+        if thickness > room:
             warnings.append(
                 f"LAYER_THICKNESS= {case.layer_thickness:g} is more than the distance from "
                 f"{' and '.join(wall.names)} to the next wall, {room:.3g}: cells between them may "

@@ -110,6 +110,40 @@ def test_first_heights_that_differ_along_the_wall_stay(motion):
     assert 0.99 < ratio["min"] <= ratio["max"] < 1.01
 
 
+@pytest.mark.parametrize("slender", [0.12, 0.03])
+def test_a_zone_is_thinner_where_facets_are_shorter(slender):
+    """At the ends of an ellipse facets are shorter by its slenderness."""
+    mesh = around(lambda angle: ellipse(angle, slender), 40, 80)
+    case, _ = deformed(mesh, Translate("w", (0.0, 0.1)))
+    zone = make_setup(prepare(case, mesh)).zone
+    wall = mesh.points[:80]
+    length = np.linalg.norm(np.roll(wall, -1, axis=0) - wall, axis=1)
+    near = np.max([np.roll(length, k) for k in range(-2, 3)], axis=0)
+    apart = np.linalg.norm(mesh.points[zone.nodes, None] - wall, axis=2)
+    at = apart.argmin(axis=1)
+    assert set(at) == set(range(80))
+    assert (apart.min(axis=1) < 1e-4 + 2.0 * near[at]).all()
+
+
+@pytest.mark.parametrize(("part", "least"), [(0.3, 0.7), (0.6, 0.64), (1.0, 0.57)])
+def test_a_much_thicker_nose_keeps_heights_and_good_cells(part, least):
+    """A zone as thick as the long facets beside the nose held round cells: lowest 0.49."""
+    mesh = c_mesh(joukowski, first=2e-6)
+    nodes = np.unique(mesh.marker("airfoil").nodes)
+    y = mesh.points[nodes, 1]
+    case = Case(
+        roles={"airfoil": "moving"},
+        motions=(Prescribed(nodes, np.stack([0 * y, part * y], axis=1), "airfoil"),),
+        relax="auto",
+        layers="auto",
+        repair="auto",
+    )
+    *_, last = sv.deform(case, mesh)
+    ratio = sv.walls(last.mesh, mesh).summary()["airfoil"]["first_height"]["ratio"]
+    assert 0.98 < ratio["min"] <= ratio["max"] < 1.02
+    assert sv.quality(last.mesh, mesh).min > least
+
+
 def test_a_wall_that_only_turns_takes_its_zone_along_exactly():
     mesh = around(ellipse, 40, 80)
     case, last = deformed(mesh, Rotate("w", 25.0, (0.3, 0.1)), steps=2)
