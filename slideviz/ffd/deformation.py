@@ -19,7 +19,7 @@ from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CARTESIAN, Box, Embedding
 from slideviz.ffd.kinds import Move, Shift, Twist
-from slideviz.mesh.model import FloatArray, IntArray, row_norms
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, row_norms
 
 INSIDE = 1e-8
 """A parametric coordinate may be so far outside of [0, 1]: a point on a side is inside."""
@@ -59,9 +59,18 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     for first in range(0, len(chosen), CHUNK):
         rows = chosen[first : first + CHUNK]
         uvw[rows] = _solved(box, spatial[rows], size)
-    inside = np.asarray(((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1))
+    inside = _are_inside(uvw)
     uvw[~inside] = np.nan
     return np.clip(uvw, 0.0, 1.0), inside
+
+
+def _closest(points: FloatArray, size: FloatArray) -> float:
+    """Return the distance over the size of a box (3,) within which a point is met."""
+    return CLOSE + ROUNDING * float((np.abs(points).max(initial=0.0) / size).max())
+
+
+def _are_inside(uvw: FloatArray) -> BoolArray:
+    return np.asarray(((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1))
 
 
 def placed_again(box: Box, points: FloatArray, uvw: FloatArray) -> FloatArray:
@@ -71,8 +80,7 @@ def placed_again(box: Box, points: FloatArray, uvw: FloatArray) -> FloatArray:
     """
     size = np.ptp(box.points.reshape(-1, 3), axis=0)
     found, gap = _newton(box, points, uvw, size)
-    close = CLOSE + ROUNDING * float((np.abs(points).max(initial=0.0) / size).max())
-    if (gap > close).any():
+    if (gap > _closest(points, size)).any():
         raise CaseError(
             f"the FFD box {box.name!r} folds over, or loses nodes, where its parent or one inside "
             "it moves these; move control points less"
@@ -93,14 +101,13 @@ def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
     _, nearest = cKDTree(box.at(seeds)).query(points, k=min(STARTS, len(seeds)))
     coordinates = np.full(points.shape, np.nan)
     left = np.arange(len(points))
-    close = CLOSE + ROUNDING * float((np.abs(points).max(initial=0.0) / size).max())
+    close = _closest(points, size)
     for start in np.atleast_2d(nearest.T):
         uvw, gap = _newton(box, points[left], seeds[start[left]], size)
         met = gap <= close
         coordinates[left[met]] = uvw[met]
         # Outside of the box there may be a second solution within it, where it is bent.
-        within = ((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1)
-        left = left[~(met & within)]
+        left = left[~(met & _are_inside(uvw))]
         if not len(left):
             break
     return coordinates
