@@ -131,9 +131,22 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
 
 _OURS = ("gridFile", "case", "displacements")
 _THEIRS = (
-    *("fileType", "specifiedSurfaces", "symmetrySurfaces", "symmetryPlanes", "aExp", "bExp"),
-    *("LdefFact", "alpha", "errTol", "evalMode", "symmTol", "useRotations", "zeroCornerRotations"),
-    *("cornerAngle", "restartFile", "bucketSize"),
+    "fileType",
+    "specifiedSurfaces",
+    "symmetrySurfaces",
+    "symmetryPlanes",
+    "aExp",
+    "bExp",
+    "LdefFact",
+    "alpha",
+    "errTol",
+    "evalMode",
+    "symmTol",
+    "useRotations",
+    "zeroCornerRotations",
+    "cornerAngle",
+    "restartFile",
+    "bucketSize",
 )
 """Options of IDWarp; they are accepted and have no effect here."""
 
