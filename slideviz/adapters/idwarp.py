@@ -23,7 +23,7 @@ from slideviz.design.deformer import Deformer
 from slideviz.errors import CaseError
 from slideviz.formats.cgns.read import CgnsForm
 from slideviz.formats.files import read, write
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, places_in, row_norms
 
 COINCIDES = 1e-8
 """Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""
@@ -52,8 +52,7 @@ class SolverSurface:
     @cached_property
     def place(self) -> IntArray:
         """Return the place of each node among the moving ones (N,), or -1."""
-        at = np.minimum(np.searchsorted(self.moving, self.nodes), len(self.moving) - 1)
-        return np.where(self.moving[at] == self.nodes, at, -1)
+        return places_in(self.moving, self.nodes)
 
     @cached_property
     def held(self) -> BoolArray:

@@ -39,6 +39,7 @@ from slideviz.mesh.model import (
     frozen_array,
     largest_coordinate,
     largest_norm,
+    places_in,
     row_norms,
     row_numbers,
 )
@@ -347,8 +348,7 @@ def zone_designs(
         points = np.arange(part.points.start, part.points.stop)
         mine = part.mesh.nodes_of(own.markers_with("moving")) + part.points.start
         leaders = motion.leader[mine]
-        place = np.searchsorted(nodes, leaders).clip(max=len(nodes) - 1)
-        rows = np.where(nodes[place] == leaders, place, -1)
+        rows = places_in(nodes, leaders)
         # Rims that are kept on walls go otherwise than the design says.
         follows = motion.led[mine] & ((rows < 0) | (own.rims == "slide") & deformed[leaders])
         rows[follows] = -1

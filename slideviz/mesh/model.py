@@ -92,6 +92,12 @@ def row_numbers(count: int, chosen: IntArray) -> IntArray:
     return places
 
 
+def places_in(ordered: IntArray, wanted: IntArray) -> IntArray:
+    """Return the places (m,) of numbers (m,) in ordered ones (n,), -1 of those not among them."""
+    at = np.searchsorted(ordered, wanted).clip(max=len(ordered) - 1)
+    return np.where(ordered[at] == wanted, at, -1)
+
+
 def run_begins(rows: NDArray) -> BoolArray:
     """Return the mask (n,) of rows (n, ...) that differ from the row before, and of the first."""
     new = rows[1:] != rows[:-1]

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, mask_of
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, mask_of, places_in
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
 from slideviz.rbf.operations import columns, radial_sum, terms
@@ -182,9 +182,9 @@ class CarriedError:
 
     def at(self, nodes: IntArray) -> Array:
         """Return the errors (..., m, d) at nodes (m,); zero at nodes that are not in ``nodes``."""
-        row = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
+        row = places_in(self.nodes, nodes)
         errors = take(self.values, row)
-        outside = np.flatnonzero(self.nodes[row] != nodes)
+        outside = np.flatnonzero(row < 0)
         nothing = np.zeros((len(outside), value(errors).shape[-1]))
         return put(errors, outside, nothing) if len(outside) else errors
 

@@ -21,6 +21,7 @@ from slideviz.mesh.model import (
     IntArray,
     largest_coordinate,
     largest_size,
+    places_in,
     row_dots,
     row_norms,
 )
@@ -318,8 +319,8 @@ class Rims:
         ``nodes`` (k,): of those that move, ``points`` (k, d) undeformed and Cartesian.
         ``vectors`` (k, d): their displacements; images that are not among them move alike.
         """
-        place = np.searchsorted(self.nodes, nodes).clip(max=len(self.nodes) - 1)
-        rows = np.flatnonzero(self.nodes[place] == nodes)[::-1]  # of images the first one counts
+        place = places_in(self.nodes, nodes)
+        rows = np.flatnonzero(place >= 0)[::-1]  # of images the first one counts
         shift = np.zeros_like(self.start)
         shift[self.representative[place[rows]]] = self.frame.difference(points[rows], vectors[rows])
         positions = self.start + shift[self.representative]

@@ -82,7 +82,7 @@ from slideviz.ffd.kinds import (
 )
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, row_norms
+from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, places_in, row_norms
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import padded
 from slideviz.solver.prepare import prepare
@@ -702,8 +702,8 @@ class MovedBoxes(Displacer):
         nodes = self.nodes[places]
         surfaces = {}
         for marker, (listed, before) in box.embedded.items():
-            rows = np.minimum(np.searchsorted(nodes, listed), len(nodes) - 1)
-            moves = (nodes[rows] == listed) & (marker in self.config.markers)
+            rows = places_in(nodes, listed)
+            moves = (rows >= 0) & (marker in self.config.markers)
             surfaces[marker] = listed, np.where(moves[:, None], uvw[rows], before)
         return surfaces
 
