@@ -28,7 +28,7 @@ from slideviz.solver.remedies import MOST_NAMES, Remedy, beyond_pitch, fixed_bes
 from slideviz.solver.setup import LOOSE
 from slideviz.system.platform import free_memory
 from slideviz.system.weak_cache import weak_cache
-from slideviz.terms import KERNELS
+from slideviz.terms import KERNELS, Texts
 
 LARGE = 1e9  # bytes of memory from which on there is a message before a run on what it takes
 RATE = 2e10
@@ -168,14 +168,14 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: Message | None = None) -> s
 @weak_cache
 def _advice(run: Run, mesh: Mesh) -> tuple[str, tuple[Remedy, ...]]:
     """Return a sentence if the motion is beyond the pitch, or "", and the remedies of a run."""
-    beside: tuple[str, ...] = ()
+    beside: Texts = ()
     if run.last is not None:
         beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
     pitch = beyond_pitch(run.case, mesh)
     return pitch, remedies(run.case, beside, pitch, run.last_step)
 
 
-def remarks_of(run: Run, level: Level) -> tuple[str, ...]:
+def remarks_of(run: Run, level: Level) -> Texts:
     """Return the warnings of a run, or its notes."""
     return tuple(with_field_labels(str(message)) for message in _messages_of(run, level))
 
@@ -215,7 +215,7 @@ class Notice:
     text: str
     leads: Requirement | None = None  # where a button leads
     settings: Settings = ()  # a button makes each of these
-    commands: tuple[str, ...] = ()  # names of commands that help
+    commands: Texts = ()  # names of commands that help
 
 
 def notices(session: Session, missing: tuple[Requirement, ...]) -> Iterator[Notice]:
@@ -359,7 +359,7 @@ _KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:{_VALUE})?)?")
 _KERNEL = re.compile(rf"\b({'|'.join(KERNELS)})\b(?= is too)|\b\w+-c\d[ab]?\b")
 
 
-def idle_text(case: Case) -> tuple[str, ...]:
+def idle_text(case: Case) -> Texts:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     sentences: list[str] = []
     for names, mode, title, verb in (

@@ -193,7 +193,8 @@ class BoundariesPanel(Panel):
             count = QTableWidgetItem()
             count.setTextAlignment(ALIGN_RIGHT)
             self.table.setItem(row, COUNT, count)
-            choice = Choice(labels(ROLES))
+            tips = {role: f"{role}: {ROLES[role].tip}" for role in ROLES}
+            choice = Choice(labels(ROLES), tips=tips)
             choice.setFrame(False)
             # The tab key goes on to the next panel: F2 opens the roles. A click on one gives the
             # focus to the table: arrows go to other rows, and change no role. With the table as
@@ -201,7 +202,6 @@ class BoundariesPanel(Panel):
             choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
-            choice.set_tips({role: f"{role}: {ROLES[role].tip}" for role in ROLES})
             choice.chosen.connect(partial(self._role_chosen, name))
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)

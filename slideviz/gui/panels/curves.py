@@ -101,9 +101,8 @@ class CurvesPanel(Panel):
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
-        self.kind = Choice(KINDS, name="curve_kind")
+        self.kind = Choice(KINDS, name="curve_kind", tips=TIPS)
         self.kind.setMinimumContentsLength(4)
-        self.kind.set_tips(TIPS)
         self.kind.chosen.connect(lambda _: self._other_plot())
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
         self.whole = check_box(

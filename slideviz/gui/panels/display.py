@@ -40,6 +40,7 @@ from slideviz.terms import (
     SHOWN,
     Range,
     Shown,
+    WholeNumbers,
     labels,
     quantity_of,
 )
@@ -73,10 +74,10 @@ class PassagesBox(NumberBox):
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("passages")
-        self.around: tuple[int, ...] = ()
+        self.around: WholeNumbers = ()
         self.set_around(())
 
-    def set_around(self, around: tuple[int, ...]) -> None:
+    def set_around(self, around: WholeNumbers) -> None:
         """Set the passages in the wheel of each zone; () for translational periodicity."""
         self.around = around
         self.setRange(0, max(max(around) // 2, 1) if around else MOST_PASSAGES)

@@ -65,12 +65,6 @@ def number_field(kind: Kind) -> NumberField:
     return NumberField(0.0, problem, words=kind.words)
 
 
-def _choice(kind: Kind) -> Choice:
-    field = Choice(kind.words)
-    field.set_tips(kind.tips)
-    return field
-
-
 def _number_box(kind: Kind) -> NumberBox:
     field = NumberBox()
     field.setRange(*kind.span)
@@ -90,7 +84,7 @@ class Switch(QCheckBox):
 Field = Choice | Switch | NumberField | NumberBox | VectorField
 
 FIELDS: dict[Entry, tuple[Callable[[Kind], Field], str]] = {
-    "choice": (_choice, "chosen"),
+    "choice": (lambda kind: Choice(kind.words, tips=kind.tips), "chosen"),
     "switch": (lambda _: Switch(), "clicked"),
     "real": (number_field, "changed"),
     "whole": (_number_box, "valueChanged"),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from qtpy.QtCore import Signal
@@ -43,7 +43,7 @@ from slideviz.gui.widgets.fields import (
 from slideviz.gui.widgets.panel import SpanWalls
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.session.motions import radial
-from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem, Numbers, Texts, WholeNumbers
+from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem, Numbers, Texts, WholeNumbers, labels, tips
 
 ABOUT = {
     "centroid": "its centroid (mean of nodes)",
@@ -67,8 +67,6 @@ whole_degrees = unless(
     lambda degrees: all(n == int(n) and 1 <= n <= MOST_DEGREE for n in degrees),
     f"degrees are whole numbers from 1 to {MOST_DEGREE}",
 )
-Check = Callable[[Any], str]  # returns why a value is not allowed; "" if it is
-FieldFactory = Callable[[], QWidget]  # makes a field
 
 
 def _unchanged(value: Any) -> Any:
@@ -84,30 +82,24 @@ class FormRow(NamedTuple):
 
     title: str
     attribute: str
-    make: FieldFactory
+    make: Callable[[], QWidget]
     shown: Callable[[Any], Any] = _unchanged
     """Returns what the field shows for a value of the attribute."""
     read: Callable[[Any], Any] = _unchanged
     """Returns the value of the attribute for that of the field."""
 
 
-def _number(tip: str, value: float = 0.0, allowed: Check | None = None) -> FieldFactory:
-    return lambda: NumberField(value, allowed, tip)
-
-
-def _vector(tip: str, values: Sequence[float] = (0.0,) * 3, allowed: Check | None = None,
-            names: Sequence[str] = "xyz") -> FieldFactory:  # fmt: skip
-    return lambda: VectorField(values, allowed, names, tip)
-
-
-def _choice(tip: str, words: Mapping[Any, str] = MappingProxyType({}),
-            tips: Mapping[str, str] = MappingProxyType({})) -> FieldFactory:  # fmt: skip
-    def make() -> Choice:
-        field = Choice(words, tip)
-        field.set_tips(tips)
-        return field
-
-    return make
+def _row(
+    title: str,
+    attribute: str,
+    field: Callable[..., QWidget],
+    tip: str,
+    *,
+    shown: Callable[[Any], Any] = _unchanged,
+    read: Callable[[Any], Any] = _unchanged,
+    **facts: Any,
+) -> FormRow:
+    return FormRow(title, attribute, partial(field, tip=tip, **facts), shown, read)
 
 
 def _factors() -> VectorField:
@@ -121,66 +113,65 @@ def _factors() -> VectorField:
 # fmt: off
 # Rounded: 1.03 is not 3 % to the last bit.
 ROWS: dict[str, FormRow] = {
-    "box": FormRow("Box", "box", _choice(
-        "The box whose control points move: of the mesh, or of the case.")),
-    "index": FormRow("Control point", "index", _vector(
+    "box": _row("Box", "box", Choice,
+        "The box whose control points move: of the mesh, or of the case.", words={}),
+    "index": _row("Control point", "index", VectorField,
         "The control point, counted from 0 along each direction of the box; -1 is all.",
-        allowed=control_point_problem, names="ijk"), read=_integers),
-    "plane": FormRow("Plane j", "plane", _number(
+        allowed=control_point_problem, names="ijk", read=_integers),
+    "plane": _row("Plane j", "plane", NumberField,
         "The plane of control points, counted from 0 along j; -1 is all.",
-        0.0, lambda value: control_point_problem((value,))), read=int),
-    "vector": FormRow("By", "vector", _vector(
-        "How far it moves along each axis, in the mesh's length unit.")),
-    "amount": FormRow("By", "amount", _number(
+        allowed=lambda value: control_point_problem((value,)), read=int),
+    "vector": _row("By", "vector", VectorField,
+        "How far it moves along each axis, in the mesh's length unit."),
+    "amount": _row("By", "amount", NumberField,
         "How far control points move, in the mesh's length unit. With the thickness, the last "
-        "ones move forwards, and the first ones as far backwards.")),
-    "angle": FormRow("Angle (°)", "angle_deg", _number(
-        "Degrees; positive turns counter-clockwise seen against the axis.")),
+        "ones move forwards, and the first ones as far backwards."),
+    "angle": _row("Angle (°)", "angle_deg", NumberField,
+        "Degrees; positive turns counter-clockwise seen against the axis."),
     "factors": FormRow(
         "Factors", "factors", _factors, lambda one: one if len(one) > 1 else one * 3),
-    "percent": FormRow("Radius by (%)", "factor", _number(
-        "How much larger the radius becomes, in percent: 3 is 3 % outwards.", 0.0,
-        unless(lambda value: value > -100.0, "-100 % or less would fold the boundary")),
-        lambda factor: round(100.0 * (factor - 1.0), 10),
-        lambda percent: round(1.0 + percent / 100.0, 14)),
-    "distance": FormRow("and by (length)", "distance", _number(
-        "How far it also moves outwards, in the mesh's length unit.")),
-    "change": FormRow("Changes", "kind", _choice(
-        "What of the blade's sections the curve changes.",
-        {kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()},
-        {kind: term.tip for kind, term in SPAN_KINDS.items()})),
-    "curve": FormRow("Over span", "spans", lambda: CheckedText(
-        str, "Values at parts of the span, from 0 at hub or root to 1 at shroud or tip: 0:0, "
-        "0.5:1.5, 1:4; or one value for all. A smooth curve goes through them.")),
-    "about": FormRow("About", "point", _choice(
-        "What stays in place while it turns or grows.",
-        {what: ABOUT[what] for what in ("centroid", "point")})),
-    "point": FormRow("Point", "point", _vector("The point that stays in place.")),
-    "axis": FormRow("Axis", "axis", _vector(
-        "Direction of the axis; its length does not matter.", (0.0, 0.0, 1.0), a_direction)),
-    "side": FormRow("Side", "side", _choice(
-        "Which side moves.", {side: term.label for side, term in SIDES.items()},
-        {side: term.tip for side, term in SIDES.items()})),
-    "term": FormRow("Shape", "term", _vector(
+    "percent": _row("Radius by (%)", "factor", NumberField,
+        "How much larger the radius becomes, in percent: 3 is 3 % outwards.",
+        allowed=unless(lambda value: value > -100.0, "-100 % or less would fold the boundary"),
+        shown=lambda factor: round(100.0 * (factor - 1.0), 10),
+        read=lambda percent: round(1.0 + percent / 100.0, 14)),
+    "distance": _row("and by (length)", "distance", NumberField,
+        "How far it also moves outwards, in the mesh's length unit."),
+    "change": _row("Changes", "kind", Choice, "What of the blade's sections the curve changes.",
+        words={kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()},
+        tips=tips(SPAN_KINDS)),
+    "curve": _row("Over span", "spans", CheckedText,
+        "Values at parts of the span, from 0 at hub or root to 1 at shroud or tip: 0:0, "
+        "0.5:1.5, 1:4; or one value for all. A smooth curve goes through them."),
+    "about": _row("About", "point", Choice, "What stays in place while it turns or grows.",
+        words={what: ABOUT[what] for what in ("centroid", "point")}),
+    "point": _row("Point", "point", VectorField, "The point that stays in place."),
+    "axis": _row("Axis", "axis", VectorField,
+        "Direction of the axis; its length does not matter.",
+        values=(0.0, 0.0, 1.0), allowed=a_direction),
+    "side": _row("Side", "side", Choice, "Which side moves.", words=labels(SIDES),
+        tips=tips(SIDES)),
+    "term": _row("Shape", "term", VectorField,
         "The term of the shape function, counted from 1 at the leading edge, and how many.",
-        (1.0, 1.0), unless(lambda kn: all(n == int(n) for n in kn) and 1 <= kn[0] <= kn[1],
-                           "expected whole numbers, and a term from 1 to how many there are"),
-        ("term", "of")), read=_integers),
-    "peak": FormRow("Peak at (%)", "peak", _number(
-        "Where the bump is highest, in percent of the chord.", 50.0,
-        unless(lambda value: 0.0 < value < 100.0,
-               "the peak lies between 0 and 100 % of the chord")),
-        lambda peak: round(100.0 * peak, 10), lambda percent: round(percent / 100.0, 14)),
-    "raised": FormRow("Raised by", "height", _number(
-        "How far it is raised, in the mesh's length unit.")),
-    "chord": FormRow("Chord", "chord", _vector(
-        "x of the leading and of the trailing edge: the airfoil lies along x.", (0.0, 1.0),
-        unless(lambda ends: ends[0] < ends[1], "the trailing edge has the larger x"),
-        ("x from", "to"))),
+        values=(1.0, 1.0), names=("term", "of"), read=_integers,
+        allowed=unless(lambda kn: all(n == int(n) for n in kn) and 1 <= kn[0] <= kn[1],
+                       "expected whole numbers, and a term from 1 to how many there are")),
+    "peak": _row("Peak at (%)", "peak", NumberField,
+        "Where the bump is highest, in percent of the chord.", value=50.0,
+        allowed=unless(lambda value: 0.0 < value < 100.0,
+                       "the peak lies between 0 and 100 % of the chord"),
+        shown=lambda peak: round(100.0 * peak, 10),
+        read=lambda percent: round(percent / 100.0, 14)),
+    "raised": _row("Raised by", "height", NumberField,
+        "How far it is raised, in the mesh's length unit."),
+    "chord": _row("Chord", "chord", VectorField,
+        "x of the leading and of the trailing edge: the airfoil lies along x.",
+        values=(0.0, 1.0), names=("x from", "to"),
+        allowed=unless(lambda ends: ends[0] < ends[1], "the trailing edge has the larger x")),
     "path": FormRow("File", "path", TextField),
-    "limit": FormRow("At most away", "limit", _number(
-        "How far a node may stay away, a length; 0 is 1 % of the boundary's size.", 0.0,
-        unless(lambda value: value >= 0.0, "a distance is not below 0"))),
+    "limit": _row("At most away", "limit", NumberField,
+        "How far a node may stay away, a length; 0 is 1 % of the boundary's size.",
+        allowed=unless(lambda value: value >= 0.0, "a distance is not below 0")),
 }
 # fmt: on
 """The rows of the form; each field is also an attribute of `MotionEditor`, by its name here."""

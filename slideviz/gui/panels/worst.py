@@ -50,7 +50,7 @@ from slideviz.session.inspect import (
 from slideviz.session.motions import machine_pair
 from slideviz.session.run_messages import Requirement, to_mend
 from slideviz.session.state import Session
-from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy
+from slideviz.terms import COLOR_BY, SIZE_SKEW, ColorBy, Texts
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 """Short names of cell types."""
@@ -218,7 +218,7 @@ class WorstModel(QAbstractTableModel):
         return len(self.columns)
 
     @property
-    def headers(self) -> tuple[str, ...]:
+    def headers(self) -> Texts:
         return tuple(column.title for column in self.columns)
 
     def headerData(
@@ -275,7 +275,7 @@ class WorstTable(Fitted, QTableView):
         super().__init__()
         self.setObjectName("worst")
         self.setTabKeyNavigation(False)  # the tab key goes on to the next panel
-        self._titles: tuple[str, ...] = ()
+        self._titles: Texts = ()
         self._needed: list[int] = []
         self._given: list[int] = []
         self.setModel(model)

@@ -495,11 +495,18 @@ class Choice(QComboBox):
     chosen = Signal(object)
     """The value that the user has chosen; not emitted by `show_value`."""
 
-    def __init__(self, words: Mapping[Value, str], tip: str = "", name: str = "") -> None:
+    def __init__(
+        self,
+        words: Mapping[Value, str],
+        tip: str = "",
+        name: str = "",
+        tips: Mapping[Any, str] | None = None,
+    ) -> None:
         super().__init__()
         self.setToolTip(wrapped(tip))
         self.setObjectName(name)
         self.offer(words)
+        self.set_tips(tips or {})
         self.setMinimumContentsLength(8)
         self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
 
@@ -523,7 +530,7 @@ class Choice(QComboBox):
         assert isinstance(model, QStandardItemModel)
         model.item(self.findData(value)).setEnabled(offered)
 
-    def set_tips(self, tips: Mapping[str, str]) -> None:
+    def set_tips(self, tips: Mapping[Any, str]) -> None:
         """Set the tooltips of entries, by their values."""
         for value, tip in tips.items():
             self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)

@@ -225,14 +225,14 @@ class CheckedField(TextField):
 class CheckedText(CheckedField):
     """A field for a text that may be wrong.
 
-    ``read``: returns a text as it is written, or raises a SlidevizError that says what is wrong.
+    ``read`` returns a text as it is written, or raises a SlidevizError that says what is wrong.
     """
 
     changed = Signal(str)
 
-    def __init__(self, read: Callable[[str], str], tip: str = "") -> None:
+    def __init__(self, tip: str = "") -> None:
         super().__init__("", "", tip)
-        self.read = read
+        self.read: Callable[[str], str] = str
 
     @property
     def problem(self) -> str:

@@ -26,6 +26,7 @@ from slideviz.session.run_messages import Requirement
 from slideviz.session.state import PanelPlace, Session
 from slideviz.session.store import Store
 from slideviz.system.csv_table import write_csv
+from slideviz.terms import Texts
 
 
 class FieldWatch(QObject):
@@ -214,10 +215,10 @@ class SpanWalls(Panel):
         self.setLayout(self._row)
         self.title = QLabel(OF_MACHINE)
         self._by_name: tuple[str, str] | None = None
-        self._blade: tuple[str, ...] = ()
+        self._blade: Texts = ()
         self.follow(lambda session: (session.mesh, session.case.around_span))
 
-    def show_for(self, blade: tuple[str, ...]) -> None:
+    def show_for(self, blade: Texts) -> None:
         """Offer the walls of the zone that has these boundaries; where none has them, of all."""
         if blade != self._blade:
             self._blade = blade
