@@ -30,11 +30,12 @@ from slideviz.terms import KERNELS, ROLES, SLIDES
 if TYPE_CHECKING:
     from slideviz.case.model import Case
 
+Messages = tuple[Message, ...]
 _LISTED = 12
 _INTERFACES = "MARKER_ZONE_INTERFACE"
 
 
-def check_case(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+def check_case(case: Case, mesh: Mesh) -> Messages:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
     case = with_marker_names(case, mesh)
     if isinstance(mesh, Assembly):
@@ -122,7 +123,7 @@ def contradictions(case: Case) -> list[Message]:
     return problems + ffd_contradictions(case)
 
 
-def marker_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+def marker_problems(case: Case, mesh: Mesh) -> Messages:
     """Return a message for each marker of the case that the mesh lacks, and if no marker moves."""
     there = [limit for limit in case.limits if limit.marker in mesh.marker_names]
     unknown = unknown_markers(mesh, _keys_of_markers(case))
@@ -184,7 +185,7 @@ def _unknown_marker(mesh: Mesh, marker: str) -> tuple[str, str]:
     return f"{mesh.name} has no marker {marker!r}", remedy
 
 
-def motion_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+def motion_problems(case: Case, mesh: Mesh) -> Messages:
     """Return a message for each motion that is unfit, and each marker that lacks its motion.
 
     Markers that the mesh does not have are told by `marker_problems`.
@@ -351,7 +352,7 @@ _SLIDES = {
 }
 
 
-def _halo_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
+def _halo_problems(case: Case, mesh: Mesh) -> Messages:
     """Return a message for each moving halo copy of a boundary that does not move."""
     return tuple(
         Message(
@@ -365,7 +366,7 @@ def _halo_problems(case: Case, mesh: Mesh) -> tuple[Message, ...]:
     )
 
 
-def idle_settings(case: Case) -> tuple[Message, ...]:
+def idle_settings(case: Case) -> Messages:
     """Return a note for each setting of the case without effect: with its method, or with any."""
     usual = type(case)()
     idle = [
@@ -385,7 +386,7 @@ def idle_settings(case: Case) -> tuple[Message, ...]:
     return tuple(map(note, notes))
 
 
-def file_before_motions(case: Case) -> tuple[Message, ...]:
+def file_before_motions(case: Case) -> Messages:
     """Return a note for each sequence of motions that begins with a file for all boundaries."""
     sequences = grouped(
         (tuple(motion for motion in case.motions if applies_to(motion, marker)), marker)

@@ -6,7 +6,7 @@ The first line of a function says what it is for a plane; shapes of arrays are i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -18,8 +18,12 @@ from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import (
     FEW,
+    Along,
+    Edges,
     InPlane,
     Label,
+    Labels,
+    Level,
     axis_word,
     direction_label,
     round_middle,
@@ -127,7 +131,7 @@ class Axes:
     """The camera's axes for looking straight at a plane."""
 
     rows: FloatArray  # (3, 3): unit vectors to the right, up, and towards the camera
-    labels: tuple[Label, Label]  # (Label, Label): the axis labels for the right and for up
+    labels: Labels  # (Label, Label): the axis labels for the right and for up
 
 
 class Plane(Line):
@@ -151,12 +155,10 @@ class Plane(Line):
         rows = np.stack([right, up, np.cross(right, up)])
         return Axes(rows, (direction_label(right), direction_label(up)))
 
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         return along(2)
 
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
+    def crossings(self, edges: Edges, level: Level) -> FloatArray:
         before, after = level
         return before / (before - after)
 
@@ -219,7 +221,7 @@ class Plane(Line):
         points[:, 2] -= self.point @ axes.rows[2]
         return polygons.with_points(points)
 
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         return self.axes.labels
 
     def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:

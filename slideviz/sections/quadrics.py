@@ -7,7 +7,6 @@ Cylinders are laid flat to (z, r θ), cones to the plane; shapes of arrays are i
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Self
 
@@ -20,8 +19,12 @@ from slideviz.sections.plane import Box
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
+    Along,
+    Edges,
     InPlane,
     Label,
+    Labels,
+    Level,
     axis_word,
     direction_label,
     round_middle,
@@ -79,9 +82,7 @@ class Quadric(AboutAxis):
     def quadric(self) -> tuple[FloatArray, float]:
         """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
 
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
+    def crossings(self, edges: Edges, level: Level) -> FloatArray:
         """Return where edges cross the surface, as parts of the edge (k,), exactly.
 
         Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
@@ -114,7 +115,7 @@ class Cylinder(Circle, Quadric):
     terms = SECTION_SHAPES["cylinder"]
     directed = False
 
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         return np.hypot(along(0), along(1)) - self.radius
 
     def quadric(self) -> tuple[FloatArray, float]:
@@ -152,7 +153,7 @@ class Cylinder(Circle, Quadric):
         outwards = opened.radius - self.radius
         return np.stack([along, self.radius * opened.angle, outwards], axis=1)
 
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         """Return the labels of the position along the axis, and of r theta."""
         return direction_label(self.basis[2]), Label("r θ", "r θ")
 
@@ -200,7 +201,7 @@ class Cone(Quadric):
         angle = np.radians(self.half_angle_deg)
         return float(np.sin(angle)), float(np.cos(angle))
 
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         """Return signed distances (n,), positive outside; behind the apex those from the apex."""
         sin, cos = self._lines
         radius = np.hypot(along(0), along(1))
@@ -276,7 +277,7 @@ class Cone(Quadric):
     def ahead(self, points: FloatArray) -> float | None:
         return float(np.mean(self.patch(points).angles))
 
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         """Return the labels of the coordinates of the developed cone.
 
         s is the length from the apex, theta the angle around the axis, alpha the half angle.

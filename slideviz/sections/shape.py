@@ -104,6 +104,12 @@ class Label(NamedTuple):
     short: str
 
 
+Labels = tuple[Label, Label]  # of the axis to the right and of the one upwards
+Along = Callable[[int], FloatArray]  # returns coordinates (n,) along a row of the section's basis
+Edges = tuple[FloatArray, FloatArray]  # start points (k, 3), and vectors to the end points (k, 3)
+Level = tuple[FloatArray, ...]
+
+
 SHAPES: dict[str, type[Section]] = {}
 """The class of each shape, by its name."""
 
@@ -291,16 +297,14 @@ class Section:
 
     # What it cuts ----------------------------------------------------------------------
     @abstractmethod
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         """Return signed distances (n,) of points; their sign changes at the section only.
 
         ``along(i)`` returns the coordinates (n,) of the points along row i of the section's basis.
         """
 
     @abstractmethod
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
+    def crossings(self, edges: Edges, level: Level) -> FloatArray:
         """Return where edges cross the section exactly, (k,), as parts of the edge from 0 to 1.
 
         ``edges`` are start points (k, 3) and vectors to the end points (k, 3); ``level`` has the
@@ -374,7 +378,7 @@ class Section:
         return None
 
     @abstractmethod
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         """Return the axis labels of the section laid flat: to the right, and up."""
 
     @abstractmethod

@@ -27,7 +27,7 @@ from slideviz.mesh.zones import names_from
 from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
 from slideviz.sections.plane import Plane
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.shape import Label, Section, Triple, triple
+from slideviz.sections.shape import Along, Edges, Label, Labels, Level, Section, Triple, triple
 
 _SPANS = np.linspace(0.0, 1.0, 33)  # at which zones are joined to each other
 _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number of right digits
@@ -180,16 +180,14 @@ class ConstantSpan(AboutAxis):
             )
         return self.walls
 
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         """Return signed numbers (n,), positive towards the shroud, that grow as distances do."""
         x = along(0)
         y = along(1)
         coords = np.stack([along(2), np.hypot(x, y), np.arctan2(y, x)], axis=1)
         return self.known_walls.level(coords, self.span)
 
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
+    def crossings(self, edges: Edges, level: Level) -> FloatArray:
         """Return where edges cross, by Ridders' method (IEEE Trans. Circuits Syst. 26, 1979)."""
         start, way = edges
         low, high = level
@@ -245,7 +243,7 @@ class ConstantSpan(AboutAxis):
         plane = self.known_walls.plane(coords)
         return np.stack([plane[:, 0], opened.angle, plane[:, 2] - self.span], axis=1)
 
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         return Label("m′ [-]", "m′"), Label("θ [rad]", "θ")
 
     def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:
@@ -290,12 +288,10 @@ class SpanPlane(ConstantSpan):
         (point,) = field.points(field.begin(np.array([self.span])))
         return Plane("plane", triple(point), self.direction)
 
-    def gap(self, along: Callable[[int], FloatArray]) -> FloatArray:
+    def gap(self, along: Along) -> FloatArray:
         return along(2) - float((self.plane.point - self.point) @ self.basis[2])
 
-    def crossings(
-        self, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
-    ) -> FloatArray:
+    def crossings(self, edges: Edges, level: Level) -> FloatArray:
         return self.plane.crossings(edges, level)
 
     def positions(self, points: FloatArray) -> FloatArray:
@@ -311,7 +307,7 @@ class SpanPlane(ConstantSpan):
     def middle_angle(self, polygons: Polygons, near: float | None = None) -> float | None:
         return None
 
-    def flat_labels(self) -> tuple[Label, Label]:
+    def flat_labels(self) -> Labels:
         return self.plane.flat_labels()
 
     def flat_matrix(self, matrix: FloatArray, angle: float) -> FloatArray:

@@ -18,13 +18,21 @@ from slideviz.case.displacement import (
     PlacedDisplacements,
     read_displacements,
 )
-from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named, nodes_moved
+from slideviz.case.motions.motion import (
+    DesignNumbers,
+    Motion,
+    NewMotion,
+    Target,
+    applies_to,
+    named,
+    nodes_moved,
+)
 from slideviz.case.values import path_text
 from slideviz.case.words import Words
 from slideviz.errors import CaseError, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart, frozen_array
 from slideviz.system.weak_cache import WeakCache
-from slideviz.terms import Term
+from slideviz.terms import Term, Texts
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -44,10 +52,10 @@ class FromFile(Motion):
 
     kind_term = Term("displacement file", "A line for each node: its number and its displacement.")
     verbs = ("file",)
-    grammar: ClassVar[tuple[str, ...]] = (
+    grammar: ClassVar[Texts] = (
         "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     )
-    rows: ClassVar[tuple[str, ...]] = ("path",)
+    rows: ClassVar[Texts] = ("path",)
     file_words = "displacement file"
     has_table = True
     lists_nodes = True
@@ -125,7 +133,7 @@ class FromFile(Motion):
     def with_files(self, change: Callable[[Path], Path]) -> Motion:
         return replace(self, path=change(self.path))
 
-    def design_numbers(self) -> Iterator[tuple[str, str, int | None]]:
+    def design_numbers(self) -> DesignNumbers:
         yield from ()
 
 
@@ -206,5 +214,5 @@ class Prescribed(Motion):
         here = (nodes >= 0) & (nodes < len(part.mesh.points))
         return replace(self, nodes=nodes[here], vectors=self.vectors[here])
 
-    def design_numbers(self) -> Iterator[tuple[str, str, int | None]]:
+    def design_numbers(self) -> DesignNumbers:
         yield from ()

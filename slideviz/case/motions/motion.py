@@ -16,7 +16,7 @@ from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacemen
 from slideviz.case.words import Words, name_text
 from slideviz.errors import ROUNDING, CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.terms import AXES, Term, Vector
+from slideviz.terms import AXES, Term, Texts, Vector
 
 if TYPE_CHECKING:
     from typing import Self
@@ -29,6 +29,8 @@ Target = str | tuple[str, ...]
 Axis = tuple[Vector, Vector]
 """An axis: its direction, and a point on it."""
 
+DesignNumbers = Iterator[tuple[str, str, int | None]]
+"""What `Motion.design_numbers` returns: a name, the field, and the place in it."""
 ALL_MOVING = "*"  # what stands for the markers of an empty target
 
 ALONG = 1e-12
@@ -87,21 +89,21 @@ class Motion(CheckedFields):
     marker: Target
     kind_term: ClassVar[Term]
     """The words for the kind."""
-    verbs: ClassVar[tuple[str, ...]] = ()
+    verbs: ClassVar[Texts] = ()
     """What stands for it in ``MOTION``; () where it cannot stand there."""
-    grammar: ClassVar[tuple[str, ...]] = ()
+    grammar: ClassVar[Texts] = ()
     """Its forms in ``MOTION``, for the reference."""
     height_row: ClassVar[tuple[str, str]] = ("Raised by", "towards +y")
     """Title and direction of the row ``raised``."""
-    stays_at: ClassVar[tuple[str, ...]] = ()
+    stays_at: ClassVar[Texts] = ()
     """What can stay in place: centroid or line, and point; () where the user does not choose."""
-    rows: ClassVar[tuple[str, ...]] = ()
+    rows: ClassVar[Texts] = ()
     """The rows of its form in the window; the first one has the cursor at the beginning."""
-    proportional: ClassVar[tuple[str, ...]] = ()
+    proportional: ClassVar[Texts] = ()
     """Fields to which the displacement is proportional: exactly, or nearly (angles)."""
-    ratios: ClassVar[tuple[str, ...]] = ()
+    ratios: ClassVar[Texts] = ()
     """Fields that are 1 where nothing moves."""
-    chosen: ClassVar[tuple[str, ...]] = ()
+    chosen: ClassVar[Texts] = ()
     """Fields with numbers that say what moves, not how far."""
     file_words: ClassVar[str] = ""
     """What its file is."""
@@ -265,7 +267,7 @@ class Motion(CheckedFields):
         """Return the name of the motion in the columns of a table of designs."""
         return f"{'+'.join(named(self.marker)) or '*'}.{self.verb}"
 
-    def design_numbers(self) -> Iterator[tuple[str, str, int | None]]:
+    def design_numbers(self) -> DesignNumbers:
         """Yield the name of each number in a table of designs, its field, and its component."""
         for field in fields(self):
             value = getattr(self, field.name)

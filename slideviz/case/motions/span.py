@@ -13,6 +13,7 @@ from slideviz.argument_types import record
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Amount,
+    DesignNumbers,
     Motion,
     NewMotion,
     Target,
@@ -183,7 +184,7 @@ class SpanMotion(Motion):
     def amounts(self) -> list[Amount]:
         return [Amount("values", self.values, SPAN_KINDS[self.kind].neutral)]
 
-    def design_numbers(self) -> Iterator[tuple[str, str, int | None]]:
+    def design_numbers(self) -> DesignNumbers:
         for k, span in enumerate(self.spans):
             yield ("value" if len(self.spans) == 1 else f"{span:.15g}"), "values", k
 
