@@ -31,7 +31,7 @@ from slideviz.formats.table import (
     format_of,
     holds_quality,
 )
-from slideviz.mesh.check import check_size
+from slideviz.mesh.check import check_mesh, check_size
 from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.quality import Quality, quality
@@ -375,6 +375,8 @@ def write(
         at_points["displacement"] = mesh.points - base.points
     replaces = path if overwrite else None
     options = WriteOptions(values, at_points, replaces, going_on or (lambda: None))
+    if row.ending[1:] not in FILE_FORMATS:  # SU2's writers look at what they write anew only
+        check_mesh(mesh)
     row.function("writer")(path, mesh, options)
 
 

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from slideviz.argument_types import record
 from slideviz.formats.hdf5 import Hdf5Draft, free_name, hdf5_write
 from slideviz.formats.table import WriteOptions
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.system.threads import cuts
 
@@ -109,7 +108,6 @@ class StepSeries:
 
 def write_vtkhdf(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh to a VTKHDF file, with values on its cells and points; or raise MeshError."""
-    check_mesh(mesh)
     with vtkhdf_series(path, mesh, options.replaces, is_series=False) as series:
         series.add(mesh.points, options.cell_data, options.point_data)
 

@@ -407,7 +407,6 @@ def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     file's type, R4 or R8. Raises MeshError if that file was changed, or the new one cannot be
     written.
     """
-    check_mesh(mesh)
     form = mesh.origin
     source = mesh.source
     if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.formats.table import WriteOptions, write_blocks
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import padded
 
@@ -21,7 +20,6 @@ TYPES = {3: 1, 5: 2, 9: 3, 10: 4, 12: 5, 13: 6, 14: 7}
 
 def write_gmsh(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh in Gmsh's format 4.1, with names of boundaries; or raise MeshError."""
-    check_mesh(mesh)
     write_blocks(path, _blocks(mesh, options), options)
 
 

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError, path_error
 from slideviz.formats.meshio.bridge import MESHIO_TYPES, formats_of, load, meshio_errors
 from slideviz.formats.table import WriteOptions, write_blocks
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.system.atomic import atomic_write
@@ -48,7 +47,6 @@ _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 def write_vtu(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as VTU, with values and the names of its boundaries; or raise MeshError."""
-    check_mesh(mesh)
     write_blocks(path, vtu_blocks(mesh, options.cell_data, options.point_data), options)
 
 
@@ -59,7 +57,6 @@ def write_with_meshio(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     most. What meshio wrote is read again and compared, for meshio leaves out what a format cannot
     hold. Raises MeshError if the file cannot be written, or the format cannot hold the mesh.
     """
-    check_mesh(mesh)
     name = formats_of(path)[0]
     data = _to_meshio(mesh, options.cell_data, name)
     with atomic_write(path, replaces=options.replaces) as file:

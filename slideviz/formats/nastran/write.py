@@ -15,7 +15,6 @@ import numpy as np
 from slideviz.errors import path_error
 from slideviz.formats.meshio.write import boundary_blocks
 from slideviz.formats.table import WriteOptions, write_blocks
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 
@@ -29,7 +28,6 @@ MOST = 99_999_999  # largest number of a node or element in eight places
 
 def write_nastran(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as bulk data of Nastran, whose boundaries are numbers; or raise MeshError."""
-    check_mesh(mesh)
     require_nastran(mesh, path)
     write_blocks(path, _blocks(mesh), options)
 

@@ -19,7 +19,6 @@ from slideviz.formats.openfoam.read import PolyMesh
 from slideviz.formats.openfoam_paths import REGIONS, instance_of
 from slideviz.formats.source import open_source
 from slideviz.formats.table import WriteOptions, write_blocks
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.zones import zones_of
 from slideviz.system.atomic import make_folder
@@ -34,7 +33,6 @@ def write_polymesh(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     Points that did not move keep the bytes of the file. Raises MeshError if the mesh was not read
     from such files, another mesh is there already, or a file cannot be written.
     """
-    check_mesh(mesh)
     for origin, points in _regions(mesh, path):
         target = _target(path, origin)
         content = _content(target, origin, points)

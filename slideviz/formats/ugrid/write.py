@@ -15,7 +15,6 @@ from slideviz.errors import path_error
 from slideviz.formats.meshio.write import boundary_blocks
 from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.table import WriteOptions, write_blocks
-from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Mesh
 
 SIDES = (5, 9)
@@ -27,7 +26,6 @@ PYRAMID = np.array([1, 0, 4, 2, 3])
 
 def write_ugrid(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as UGRID, whose boundaries are numbers; raise MeshError if it cannot be."""
-    check_mesh(mesh)
     require_ugrid(mesh, path)
     order = "<" if ending_of(path) == ".lb8.ugrid" else ">"
     write_blocks(path, _blocks(mesh, order), options)
