@@ -141,7 +141,7 @@ def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Pa
     """
     dialog = TableDialog(parent, rows, table_text(path))
     there = path.is_file()
-    while dialog.exec() == QDialog.DialogCode.Accepted:
+    while dialog.exec():
         target = questions.ask_save(parent, "Save the table", path if there else default, FILTERS)
         if target is not None:
             write_table(target, dialog.text, path)

@@ -194,8 +194,7 @@ def ask_sample(
     size.marked.connect(lambda: buttons.button(kinds.Open).setEnabled(not size.fault))
     form.addRow(buttons)
     dialog.setMinimumWidth(420)
-    accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    return (name.currentData(), size.value()) if accepted else None
+    return (name.currentData(), size.value()) if dialog.exec() else None
 
 
 def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, float] | None:
@@ -209,8 +208,7 @@ def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, floa
     form.addRow("Height, at most", high)
     kinds = QDialogButtonBox.StandardButton
     form.addRow(dialog_buttons(dialog, kinds.Ok, kinds.Cancel))
-    accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    return (wide.value(), high.value()) if accepted else None
+    return (wide.value(), high.value()) if dialog.exec() else None
 
 
 def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
