@@ -71,12 +71,11 @@ def test_each_value_has_what_computes_or_draws_it():
     from matplotlib import colormaps
 
     from slideviz.mesh import skew
-    from slideviz.rbf import kernels, methods
+    from slideviz.rbf import methods
     from slideviz.study.combinations import COMPARED_METHODS
 
     assert methods.SLIDING_METHODS.keys() == terms.SLIDING.keys()
     assert skew.SKEW_METRICS.keys() == terms.SKEW_METRICS.keys()
-    assert kernels.KERNELS.keys() == terms.KERNELS.keys()
     assert set(terms.COLOR_MAPS) <= set(colormaps)
     assert set(COMPARED_METHODS) == {*terms.SLIDING, *terms.METHODS} - {"rbf"}
 
