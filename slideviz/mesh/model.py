@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slideviz.argument_types import check_fields, check_types, record
+from slideviz.argument_types import CheckedFields, check_fields, check_types, record
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS, SIZES
 from slideviz.system.threads import in_parts
@@ -133,7 +133,7 @@ def sorted_nodes(nodes: IntArray) -> IntArray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cells:
+class Cells(CheckedFields):
     """Elements of mixed type, in file order."""
 
     types: NDArray[np.uint8]
@@ -142,9 +142,6 @@ class Cells:
     """(m + 1,): element ``i`` has the nodes ``connectivity[offsets[i]:offsets[i + 1]]``."""
     connectivity: IntArray
     """(k,): node indices, zero-based."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @classmethod
     @check_types
@@ -261,14 +258,11 @@ class Cells:
 
 
 @record
-class Marker:
+class Marker(CheckedFields):
     """A named boundary: its elements, of one dimension less than the mesh."""
 
     name: str
     cells: Cells
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def nodes(self) -> IntArray:
