@@ -77,17 +77,17 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
         table = np.empty((0, 0))
     if table.shape[1:] != (len(names),):
         rows = enumerate((line.split(",") for line in lines), start=2)
-        wrong = (k for k, row in rows if len(row) != len(names) or not all(map(_is_word, row)))
+        wrong = (
+            k
+            for k, row in rows
+            if len(row) != len(names) or not all(is_number(cell.strip()) for cell in row)
+        )
         line = next(wrong, 2)  # NumPy may refuse what is a number here
         raise CaseError(
             f"{path}:{line}: expected a number for each of the {len(names)} columns, separated by "
             "commas; decimals are written with a point"
         )
     return names, table
-
-
-def _is_word(cell: str) -> bool:
-    return is_number(cell.strip())
 
 
 def _without_last_comma(line: str) -> str:
