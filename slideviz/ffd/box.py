@@ -165,9 +165,7 @@ MOST_POINTS = 20_000
 """The largest degree and number of control points; with more it takes minutes to find nodes."""
 
 HALF = 0.5  # half the thickness of a box in 2D, in the mesh's length unit
-CORNERS = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
-)
+CORNERS = np.array([(i, j, k) for k in (0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
 """SU2's order of the corners, by their (u, v, w)."""
 
 

@@ -188,9 +188,7 @@ QUADRILATERAL = 9
 # For edges e = (ax, ay, bx, by): a x b = e S e / 2 with this matrix S.
 _CROSS = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], float)
 # From the coordinates (x, y) of a corner and its two neighbours to these edges.
-_EDGES = np.array(
-    [[-1, 0, 1, 0, 0, 0], [0, -1, 0, 1, 0, 0], [-1, 0, 0, 0, 1, 0], [0, -1, 0, 0, 0, 1]], float
-)
+_EDGES = np.kron([[-1, 1, 0], [-1, 0, 1]], np.eye(2)) + 0.0  # 0.0 for -0.0
 
 
 @record
