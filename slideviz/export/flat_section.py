@@ -81,7 +81,7 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     assert frame is not None
     around = matrices(session, period_of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
-    cutter = Cutter.of(frame.mesh)
+    cutter = Cutter(frame.mesh)
     points = frame.mesh.points
     only = _choice(session, section)
     at = session.view.frame
@@ -201,7 +201,7 @@ def section(
     measured = quality(mesh, reference=reference) if rated is None else rated
     matrices = {0: np.eye(4)} if passages is None else passages
     painted = replace(paint(mesh, measured, color, reference), color_map=color_map)
-    cutter = Cutter.of(mesh)
+    cutter = Cutter(mesh)
     pieces = show_passages(cutter, mesh.points, at, matrices)
     note = (
         "" if reference is not None or painted.label not in ("size-skew", "size") else NO_REFERENCE

@@ -144,7 +144,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     assert frame is not None
     assert session.mesh is not None
     mesh = frame.mesh
-    cutter = Cutter.of(frame.mesh)
+    cutter = Cutter(frame.mesh)
     edge = _EDGE * pixel_pt * options.edges
     only = None
     paint = _Paint(None, None, edge)

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.argument_types import record
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
-from slideviz.mesh.model import NO_NODES, BoolArray, Cells, FloatArray, IntArray, Mesh, offsets_of
+from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import InPlane, Section
@@ -30,25 +30,18 @@ class _Block:
 
 
 class Cutter:
-    """Cuts the cells of a mesh at any positions of its nodes; made once for a mesh.
+    """Cuts the cells of a mesh at any positions of its nodes; made once for a mesh."""
 
-    ``cells``: the cells of the mesh.
-    """
-
-    def __init__(self, cells: Cells) -> None:
+    def __init__(self, mesh: Mesh) -> None:
+        cells = mesh.cells
         self.dim = max((ELEMENTS[vtk].dim for vtk in cells.by_type), default=3)
-        self._cells = cells
+        self._mesh = mesh
         self._blocks = [_Block(vtk, *found) for vtk, found in cells.by_type.items()]
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> Cutter:
-        """Return the cutter of a mesh."""
-        return cls(mesh.cells)
 
     @property
     def used(self) -> IntArray:
         """Return the nodes that cells use, sorted, each once."""
-        return self._cells.nodes
+        return self._mesh.cells.nodes
 
     def cut(self, points: FloatArray, section: Section) -> Polygons:
         """Return the polygons in which the section cuts the cells; none where all are missed.

@@ -61,7 +61,7 @@ def _write_and_read() -> None:
 def _look() -> None:
     """Cut a mesh, color it by its displacement, and measure its walls."""
     mesh = sample("cylindrical", size=4).mesh
-    Cutter.of(mesh).cut(mesh.points, Plane("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
+    Cutter(mesh).cut(mesh.points, Plane("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
     cell_displacement(mesh.with_points(mesh.points / 3.0), mesh)
     walls(mesh)
 

@@ -237,7 +237,7 @@ class Cuts:
         """Return the cutter of a mesh; the steps of a deformation share it."""
         if self._cutter is None or self._cells is not mesh.cells:
             self._cells = mesh.cells
-            self._cutter = Cutter.of(mesh)
+            self._cutter = Cutter(mesh)
             self._points = None
         return self._cutter
 
@@ -277,7 +277,7 @@ class Cuts:
         if key not in self._slabs:
             while len(self._slabs) >= CACHE_SIZE:
                 self._slabs.pop(next(iter(self._slabs)))
-            self._slabs[key] = Cutter.of(slab.mesh).show(slab.mesh.points, section)
+            self._slabs[key] = Cutter(slab.mesh).show(slab.mesh.points, section)
         return self._slabs[key]
 
 

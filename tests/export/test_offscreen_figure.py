@@ -362,7 +362,7 @@ def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(rend
     assert axes.collections[0].get_alpha() == FADED
     assert axes.get_xlim() == plain.get_xlim()
     mesh, values = renderer.session.frame.mesh, renderer.session.frame.quality.values
-    cutter, extra = Cutter.of(mesh), [c for c in axes.collections if 1.0 < c.get_zorder() < 2.0]
+    cutter, extra = Cutter(mesh), [c for c in axes.collections if 1.0 < c.get_zorder() < 2.0]
     cut = cutter.cut(mesh.points, line)
     whole = cutter.show(mesh.points, circle)
     arrays = [c.get_array() for c in extra if c.get_array() is not None]

@@ -79,7 +79,7 @@ def test_inverted_cells_are_seen_in_a_drawing(base, folded):
 
 def test_inverted_cells_are_seen_in_the_picture_of_a_section(base, folded):
     section = Section("plane", (0, 0.5, 0), (0, 1, 0), whole_cells=True)
-    pieces = {0: Cutter.of(folded).show(folded.points, section)}
+    pieces = {0: Cutter(folded).show(folded.points, section)}
     painted = paint(folded, quality(folded, base), "size-skew", base)
     figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle())
     (cells,) = figure.axes[0].collections

@@ -112,7 +112,7 @@ def test_a_section_has_the_cells_and_colors_of_the_whole_mesh(stator, folder):
     section = Section("cylinder", (0.0, 0.0, 0.0), (0, 0, 1), 0.27)
     stator.window.store.change(changes.set_view, color_by="skew")
     one = add(stator, section)
-    there = Cutter.of(whole).cut(whole.points, section)
+    there = Cutter(whole).cut(whole.points, section)
     np.testing.assert_array_equal(one.frame.mesh.numbering.cells[one.polygons.cells], there.cells)
     assert not stator.window.statusBar().currentMessage().startswith(READING)
     np.testing.assert_allclose(
@@ -172,7 +172,7 @@ def test_a_run_goes_from_file_to_file(stator, folder, tmp_path, answers):
     assert (frame.quality.min, frame.quality.inverted) == (found.min, found.inverted)
     part = stator.session.mesh.numbering
     np.testing.assert_array_equal(frame.mesh.points, step.mesh.points[part.points])
-    cut = Cutter.of(whole).cut(step.mesh.points, stator.session.view.sections[0])
+    cut = Cutter(whole).cut(step.mesh.points, stator.session.view.sections[0])
     one = window.scene.sections.drawn["section:0"]
     np.testing.assert_array_equal(one.frame.mesh.numbering.cells[one.polygons.cells], cut.cells)
     assert stator.told == f"Note: The deformed mesh is in {output}."
@@ -220,7 +220,7 @@ def test_all_zones_of_a_large_mesh_are_opened_and_run(driver, tmp_path, monkeypa
     *_, step = deform(case, whole)
     np.testing.assert_array_equal(sv.read(output).points, step.mesh.points)
     assert driver.session.frame.quality.min == quality(step.mesh, whole).min
-    cut = Cutter.of(whole).cut(step.mesh.points, driver.session.view.sections[0])
+    cut = Cutter(whole).cut(step.mesh.points, driver.session.view.sections[0])
     one = driver.window.scene.sections.drawn["section:0"]
     np.testing.assert_array_equal(one.frame.mesh.numbering.cells[one.polygons.cells], cut.cells)
     driver.window.dock_manager.bring_to_front("worst")

@@ -243,7 +243,7 @@ def test_a_section_at_a_span_is_a_plane(wing, tmp_path, capsys):
     section = between_walls(Section("span", span=0.37), walls)
     assert isinstance(section, SpanPlane)
     plane = Section("plane", (0.0, 1.11, 0.0), (0.0, 1.0, 0.0))
-    cut, same = (Cutter.of(mesh).cut(mesh.points, one) for one in (section, plane))
+    cut, same = (Cutter(mesh).cut(mesh.points, one) for one in (section, plane))
     assert cut.cells.tolist() == same.cells.tolist()
     assert cut.points == pytest.approx(same.points, abs=1e-15)
     assert section.positions(cut.points) == pytest.approx(0.37, abs=1e-15)

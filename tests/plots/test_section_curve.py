@@ -52,7 +52,7 @@ def mesh():
 
 def curve(mesh, section):
     found = quality(mesh)
-    lines = Cutter.of(mesh).cut(mesh.points, section)
+    lines = Cutter(mesh).cut(mesh.points, section)
     return curve_of(lines, section, paint(mesh, found, "size-skew"))
 
 
@@ -208,7 +208,7 @@ def test_the_curve_is_of_what_the_colors_say(session):
 
 
 def test_the_facts_are_those_of_the_cut_cells(session):
-    cells = Cutter.of(session.mesh).which_cells(session.frame.mesh.points, LINE)
+    cells = Cutter(session.mesh).which_cells(session.frame.mesh.points, LINE)
     values = session.frame.quality.values[cells]
     assert facts_of(session, Cuts(), LINE) == (
         f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; {len(cells)} cells cut"
@@ -221,7 +221,7 @@ def test_the_facts_are_those_of_the_cut_cells(session):
 
 
 def picture(mesh, section, **style):
-    cutter = Cutter.of(mesh)
+    cutter = Cutter(mesh)
     painted = paint(mesh, quality(mesh), "size-skew")
     pieces = {0: cutter.show(mesh.points, section)}
     around = surroundings(cutter, mesh.points, EYE)
@@ -246,7 +246,7 @@ def test_the_picture_of_whole_cells_has_the_others_faintly_around_them(mesh):
     faint, line, cells = axes.collections
     assert isinstance(line, LineCollection)
     assert np.concatenate([path.vertices for path in line.get_paths()])[:, 1] == pytest.approx(0.45)
-    own = Cutter.of(mesh).which_cells(mesh.points, whole)
+    own = Cutter(mesh).which_cells(mesh.points, whole)
     assert len(cells.get_paths()) == len(own)
     assert len(faint.get_paths()) > len(own)
     assert faint.get_zorder() < cells.get_zorder() < line.get_zorder()
@@ -257,7 +257,7 @@ def test_the_picture_of_whole_cells_has_the_others_faintly_around_them(mesh):
 
 def test_a_picture_of_a_3d_section_has_nothing_around_it():
     mesh = cube(3, block=False)
-    assert surroundings(Cutter.of(mesh), mesh.points, EYE) is None
+    assert surroundings(Cutter(mesh), mesh.points, EYE) is None
     figure = picture(mesh, Section("plane", (0.0, 0.0, 0.4)))
     (shapes,) = figure.axes[0].collections
     assert isinstance(shapes, PolyCollection)
@@ -266,7 +266,7 @@ def test_a_picture_of_a_3d_section_has_nothing_around_it():
 
 def test_what_is_shown_around_a_cut_stays_on_the_mesh():
     mesh = square(4, block=False)
-    around = surroundings(Cutter.of(mesh), mesh.points * (4.0, 1.0), EYE)
+    around = surroundings(Cutter(mesh), mesh.points * (4.0, 1.0), EYE)
     # A strip at the left end: the room beside it shows what is to the right.
     low, high = window((np.array([0.0, 0.0]), np.array([0.2, 1.0])), around, 2.0)
     assert (low.tolist(), high.tolist()) == ([0.0, 0.0], [2.0, 1.0])

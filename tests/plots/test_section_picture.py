@@ -50,7 +50,7 @@ def drawn(mesh, section, count=0, base=None, names=None, by="size-skew", **style
     """The figure, its collection, and the paint."""
     painted = paint(mesh, quality(mesh, base), by, base)
     matrices = passages(match(base or mesh, *names), count) if names else {0: np.eye(4)}
-    pieces = show_passages(Cutter.of(mesh), mesh.points, section, matrices)
+    pieces = show_passages(Cutter(mesh), mesh.points, section, matrices)
     figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle(**style))
     (shapes,) = figure.axes[0].collections
     return figure, shapes, painted
@@ -77,7 +77,7 @@ def test_cells_have_the_colors_of_their_values():
     section = Section("plane", (0, 0, 0.4))
     _, shapes, painted = drawn(mesh, section, base=base)
     assert isinstance(shapes, PolyCollection)
-    cells = Cutter.of(mesh).which_cells(mesh.points, section)
+    cells = Cutter(mesh).which_cells(mesh.points, section)
     assert len(shapes.get_paths()) == len(cells) == 16
     faces = shapes.get_facecolor()
     assert np.ptp(painted.values[cells]) > 0.02
@@ -97,7 +97,7 @@ def test_numbers_of_a_narrow_range_do_not_run_together(size, high):
     mesh = mesh.with_points(mesh.points * [1.0, high, 1.0])
     painted = paint(mesh, quality(mesh), "size-skew").within(0.946, 0.967)
     section = Section("plane", (0, 0, 0.4))
-    pieces = show_passages(Cutter.of(mesh), mesh.points, section, {0: np.eye(4)})
+    pieces = show_passages(Cutter(mesh), mesh.points, section, {0: np.eye(4)})
     figure = draw_section(
         [SectionInRun(pieces, painted)], section, SectionStyle(size, trimmed=True)
     )
@@ -117,7 +117,7 @@ def test_inverted_cells_are_red_on_top_and_explained():
     mesh = folded(base)
     section = Section("plane", (0.5, 0.5, 0.55), (0, 0, 1))
     figure, shapes, painted = drawn(mesh, section, base=base)
-    ids = Cutter.of(mesh).which_cells(mesh.points, section)
+    ids = Cutter(mesh).which_cells(mesh.points, section)
     number = int(painted.inverted[ids].sum())
     assert number > 0
     red = np.all(np.isclose(shapes.get_facecolor(), to_rgba(INVERTED_COLOR)), axis=1)
@@ -135,7 +135,7 @@ def test_the_title_has_min_and_mean_of_the_cut_alone():
     mesh = bent(base)
     section = Section("plane", (0, 0, 0.1))
     figure, _, painted = drawn(mesh, section, base=base)
-    values = painted.values[Cutter.of(mesh).which_cells(mesh.points, section)]
+    values = painted.values[Cutter(mesh).which_cells(mesh.points, section)]
     first, second = words_of(figure)
     assert first == "plane z = 0.1"
     assert second == (f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; 36 cells cut")
@@ -244,7 +244,7 @@ def test_in_space_the_nearest_polygon_is_last_and_axes_are_named():
     section = Section("cylinder", radius=0.7, whole_cells=True)
     figure, shapes, _ = drawn(mesh, section, in_space=True)
     assert {"x", "y", "z"} <= set(words_of(figure))
-    seen = in_space([Cutter.of(mesh).show(mesh.points, section)], section)
+    seen = in_space([Cutter(mesh).show(mesh.points, section)], section)
     depth = np.add.reduceat(seen.points[seen.connectivity, 2], seen.offsets[:-1]) / seen.sizes
     assert (np.diff(depth) >= 0).all()
     first = shapes.get_paths()[0].vertices[: seen.sizes[0]]
@@ -313,7 +313,7 @@ def test_displacement_needs_the_undeformed_mesh():
 def save(file, **style):
     mesh = cube(4, block=False)
     section = Section("plane", (0, 0, 0.4))
-    pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
+    pieces = {0: Cutter(mesh).cut(mesh.points, section)}
     painted = paint(mesh, quality(mesh), "size-skew")
     section_picture([SectionInRun(pieces, painted)], section, file, SectionStyle(**style))
 
@@ -354,7 +354,7 @@ def test_what_cannot_be_drawn_or_written_says_so(tmp_path):
     mesh = cube(4, block=False)
     painted = paint(mesh, quality(mesh), "size-skew")
     section = Section("plane", (0, 0, 3))
-    pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
+    pieces = {0: Cutter(mesh).cut(mesh.points, section)}
     with pytest.raises(CaseError, match="plane z = 3: it cuts no cell"):
         section_picture([SectionInRun(pieces, painted)], section, tmp_path / "x.png")
     assert not list(tmp_path.iterdir())

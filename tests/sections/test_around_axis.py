@@ -20,7 +20,7 @@ def sector(start, degrees=30.0):
 @pytest.mark.parametrize("start", [0, 75, 165, 170, 275, 350])
 def test_the_middle_of_a_sector_is_in_it_wherever_it_lies(start):
     mesh = sector(start)
-    patch = CUT.patch(Cutter.of(mesh).cut(mesh.points, CUT).points)
+    patch = CUT.patch(Cutter(mesh).cut(mesh.points, CUT).points)
     assert np.ptp(patch.angles) == pytest.approx(np.radians(30.0))
     assert patch.along == pytest.approx((0.0, 1.0))
     (ball,) = CUT.surface(np.array([patch.middle]), 0.7)

@@ -61,7 +61,7 @@ def test_a_plane_cuts_the_cells_that_it_has_nodes_on_both_sides_of(kind, directi
     if seed:
         mesh = shaken(mesh, seed)
     section = Section("plane", at, direction)
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     wanted = cut_cells(mesh, section)
     if not wanted:
         # The section at most touches the mesh from outside: then the cells on its other side.
@@ -80,7 +80,7 @@ def test_a_plane_cuts_the_cells_that_it_has_nodes_on_both_sides_of(kind, directi
 def test_a_cylinder_cuts_the_cells_that_it_has_nodes_on_both_sides_of(kind, radius, axis, centre):
     mesh = shaken(cube(4, kind, block=False))
     section = Section("cylinder", centre, axis, radius)
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
     # Not only near it: every corner is on the cylinder.
     assert max((abs(height(section, p)) for p in found.points), default=0.0) < 1e-12
@@ -110,7 +110,7 @@ def test_distances_are_those_of_the_literal_formula():
 )
 def test_the_polygons_of_a_plane_cover_the_cross_section_once(kind, normal, at, area):
     mesh = cube(6, kind, block=False)
-    found = Cutter.of(mesh).cut(mesh.points, Section("plane", at, normal))
+    found = Cutter(mesh).cut(mesh.points, Section("plane", at, normal))
     assert areas(found).sum() == pytest.approx(area, abs=1e-12)
     assert areas(found).min() > 1e-12
 
@@ -118,7 +118,7 @@ def test_the_polygons_of_a_plane_cover_the_cross_section_once(kind, normal, at, 
 def test_a_layer_of_nodes_in_the_plane_gives_one_layer_of_cells_whatever_the_rounding():
     mesh = cube(6, block=False)
     noise = np.random.default_rng(3).uniform(-1e-13, 1e-13, mesh.points.shape)
-    found = Cutter.of(mesh).cut(mesh.points + noise, Section("plane", (0, 0, 0.5)))
+    found = Cutter(mesh).cut(mesh.points + noise, Section("plane", (0, 0, 0.5)))
     assert len(found) == 36
     middle = [mesh.points[mesh.cells.by_type[12][1][i], 2].mean() for i in found.cells]
     assert max(middle) < 0.5
@@ -131,7 +131,7 @@ def test_neighbours_share_the_sides_of_their_polygons(kind):
         Section("plane", (0.5, 0.5, 0.5), (1, 2, 3)),
         Section("cylinder", (0, 0, 0), (0, 0, 1), 0.8),
     ):
-        found = Cutter.of(mesh).cut(mesh.points, section)
+        found = Cutter(mesh).cut(mesh.points, section)
         counts = edge_counts(found)
         assert max(counts.values()) == 2
         # What one polygon only has is the rim: a closed line, so every point has two of it.
@@ -160,14 +160,14 @@ def test_order_of_nodes_does_not_matter():
     mesh = shaken(cube(4, "mixed", block=False))
     order = np.random.default_rng(5).permutation(len(mesh.points))
     section = Section("cylinder", (0, 0, 0), (0, 0, 1), 0.7)
-    one, other = (Cutter.of(m).cut(m.points, section) for m in (mesh, permuted(mesh, order)))
+    one, other = (Cutter(m).cut(m.points, section) for m in (mesh, permuted(mesh, order)))
     assert areas(one).sum() == pytest.approx(areas(other).sum(), rel=1e-12)
     assert one.cell_ids.tolist() == other.cell_ids.tolist()
 
 
 def test_one_cutter_serves_all_positions_of_the_nodes():
     mesh = cube(5, block=False)
-    cutter, section = Cutter.of(mesh), Section("plane", (0, 0, 0.45))
+    cutter, section = Cutter(mesh), Section("plane", (0, 0, 0.45))
     first = cutter.cut(mesh.points, section)
     later = cutter.cut(mesh.points + np.array([0, 0, 0.2]), section)
     assert not set(first.cells) & set(later.cells)
@@ -177,12 +177,12 @@ def test_one_cutter_serves_all_positions_of_the_nodes():
 def test_a_plane_cuts_a_2d_mesh_in_lines():
     mesh = square(6, "mixed", block=False)
     section = Section("plane", (0, 0.45, 0), (0, 1, 0))
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     assert set(found.sizes) == {2}
     ends = found.points[found.connectivity].reshape(-1, 2, 3)
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    whole = Cutter.of(mesh).show(mesh.points, replace(section, whole_cells=True))
+    whole = Cutter(mesh).show(mesh.points, replace(section, whole_cells=True))
     assert whole.cells.tolist() == cut_cells(mesh, section)
     assert set(whole.sizes) <= {3, 4}
 
@@ -191,7 +191,7 @@ def test_a_plane_cuts_a_2d_mesh_in_lines():
 def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
     mesh = square(12, "mixed", block=False)
     section = Section("cylinder", (0.5, 0.5, 0.0), direction, 0.3)
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     assert set(found.sizes) == {2}
     assert np.hypot(*(found.points[:, :2] - 0.5).T) == pytest.approx(0.3)
     ends = found.points[found.connectivity].reshape(-1, 2, 3)
@@ -199,7 +199,7 @@ def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
     assert 0.98 * 0.6 * np.pi < length < 0.6 * np.pi
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    assert Cutter.of(mesh).show(
+    assert Cutter(mesh).show(
         mesh.points, replace(section, whole_cells=True)
     ).cells.tolist() == cut_cells(mesh, section)
 
@@ -207,7 +207,7 @@ def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
 def test_in_2d_the_axis_of_a_cylinder_is_z():
     mesh = square(3, block=False)
     with pytest.raises(CaseError, match="its axis is not z, so it needs a 3D mesh"):
-        Cutter.of(mesh).cut(mesh.points, Section("cylinder", direction=(1, 0, 0), radius=0.5))
+        Cutter(mesh).cut(mesh.points, Section("cylinder", direction=(1, 0, 0), radius=0.5))
 
 
 def test_a_section_beside_the_mesh_cuts_nothing():
@@ -216,7 +216,7 @@ def test_a_section_beside_the_mesh_cuts_nothing():
         Section("plane", (0, 0, 1.5)),
         Section("cylinder", (0, 0, 0), (0, 0, 1), 2.0),
     ):
-        cutter = Cutter.of(mesh)
+        cutter = Cutter(mesh)
         assert len(cutter.cut(mesh.points, section)) == 0
         assert len(cutter.show(mesh.points, replace(section, whole_cells=True))) == 0
 
@@ -225,7 +225,7 @@ def test_a_section_beside_the_mesh_cuts_nothing():
 def test_whole_cells_have_a_closed_surface_that_looks_outwards(kind):
     mesh = shaken(cube(5, kind, block=False), part=0.1)
     section = Section("plane", (0.5, 0.5, 0.5), (1, 2, 3), whole_cells=True)
-    cutter = Cutter.of(mesh)
+    cutter = Cutter(mesh)
     found = cutter.show(mesh.points, section)
     ids = cutter.which_cells(mesh.points, section)
     assert set(found.cells) <= set(ids)
@@ -246,7 +246,7 @@ def test_whole_cells_have_a_closed_surface_that_looks_outwards(kind):
 def test_the_polygons_of_a_plane_fill_it():
     mesh = cube(4, "prism", block=False)
     section = Section("plane", (0, 0, 0.4), (0, 0, 1))
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     shape = pv.PolyData(
         found.points, faces=np.insert(found.connectivity, found.offsets[:-1], found.sizes)
     )
@@ -256,7 +256,7 @@ def test_the_polygons_of_a_plane_fill_it():
 
 def test_pieces_are_taken_and_joined():
     mesh = cube(4, block=False)
-    found = Cutter.of(mesh).cut(mesh.points, Section("plane", (0, 0, 0.4)))
+    found = Cutter(mesh).cut(mesh.points, Section("plane", (0, 0, 0.4)))
     halves = [found.take(np.arange(8)), found.take(np.arange(8, 16))]
     both = joined(halves[::-1])
     assert both.cells.tolist() == [*found.cells[8:], *found.cells[:8]]
@@ -269,7 +269,7 @@ def test_cells_of_no_kind_that_a_mesh_has_are_no_trouble():
         [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     )
     mesh = Mesh(points, cells)
-    found = Cutter.of(mesh).cut(mesh.points, Section("plane", (0.2, 0.2, 0.2), (1, 1, 1)))
+    found = Cutter(mesh).cut(mesh.points, Section("plane", (0.2, 0.2, 0.2), (1, 1, 1)))
     assert found.sizes.tolist() == [3]
 
 

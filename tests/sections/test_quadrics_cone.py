@@ -69,7 +69,7 @@ def test_a_cone_cuts_edges_where_it_is_and_only_along_its_axis(apex, direction, 
     section = Section("cone", apex, direction, half_angle_deg=angle)
     wanted = away(section, mesh.points)
     assert section.distance(mesh.points) == pytest.approx(wanted, abs=1e-8)
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     assert np.abs(away(section, found.points)).max(initial=0.0) < 1e-9, "not only to second order"
     # Cells with nodes on both sides are cut, the others are not.
     sides = np.sign(section.distance(mesh.points))
@@ -82,9 +82,9 @@ def test_a_cone_cuts_edges_where_it_is_and_only_along_its_axis(apex, direction, 
 def test_the_other_half_behind_the_apex_cuts_nothing():
     mesh = sector(degrees=360.0)
     behind = Section("cone", (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), half_angle_deg=ANGLE)
-    assert not len(Cutter.of(mesh).cut(mesh.points, behind))
+    assert not len(Cutter(mesh).cut(mesh.points, behind))
     opposite = Section("cone", (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), half_angle_deg=ANGLE)
-    assert len(Cutter.of(mesh).cut(mesh.points, opposite))
+    assert len(Cutter(mesh).cut(mesh.points, opposite))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def developed(section, points):
 @pytest.mark.parametrize("start", [0, 75, 165, 170, 180, 275, 350])
 def test_a_sector_lies_flat_with_its_lengths_wherever_it_lies(start):
     mesh = sector(start, kind="simplex")
-    cut = Cutter.of(mesh).cut(mesh.points, CUT)
+    cut = Cutter(mesh).cut(mesh.points, CUT)
     flat = CUT.flatten(cut, None, None)
     assert np.abs(flat.points[:, 2]).max() < 1e-12
     # From the apex, and between neighbours: as long as the geodesic, by the law of cosines.
@@ -148,7 +148,7 @@ def test_a_sector_lies_flat_with_its_lengths_wherever_it_lies(start):
 def test_the_area_laid_flat_tends_to_that_of_the_cone(count):
     shape = (6, count, 6)
     mesh = sector(20.0, 60.0, shape)
-    cut = Cutter.of(mesh).cut(mesh.points, CUT)
+    cut = Cutter(mesh).cut(mesh.points, CUT)
     flat = CUT.flatten(cut, None, None)
     # From z = 0 to r = 1, that is from s = 1 / cos to s = 1 / sin.
     sin, cos = np.sin(np.radians(ANGLE)), np.cos(np.radians(ANGLE))
@@ -164,7 +164,7 @@ def test_the_area_laid_flat_tends_to_that_of_the_cone(count):
 def test_a_whole_ring_is_opened_once_to_a_piece_of_a_disc():
     shape = (3, 24, 4)
     mesh = grid(shape, wrap=1, place=ring(shape, 0.5, 1.0, 360.0))
-    cut = Cutter.of(mesh).cut(mesh.points, CUT)
+    cut = Cutter(mesh).cut(mesh.points, CUT)
     flat = CUT.flatten(cut, None, None)
     angles = np.degrees(np.arctan2(flat.points[:, 1], flat.points[:, 0]))
     assert np.ptp(angles) == pytest.approx(360.0 * np.sin(np.radians(ANGLE)))
@@ -176,7 +176,7 @@ def test_a_whole_ring_is_opened_once_to_a_piece_of_a_disc():
 def test_copies_lie_beside_each_other_and_are_turned_about_the_apex(start):
     mesh = sector(start)
     pair = pair_of(angle=np.radians(30.0))
-    cutter = Cutter.of(mesh)
+    cutter = Cutter(mesh)
     every = passages(pair, 3)
     assert all(keeps(CUT, matrix) for matrix in every.values())
     pieces = {n: cutter.cut(mesh.points @ m[:3, :3].T, CUT) for n, m in every.items()}
@@ -254,7 +254,7 @@ def test_it_starts_from_end_to_end_of_the_passage_at_round_numbers(extent):
     section = first_section("cone", session_of(mesh))
     assert section.direction == (0.0, 0.0, 1.0)
     assert max(len(f"{v:.10g}") for v in (*section.origin, section.half_angle_deg)) <= 7
-    found = Cutter.of(mesh).cut(mesh.points, section)
+    found = Cutter(mesh).cut(mesh.points, section)
     assert np.ptp(found.points[:, 2]) > 0.5 * np.ptp(mesh.points[:, 2])
     low, high = position_range(section, mesh.points)
     assert low < section.half_angle_deg < high
@@ -272,7 +272,7 @@ def test_another_axis_or_apex_leaves_it_where_it_cuts():
 
 def test_the_places_of_its_handle_lie_on_it_where_it_is_cut():
     mesh = sector(75.0)
-    cut = Cutter.of(mesh).cut(mesh.points, CUT)
+    cut = Cutter(mesh).cut(mesh.points, CUT)
     patch = CUT.patch(cut.points)
     places = CUT.surface(np.concatenate([[patch.middle], patch.places]), ANGLE)
     assert np.abs(away(CUT, places)).max() < 1e-12
@@ -286,7 +286,7 @@ def test_in_2d_it_says_what_it_needs():
     mesh = square(3)
     assert not CUT.can_cut(2)
     with pytest.raises(CaseError, match=r"apex \(0, 0, -1\): it needs a 3D mesh; a 2D mesh is cut"):
-        Cutter.of(mesh).cut(mesh.points, CUT)
+        Cutter(mesh).cut(mesh.points, CUT)
     assert CUT.describe(2) == CUT.brief(2) == CUT.describe()
 
 
@@ -296,7 +296,7 @@ def test_it_is_drawn(tmp_path, whole, in_space):
     mesh = sector(200.0)
     section = Section("cone", APEX, half_angle_deg=ANGLE, whole_cells=whole)
     painted = paint(mesh, quality(mesh), "skew")
-    pieces = {0: Cutter.of(mesh).show(mesh.points, section)}
+    pieces = {0: Cutter(mesh).show(mesh.points, section)}
     style = SectionStyle(size=(400, 300), in_space=in_space)
     section_picture([SectionInRun(pieces, painted)], section, tmp_path / "a.svg", style)
     text = (tmp_path / "a.svg").read_text()
@@ -318,7 +318,7 @@ def test_the_command_line_cuts_by_it(tmp_path, monkeypatch, capsys):
         "whole": False,
     }
     mesh = sector()
-    assert found["cells"] == len(Cutter.of(mesh).which_cells(mesh.points, CUT))
+    assert found["cells"] == len(Cutter(mesh).which_cells(mesh.points, CUT))
     assert "cone 30° about z from apex (0, 0, -1)" in capsys.readouterr().out
     words[3] = "5,z,0,0,-1"
     assert run(words) == 1

@@ -34,8 +34,8 @@ def bound(mesh, span=0.5, **others):
 
 def test_between_cylinders_it_is_a_cylinder():
     mesh = passage()
-    cut = Cutter.of(mesh).cut(mesh.points, bound(mesh, 0.3))
-    same = Cutter.of(mesh).cut(mesh.points, Section("cylinder", radius=0.65))
+    cut = Cutter(mesh).cut(mesh.points, bound(mesh, 0.3))
+    same = Cutter(mesh).cut(mesh.points, Section("cylinder", radius=0.65))
     assert cut.cells.tolist() == same.cells.tolist()
     # The walls are the chords of their facets only across theta, which does not count.
     assert cut.points == pytest.approx(same.points, abs=1e-12)
@@ -51,7 +51,7 @@ def test_between_cylinders_it_is_a_cylinder():
 def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
     mesh = impeller_mesh(3000)
     section = bound(mesh, 0.37)
-    cut = Cutter.of(mesh).cut(mesh.points, section)
+    cut = Cutter(mesh).cut(mesh.points, section)
     spans = section.positions(cut.points)
     assert len(cut) > 100
     assert np.abs(spans - 0.37).max() < 1e-12
@@ -80,17 +80,17 @@ def test_a_radial_passage_is_cut_exactly_and_keeps_its_angles():
 def test_layers_of_nodes_that_are_nearly_on_it_are_not_cut_into_slivers():
     mesh = passage()
     section, rng = bound(mesh, 0.5), np.random.default_rng(3)
-    regular = Cutter.of(mesh).cut(mesh.points, section)
+    regular = Cutter(mesh).cut(mesh.points, section)
     # As a relaxed mesh has it: nodes a hundredth of a cell above and below the layer.
     shaken = mesh.points * (1.0 + rng.uniform(-1e-3, 1e-3, (len(mesh.points), 1)) * [1, 1, 0])
-    cut = Cutter.of(mesh).cut(shaken, section)
+    cut = Cutter(mesh).cut(shaken, section)
     assert cut.cells.tolist() == regular.cells.tolist()
     assert cut.sizes.tolist() == regular.sizes.tolist()
     assert np.abs(section.positions(cut.points) - 0.5).max() < 2e-3
     # A mesh in its file gets the same cells: those below, which touch it only so, are read too.
     block = next(MemorySource(mesh.with_points(shaken)).blocks())
     part = cut_cells([block], section)
-    again = Cutter.of(part.mesh).cut(part.mesh.points, section)
+    again = Cutter(part.mesh).cut(part.mesh.points, section)
     assert part.ids[again.cells].tolist() == regular.cells.tolist()
     assert len(part.ids) < len(mesh.cells)
 
@@ -174,9 +174,9 @@ def test_each_zone_is_cut_by_the_span_between_its_own_walls(span):
     mesh = stage()
     section = bound(mesh, span, periods=find_periods(mesh))
     assert section.describe() == f"{100 * span:g} % span from 1:hub to 1:shroud, 2:hub to 2:shroud"
-    cut = Cutter.of(mesh).cut(mesh.points, section)
+    cut = Cutter(mesh).cut(mesh.points, section)
     alone = [
-        Cutter.of(part.mesh).cut(part.mesh.points, bound(part.mesh, span)).cells + part.cells.start
+        Cutter(part.mesh).cut(part.mesh.points, bound(part.mesh, span)).cells + part.cells.start
         for part in mesh.parts
     ]
     assert cut.cells.tolist() == np.concatenate(alone).tolist()

@@ -110,7 +110,7 @@ def test_sections_that_the_period_keeps():
 def test_one_section_cuts_all_passages(section):
     mesh = passage()
     found = show_passages(
-        Cutter.of(mesh), mesh.points, section, passages(match(mesh, "per1", "per2"), 2)
+        Cutter(mesh), mesh.points, section, passages(match(mesh, "per1", "per2"), 2)
     )
     assert any(len(piece) for number, piece in found.items() if number)
     for number, matrix in passages(match(mesh, "per1", "per2"), 2).items():

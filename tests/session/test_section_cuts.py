@@ -72,12 +72,12 @@ def test_the_same_cells_and_polygons_as_in_memory(files, kind, group, monkeypatc
     monkeypatch.setattr(section_cuts, "GROUP", group)
     section = sections(mesh)[kind]
     slab = read_slab(framed(path, file), section, lambda _: None, lambda: None)
-    there = Cutter.of(moved).cut(moved.points, section)
+    there = Cutter(moved).cut(moved.points, section)
     if not len(slab.mesh.cells):
         assert not len(there)
         return
     # Cells that a section only touches give no polygon, in memory as here.
-    found = Cutter.of(slab.mesh).cut(slab.mesh.points, section)
+    found = Cutter(slab.mesh).cut(slab.mesh.points, section)
     numbers = slab.mesh.numbering.cells
     np.testing.assert_array_equal(numbers[found.cells], there.cells)
     at, wanted = found.points[found.connectivity], there.points[there.connectivity]

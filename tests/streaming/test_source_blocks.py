@@ -58,7 +58,7 @@ def test_cut_cells_are_those_that_the_cutter_cuts(sources, height):
     _, memory, file = sources
     section = Section("plane", (0.0, 0.0, height), (0, 0, 1))
     mesh = memory.mesh
-    wanted = Cutter.of(mesh).cut(mesh.points, section)
+    wanted = Cutter(mesh).cut(mesh.points, section)
     one, other = (cut_cells(quality_blocks(s, "knupp"), section) for s in (memory, file))
     for name in ("ids", "nodes"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
@@ -66,7 +66,7 @@ def test_cut_cells_are_those_that_the_cutter_cuts(sources, height):
         np.testing.assert_array_equal(getattr(one.quality, name), getattr(other.quality, name))
     assert set(wanted.cell_ids.tolist()) <= set(one.ids.tolist())
     if len(one.ids):
-        again = Cutter.of(one.mesh).cut(one.mesh.points, section)
+        again = Cutter(one.mesh).cut(one.mesh.points, section)
         np.testing.assert_array_equal(one.ids[again.cells], wanted.cells)
 
 
