@@ -29,7 +29,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.span import SpanWalls, between_walls, find_walls
 from slideviz.session.passages import find_period, find_periods, keeps, passages
 from slideviz.streaming.quality import quality_blocks
-from slideviz.streaming.source import cut_cells, join_blocks
+from slideviz.streaming.source import cut_cells
 
 WALLS_OPTION = "--between HUB,SHROUD"
 
@@ -100,10 +100,13 @@ def _scene(arguments: Namespace, case: Case | None) -> _Scene:
             moves.append(np.eye(4))
         with progress_of(arguments, "quality") as tick:
             blocks = quality_blocks(opened.source, arguments.metric, tick)
-            near = join_blocks(blocks) if mesh.dim == 2 else cut_cells(blocks, chosen, moves)
-    near = near.part_of(mesh)
+            if isinstance(mesh, Skin):
+                near = cut_cells(blocks, chosen, moves).part_of(mesh)
+                outer = mesh.points
+            else:
+                [near] = blocks
+                outer = mesh.points[mesh.cells.nodes]
     assert near.quality is not None
-    outer = mesh.points if isinstance(mesh, Skin) else mesh.points[mesh.cells.nodes]
     return _Scene(near.mesh, near.base, near.quality, chosen, matrices, outer, path)
 
 

@@ -417,6 +417,11 @@ class Mesh:
         begin = offsets_of([one[-1] + 1 for one in cells])
         return sealed(np.concatenate([one + a for one, a in zip(cells, begin, strict=False)]))
 
+    def first_parts(self, cells: IntArray) -> IntArray:
+        """Return the first part (k,) of the polyhedron that each of cells (k,) is in."""
+        whole = self.whole_cells
+        return cells if whole is None else np.searchsorted(whole, whole[cells])
+
     @check_types
     def with_reference(self, reference: Mesh | None) -> Self:
         """Return the mesh as one that was deformed from ``reference``; None: it was from none.

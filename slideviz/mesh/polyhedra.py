@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import FloatArray, IntArray, row_dots, row_norms
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, offsets_of, ranges, row_dots, row_norms
 
 
 @record
@@ -133,12 +133,85 @@ class Polyhedra:
     """The cells of a file, some of which are several cells of the mesh."""
 
     cell: IntArray  # (m,): number of the file's cell that each cell of the mesh is in, ascending
+    face: IntArray  # (m,): of a part, number of the file's face that it stands on; -1 for others
     faces: Faces
 
     @property
     def added(self) -> int:
         """Return the number of nodes added in polyhedra, one in each."""
         return int(np.count_nonzero(np.bincount(self.cell) > 1))
+
+
+def whole_polygons(
+    mesh: Mesh, offsets: IntArray, nodes: IntArray, cells: IntArray, *, sides: bool
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return polygons of cells of a mesh as those of the file's cells.
+
+    The polygons of the parts of a polyhedron are one, around them all; ``sides`` of parts are one
+    where they are pieces of one face. ``offsets`` (q + 1,), ``nodes`` (k,): as those of `Faces`.
+    ``cells`` (q,): the cell of each. Also returns the index (p,) of the first polygon in each.
+    """
+    whole = mesh.whole_cells
+    if whole is None:
+        return offsets, nodes, np.arange(len(cells))
+    groups = whole[cells]
+    if sides:
+        of_zones = (zone.mesh.origin.polyhedra for zone in mesh.parts)
+        face = np.concatenate([one.face for one in of_zones if one is not None])[cells]
+        groups = groups * (face.max(initial=0) + 1) + face
+        groups[face < 0] = -1 - np.flatnonzero(face < 0)
+    return outlines(offsets, nodes, groups)
+
+
+def outlines(
+    offsets: IntArray, nodes: IntArray, groups: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return polygons in which those of one group (q,) are one, and the index (p,) of its first.
+
+    Those of a group around which there is not one simple line stay.
+    """
+    sizes = np.diff(offsets)
+    _, first, group, counts = np.unique(
+        groups, return_index=True, return_inverse=True, return_counts=True
+    )
+    some = np.repeat(counts[group] > 1, sizes)
+    after = np.roll(nodes, -1)
+    after[offsets[1:] - 1] = nodes[offsets[:-1]]
+    start = nodes[some]
+    end = after[some]
+    of = np.repeat(group, sizes)[some]
+    above = int(nodes.max(initial=0)) + 1
+    edge = np.unique(np.minimum(start, end) * above + np.maximum(start, end), return_inverse=True)[
+        1
+    ]
+    edge += of * len(edge)
+    _, edge, times = np.unique(edge, return_inverse=True, return_counts=True)
+    outer = times[edge] == 1
+    begins = of[outer] * above + start[outer]
+    order = np.argsort(begins)
+    begins = begins[order]
+    ends = (of[outer] * above + end[outer])[order]
+    follow = np.minimum(np.searchsorted(begins, ends), max(len(begins) - 1, 0))
+    of, heads, lengths = np.unique(of[outer], return_index=True, return_counts=True)
+    heads = offsets_of(lengths)[:-1]
+    # Walk along all lines at once: a simple one is back only when it has been everywhere.
+    place = np.full(len(begins), -1)
+    at = heads
+    for step in range(lengths.max(initial=0)):
+        new = place[at] < 0
+        place[at[new]] = step
+        at = follow[at]
+    closed = begins[follow] == ends
+    simple = np.minimum.reduceat(np.where(closed, place, -1), heads) >= 0 if len(heads) else closed
+    walk = np.argsort(np.repeat(np.arange(len(of)), lengths) * len(begins) + place)
+    line = (begins % above)[walk][np.repeat(simple, lengths)]
+    stays = np.flatnonzero(~np.isin(group, of[simple]))
+    kept = np.concatenate([stays, first[of[simple]]])
+    size = np.concatenate([sizes[stays], lengths[simple]])
+    flat = np.concatenate([nodes[ranges(offsets[stays], sizes[stays])], line])
+    order = np.argsort(kept)
+    flat = flat[ranges(offsets_of(size)[:-1][order], size[order])]
+    return offsets_of(size[order]), flat, kept[order]
 
 
 def parts_words(cell: IntArray | None) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, row_norms
-from slideviz.mesh.topology import distinct_edges, edge_keys, facet_edges, single_edges
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, offsets_of, row_norms
+from slideviz.mesh.polyhedra import whole_polygons
+from slideviz.mesh.topology import Boundary, distinct_edges, edge_keys, facet_edges, single_edges
 from slideviz.system.weak_cache import WeakCache
 
 LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
@@ -62,7 +63,9 @@ def _merge_nodes(surface: Surface, representatives: IntArray) -> Surface:
 
     Collapsed facets are left out. Of facets that become equal, only the first is kept.
     """
-    facets = representatives[surface.facets]
+    width = surface.facets.shape[1]
+    corners = [[0, k, k + 1, min(k + 2, width - 1)] for k in range(1, width - 1, 2)]
+    facets = representatives[np.concatenate([surface.facets[:, some] for some in corners])]
     # A side whose nodes became one is removed: a triangle is left, with its last node twice.
     for side in range(3):
         gone = facets[:, side] == facets[:, side + 1]
@@ -77,7 +80,7 @@ def _merge_nodes(surface: Surface, representatives: IntArray) -> Surface:
         surface,
         nodes=used,
         facets=local.reshape(-1, 4),
-        owner=surface.owner[keep],
+        owner=surface.owner[keep % len(surface.owner)],
         rim=np.empty((0, 2), np.int64),
     )
 
@@ -144,7 +147,7 @@ def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
 
 def is_closed(surfaces: Sequence[Surface]) -> bool:
     """Return whether faces (3D) enclose a volume: each edge belongs to exactly two of them."""
-    faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
+    faces = [one.nodes[one.facets] for one in surfaces if not one.flat]
     if len(faces) != len(surfaces) or not faces:
         return False
     keys = edge_keys(facet_edges(np.concatenate(faces)))
@@ -158,8 +161,8 @@ class Surface:
     name: str  # the marker
     nodes: IntArray  # (u,): the mesh nodes it uses
     facets: IntArray
-    """(f, 2 or 4): its lines or faces, as indices into ``nodes``; a triangle repeats its last
-    node."""
+    """(f, 2 or k): its lines or faces, as indices into ``nodes``; a triangle repeats its last node,
+    as does each face with fewer nodes than others."""
     owner: IntArray  # (f,): the cell whose side each facet is
     rim: IntArray  # (r, 2): edges that only one facet has, as indices into nodes; empty in 2D
 
@@ -182,14 +185,10 @@ def lifted(points: FloatArray, by: float) -> FloatArray:
 
 
 def facet_connectivity(facets: IntArray) -> IntArray:
-    """Return facets (f, 2 or 4) as VTK's flat array: for each its number of nodes, then these."""
-    if facets.shape[1] == 2:
-        return np.column_stack([np.full(len(facets), 2), facets]).ravel()
-    triangle = facets[:, 2] == facets[:, 3]
-    table = np.column_stack([np.where(triangle, 3, 4), facets])
-    keep = np.ones(table.shape, bool)
-    keep[triangle, 4] = False
-    return table[keep]
+    """Return facets (f, 2 or k) as VTK's flat array: for each its number of nodes, then these."""
+    width = facets.shape[1]
+    sizes = min(width, 3) + (facets[:, 2:-1] != facets[:, 3:]).sum(axis=1)
+    return np.column_stack([sizes, facets])[np.arange(width + 1) <= sizes[:, None]]
 
 
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
@@ -200,17 +199,33 @@ def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     if not mesh.markers:
         return ()
     boundary = boundary_of(mesh)
+    table, kept = _whole_faces(mesh, boundary)
+    owner = mesh.first_parts(boundary.owner[kept])
     surfaces = []
     for index, name in enumerate(boundary.names):
-        mine = boundary.marker == index
-        nodes, local = np.unique(boundary.facets[mine], return_inverse=True)
-        facets = local.reshape(-1, boundary.facets.shape[1])
-        surfaces.append(Surface(name, nodes, facets, boundary.owner[mine], _rim(facets)))
+        mine = boundary.marker[kept] == index
+        nodes, local = np.unique(table[mine], return_inverse=True)
+        facets = local.reshape(-1, table.shape[1])
+        surfaces.append(Surface(name, nodes, facets, owner[mine], _rim(facets)))
     return tuple(surfaces)
 
 
+def _whole_faces(mesh: Mesh, boundary: Boundary) -> tuple[IntArray, IntArray | slice]:
+    """Return the faces (f, k) of the mesh's file on the boundary, and a facet of each."""
+    facets = boundary.facets
+    if mesh.whole_cells is None or mesh.dim == 2:
+        return facets, slice(None)
+    keep = np.ones(facets.shape, bool)
+    keep[facets[:, 2] == facets[:, 3], 3] = False
+    offsets = offsets_of(keep.sum(axis=1))
+    offsets, nodes, kept = whole_polygons(mesh, offsets, facets[keep], boundary.owner, sides=True)
+    sizes = np.diff(offsets)[:, None]
+    corners = np.minimum(np.arange(max(4, sizes.max())), sizes - 1)
+    return nodes[offsets[:-1, None] + corners], kept
+
+
 def _rim(facets: IntArray) -> IntArray:
-    """Return the edges (r, 2), nodes sorted, that only one of the faces (f, 4) has; none in 2D."""
+    """Return the edges (r, 2), nodes sorted, that only one of the faces (f, k) has; none in 2D."""
     if facets.shape[1] == 2:
         return np.empty((0, 2), np.int64)
     edges = facet_edges(facets)

@@ -11,7 +11,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from slideviz.argument_types import record
 from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
+from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted
+from slideviz.sections.polygons import Polygons
 
 VALUES = "values"  # name of the cell data by which shapes are colored
 CELL = "vtkOriginalCellIds"
@@ -66,27 +67,15 @@ def rim_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
     return pv.PolyData(at, lines=facet_connectivity(lines))
 
 
-def cell_shape(mesh: Mesh) -> Any:
-    """Return all cells of a 2D mesh as PolyData, in the mesh's order."""
-    cells = mesh.cells
-    flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-    shape = pv.PolyData(padded(mesh.points), faces=flat)
-    shape.cell_data[VALUES] = np.zeros(len(cells))
-    return shape
-
-
-def set_order(shape: Any, mesh: Mesh, order: IntArray) -> None:
-    """Put the cells of a 2D mesh into its data set in another order, indices (m,)."""
-    cells = mesh.cells.take(order)
-    shape.SetPolys(pv.CellArray.from_arrays(cells.offsets, cells.connectivity))  # type: ignore[arg-type]
-
-
 def part_shape(mesh: Mesh, cells: IntArray) -> Any:
     """Return the cells with indices (k,) as PolyData: themselves in 2D, their outer faces in 3D.
 
     Its cell data `CELL` are the indices in the mesh of the cells that the polygons belong to, its
-    point data `POINT` those of the nodes.
+    point data `POINT` those of the nodes. A part of a polyhedron stands for all of it, and the
+    first one for its polygons.
     """
+    if mesh.whole_cells is not None:
+        cells = np.flatnonzero(np.isin(mesh.whole_cells, mesh.whole_cells[cells]))
     part = mesh.cells.take(cells)
     nodes = part.nodes
     place = np.empty(len(mesh.points), np.int64)
@@ -99,13 +88,37 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
         shape.SetPolys(table)
         shape.point_data[POINT] = nodes
         shape.cell_data[CELL] = cells
-        return shape
-    grid = pv.UnstructuredGrid()
-    grid.points = points
-    grid.SetCells(numpy_to_vtk(part.types, deep=True), table)
-    shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
-    shape.point_data[POINT] = nodes[shape.point_data[POINT]]
-    shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
+    else:
+        grid = pv.UnstructuredGrid()
+        grid.points = points
+        grid.SetCells(numpy_to_vtk(part.types, deep=True), table)
+        shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
+        shape.point_data[POINT] = nodes[shape.point_data[POINT]]
+        shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
+    if mesh.whole_cells is not None:
+        faces = shape.GetPolys()
+        flat = faces.GetOffsetsArray(), faces.GetConnectivityArray(), shape.cell_data[CELL]
+        arrays = (np.array(one, np.int64) for one in flat)
+        polygons = Polygons(points, *arrays).whole(mesh, sides=mesh.dim == 3)
+        shape.SetPolys(polygon_table(polygons))
+        shape.cell_data[CELL] = polygons.cells
+    return shape
+
+
+def polygon_table(polygons: Polygons) -> Any:
+    """Return polygons as VTK's array of cells."""
+    return pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)  # type: ignore[arg-type]
+
+
+def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
+    """Return polygons, or lines, as PolyData, raised by ``lift`` in z, with values of 0."""
+    shape = pv.PolyData()
+    shape.points = polygons.points + np.array([0.0, 0.0, lift])
+    if len(polygons) and polygons.sizes.max() == 2:
+        shape.SetLines(polygon_table(polygons))
+    else:
+        shape.SetPolys(polygon_table(polygons))
+    shape.cell_data[VALUES] = np.zeros(len(polygons))
     return shape
 
 

@@ -132,13 +132,13 @@ class MarkLayer(KeyedLayer):
         mesh = containing.mesh
         lift = 3.0 * self.stage.lift(mesh)
         corners = mesh.points[nodes_of(mesh, at)]
-        edges = np.array(ELEMENTS[int(mesh.cells.types[at])].edges)
-        outline = pv.PolyData(lifted(corners, lift), lines=facet_connectivity(edges))
+        faces = part_shape(mesh, np.array([at]))
+        outline = faces.extract_all_edges()
+        outline.points[:, 2] += lift
         dot = pv.PolyData(lifted(corners.mean(axis=0)[None], lift))
         for name, shape in ((OUTLINE, outline), (DOT, dot)):
             draw_in_front(self.stage.mark(shape, name, SELECTED_COLOR, 4.0, 9.0).mapper)
         if mesh.dim == 3:
-            faces = part_shape(mesh, np.array([at]))
             value = self.stage.value_of(session, cell)
             faces.cell_data[VALUES] = np.full(faces.n_cells, value)
             actor = self.stage.add(faces, FACES, lighting=False, pickable=False)

@@ -11,17 +11,18 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import NO_NODES, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
-from slideviz.mesh.surfaces import Surface, enclosing_of
+from slideviz.mesh.surfaces import Surface, enclosing_of, padded
 from slideviz.mesh.zones import marker_zones
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, part_shape, see_through
 from slideviz.scene.stage import KeyedLayer, Layer, Stage
 from slideviz.sections.cut import transformed
-from slideviz.sections.polygons import cells_in_range
+from slideviz.sections.polygons import Polygons, cells_in_range
 from slideviz.session.passages import matrices, period_of, periods_of
+from slideviz.session.section_cuts import NO_POLYGONS
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import ROLES, WALL_VALUES
 
@@ -54,8 +55,8 @@ class CellLayer(Layer):
     """(k,): indices of the cells of a 3D mesh whose outside is drawn; None for all."""
 
     def clear(self) -> None:
-        self.order: IntArray | None = None
-        """(m,): indices of the cells of a 2D mesh in the order of drawing; None: the mesh's."""
+        self.polygons = NO_POLYGONS  # the cells of a 2D mesh, in the order of the mesh
+        self.cells = NO_NODES  # those whose polygons are drawn, in the order of drawing
         self.shape: Any = None
         self.actor: Any = None
         self._veil: tuple[Any, Any] | None = None
@@ -64,7 +65,11 @@ class CellLayer(Layer):
         mesh = session.mesh
         assert mesh is not None
         if mesh.dim == 2:
-            shape = actors.cell_shape(mesh)
+            every = np.arange(len(mesh.cells))
+            cells = mesh.cells.offsets, mesh.cells.connectivity, every
+            self.polygons = Polygons(padded(mesh.points), *cells).whole(mesh, sides=False)
+            self.cells = self.polygons.cells
+            shape = actors.polygon_shape(self.polygons)
         elif not surfaces:
             part = np.arange(len(mesh.cells)) if self.part is None else self.part
             shape = actors.part_shape(mesh, part)
@@ -86,11 +91,10 @@ class CellLayer(Layer):
     def _stack(self, frame: StepFrame) -> None:
         """Draw the inverted cells of a 2D mesh last, so that overlapping cells do not hide them."""
         folded = frame.quality.status == INVERTED
-        order = np.argsort(folded, kind="stable") if folded.any() else None
-        if not np.array_equal(order, self.order):  # type: ignore[arg-type]  # None is equal to None
-            self.order = order
-            every = np.arange(len(folded)) if order is None else order
-            actors.set_order(self.shape, frame.mesh, every)
+        polygons = self.polygons.with_last(folded[self.polygons.cells])
+        if not np.array_equal(polygons.cells, self.cells):
+            self.cells = polygons.cells
+            self.shape.SetPolys(actors.polygon_table(polygons))
 
     def shapes(self) -> list[Any]:
         return [] if self.shape is None else [self.shape]
@@ -113,8 +117,7 @@ class CellLayer(Layer):
             if new.mesh.dim == 3:
                 values = self.stage.values_of(new, self.shape.cell_data[CELL])
             else:
-                values = self.stage.drawn(new, self.stage.values(new))
-                values = values if self.order is None else values[self.order]
+                values = self.stage.drawn(new, self.stage.values(new))[self.cells]
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.scheme.cell

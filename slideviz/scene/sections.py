@@ -12,7 +12,7 @@ import pyvista as pv
 from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.quality import INVERTED
-from slideviz.scene.actors import VALUES
+from slideviz.scene.actors import VALUES, polygon_shape
 from slideviz.scene.mesh import recolored
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.cut import transformed
@@ -312,19 +312,6 @@ def plain_color(scheme: ColorScheme) -> tuple[float, float, float]:
     ghost = np.array(pv.Color(scheme.ghost).float_rgb)
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue
-
-
-def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
-    """Return polygons, or lines, as PolyData, raised by ``lift`` in z, with values of 0."""
-    shape = pv.PolyData()
-    shape.points = polygons.points + np.array([0.0, 0.0, lift])
-    table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)  # type: ignore[arg-type]
-    if len(polygons) and polygons.sizes.max() == 2:
-        shape.SetLines(table)
-    else:
-        shape.SetPolys(table)
-    shape.cell_data[VALUES] = np.zeros(len(polygons))
-    return shape
 
 
 class Instances:

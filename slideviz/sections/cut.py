@@ -71,7 +71,8 @@ class Cutter:
         a, b = np.divmod(keys, len(points))
         at = _crossings(points, a, b, level, section)
         polygons = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
-        return polygons.take(np.argsort(owners, kind="stable"))
+        polygons = polygons.take(np.argsort(owners, kind="stable"))
+        return polygons.whole(self._mesh, sides=False)
 
     def which_cells(self, points: FloatArray, section: Section) -> IntArray:
         """Return the sorted numbers of the cells that the section cuts (see `cut`).
@@ -99,12 +100,13 @@ class Cutter:
     def surface(self, points: FloatArray, ids: IntArray) -> Polygons:
         """Return the sides that only one of the cells ``ids`` (c,) has; in 2D the cells.
 
-        The sides are oriented outwards of cells that are not inverted.
+        The sides are oriented outwards of cells that are not inverted. Of a polyhedron, its first
+        part stands for all.
         """
         sides = [np.empty((0, 4), np.int64)]
         owners = [NO_NODES]
         for block in self._blocks:
-            mine = np.isin(block.ids, ids)
+            mine = np.isin(self._mesh.first_parts(block.ids), ids)
             row = ELEMENTS[block.vtk]
             nodes = block.nodes[mine]
             for side in row.facets if self.dim == 3 else (tuple(range(row.n_nodes)),):
@@ -120,7 +122,8 @@ class Cutter:
         keep = np.ones(facets.shape, bool)
         keep[facets[:, 2] == facets[:, 3], 3] = False
         used, corners = np.unique(facets[keep], return_inverse=True)
-        return Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
+        polygons = Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
+        return polygons.whole(self._mesh, sides=self.dim == 3)
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
         if not section.can_cut(self.dim):

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from slideviz.argument_types import record
-from slideviz.mesh.model import BoolArray, FloatArray, IntArray, offsets_of, ranges
+from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, offsets_of, ranges
+from slideviz.mesh.polyhedra import whole_polygons
 from slideviz.mesh.topology import single_edges
 from slideviz.terms import Range
 
@@ -80,6 +81,14 @@ class Polygons:
     def with_points(self, points: FloatArray) -> Polygons:
         """Return the same polygons at other points, (p, 3)."""
         return replace(self, points=points)
+
+    def whole(self, mesh: Mesh, *, sides: bool) -> Polygons:
+        """Return the polygons as those of the cells of the mesh's file (see `whole_polygons`)."""
+        if mesh.whole_cells is None:
+            return self
+        polygons = self.offsets, self.connectivity, self.cells
+        offsets, corners, kept = whole_polygons(mesh, *polygons, sides=sides)
+        return Polygons(self.points, offsets, corners, mesh.first_parts(self.cells[kept]))
 
     def take(self, order: IntArray) -> Polygons:
         """Return the polygons with the numbers ``order`` (t,), in that order; all points stay."""

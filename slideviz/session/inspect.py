@@ -16,6 +16,7 @@ from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.polyhedra import outlines
 from slideviz.mesh.quality import INVERTED, Quality, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
@@ -228,9 +229,17 @@ def cell_centers(mesh: Mesh, cells: IntArray) -> FloatArray:
 
 
 def nodes_of(mesh: Mesh, cell: int) -> IntArray:
-    """Return the nodes of a cell, (k,)."""
-    begin, end = mesh.cells.offsets[cell : cell + 2]
-    return mesh.cells.connectivity[begin:end]
+    """Return the nodes of a cell, (k,); of a part, those of its polyhedron, in 2D in order."""
+    begin = cell
+    end = cell + 1
+    whole = mesh.whole_cells
+    if whole is not None:
+        begin, end = np.searchsorted(whole, whole[cell] + np.arange(2))
+    offsets = mesh.cells.offsets[begin : end + 1]
+    nodes = mesh.cells.connectivity[offsets[0] : offsets[-1]]
+    if mesh.dim == 3:
+        return nodes if end - begin == 1 else np.unique(nodes)
+    return outlines(offsets - offsets[0], nodes, np.zeros(end - begin, int))[1]
 
 
 def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
@@ -275,7 +284,8 @@ def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
     here = np.array([x, y])
     near = ((low <= here) & (here <= high)).all(axis=1) & ~np.isnan(values)
     inside = [cell for cell in np.flatnonzero(near) if _inside(mesh, int(cell), x, y)]
-    return int(min(inside, key=lambda cell: values[cell])) if inside else None
+    best = sorted(inside, key=lambda cell: values[cell])[:1]
+    return int(mesh.first_parts(np.array(best))[0]) if best else None
 
 
 def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:

@@ -175,7 +175,8 @@ class Built:
     """Cells built from faces."""
 
     cells: Cells
-    cell: IntArray  # (m,): number of the file's cell that each is (in)
+    cell: IntArray
+    face: IntArray  # `cell`, `face` (m,): see `Polyhedra`
     points: FloatArray  # (n, d): those of the file, and added ones
 
 
@@ -239,7 +240,7 @@ def _built(faces: Faces, pieces: Pieces, points: FloatArray) -> Built:
         rows = first[ids][:, None] + np.arange(three + four)
         table, fits = _elements(vtk, oriented(rows, pieces.offsets[sides[rows]]))
         kinds[ids[fits]] = vtk
-        tables.append((ids[fits], vtk, table[fits]))
+        tables.append((ids[fits], np.full(fits.sum(), -1), vtk, table[fits]))
     # All others by their parts.
     rows = np.flatnonzero(kinds[of_cell] == 0)
     several = np.diff(pieces.offsets)[sides[rows]]
@@ -254,23 +255,27 @@ def _built(faces: Faces, pieces: Pieces, points: FloatArray) -> Built:
     flat = nodes[:, 0] == nodes[:, 3]
     for some, vtk, base in ((flat, 10, [0, 2, 1]), (~flat, 14, [0, 3, 2, 1])):
         table = np.append(nodes[some][:, base], apex[some, None], axis=1)
-        tables.append((of_cell[rows[some]], vtk, table))
+        tables.append((of_cell[rows[some]], sides[rows[some]], vtk, table))
     return ordered_cells(tables, np.concatenate([points, tops]))
 
 
-def ordered_cells(tables: Sequence[tuple[IntArray, int, IntArray]], points: FloatArray) -> Built:
+def ordered_cells(
+    tables: Sequence[tuple[IntArray, IntArray, int, IntArray]], points: FloatArray
+) -> Built:
     """Return cells in the order of the file's cells.
 
-    Each table has the numbers of file's cells (k,), an element type, and nodes (k, n).
+    Each table has the numbers of file's cells and faces (k,) (see `Polyhedra`), an element type,
+    and nodes (k, n).
     """
-    cell = np.concatenate([ids for ids, _, _ in tables])
+    cell = np.concatenate([ids for ids, _, _, _ in tables])
+    face = np.concatenate([ids for _, ids, _, _ in tables])
     order = np.argsort(cell, kind="stable")
-    types = np.repeat([vtk for _, vtk, _ in tables], [len(ids) for ids, _, _ in tables])
-    nodes = np.concatenate([nodes.ravel() for _, _, nodes in tables])
+    types = np.repeat([vtk for _, _, vtk, _ in tables], [len(table[0]) for table in tables])
+    nodes = np.concatenate([nodes.ravel() for _, _, _, nodes in tables])
     begin = offsets_of(SIZES[types])[:-1]
     connectivity = nodes[ranges(begin[order], SIZES[types[order]])]
     cells = Cells.from_types(types[order].astype(np.uint8), sealed(connectivity))
-    return Built(cells, cell[order], points)
+    return Built(cells, cell[order], face[order], points)
 
 
 def _elements(vtk: int, sides: IntArray) -> tuple[IntArray, BoolArray]:

@@ -175,7 +175,7 @@ def _triangulated(outline: Faces, coords: FloatArray) -> tuple[Built, bool]:
         if size == 4:
             sound = sound_quadrilaterals(np.pad(coords[nodes], ((0, 0), (0, 0), (0, 1))))
         several[ids[sound]] = False
-        tables.append((ids[sound], vtk, nodes[sound]))
+        tables.append((ids[sound], ids[sound], vtk, nodes[sound]))
     cells = np.repeat(np.arange(len(sizes)), sizes)
     rows = np.flatnonzero(several[cells])
     moments = np.stack([np.bincount(cells, areas * x) for x in (first + second).T], axis=1)
@@ -183,7 +183,7 @@ def _triangulated(outline: Faces, coords: FloatArray) -> tuple[Built, bool]:
         middles = (moments / (3 * np.bincount(cells, areas))[:, None])[several]
     apex = len(coords) + (np.cumsum(several) - 1)[cells[rows]]
     sides = outline.nodes[rows], outline.next_nodes()[rows], apex
-    tables.append((cells[rows], 5, np.stack(sides, axis=1)))
+    tables.append((cells[rows], rows, 5, np.stack(sides, axis=1)))
     if turned:
-        tables = [(ids, vtk, nodes[:, ::-1]) for ids, vtk, nodes in tables]
+        tables = [(*ids, vtk, nodes[:, ::-1]) for *ids, vtk, nodes in tables]
     return ordered_cells(tables, np.concatenate([coords, middles])), turned

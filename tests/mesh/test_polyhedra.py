@@ -1,0 +1,166 @@
+"""Polyhedra are drawn as the cells of their file: faces, cuts and cells of a plane, in one piece."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import slideviz as sv
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.polyhedra import outlines
+from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces, is_closed
+from slideviz.scene.actors import CELL, POINT, part_shape
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from tests.builders import grid
+from tests.polymesh_files import extruded, honeycomb, merged, sides_of, write_mesh, write_polymesh
+
+ENDS = {
+    "ends": lambda corners: np.ptp(corners[:, 2]) == 0,
+    "sides": lambda corners: True,
+}
+
+
+@pytest.fixture(scope="module")
+def hexagons(tmp_path_factory):
+    """Hexagonal prisms, nine in each of two layers."""
+    folder = tmp_path_factory.mktemp("case")
+    write_polymesh(folder / "polyMesh", *extruded(*honeycomb(), [0.0, 1.0, 2.0]), ENDS)
+    return sv.read(folder / "polyMesh")
+
+
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory):
+    """Hexagons, a layer between two empty patches."""
+    folder = tmp_path_factory.mktemp("case")
+    kinds = {"ends": "empty"}
+    write_polymesh(folder / "polyMesh", *extruded(*honeycomb(), [0.0, 1.0]), ENDS, kinds)
+    return sv.read(folder / "polyMesh")
+
+
+def areas(polygons):
+    """Return the area of each polygon."""
+    out = []
+    for nodes in np.split(polygons.connectivity, polygons.offsets[1:-1])[: len(polygons)]:
+        at = polygons.points[nodes]
+        out.append(np.linalg.norm(np.cross(at[1:-1] - at[0], at[2:] - at[0]).sum(axis=0)) / 2)
+    return np.array(out)
+
+
+def test_boundaries_have_the_faces_of_the_file(hexagons):
+    ends, sides = find_surfaces(hexagons)
+    assert Counter(6 - (ends.facets[:, 1:] == ends.facets[:, :-1]).sum(axis=1)) == {6: 18}
+    assert Counter(6 - (sides.facets[:, 1:] == sides.facets[:, :-1]).sum(axis=1)) == {4: 44}
+    first = np.flatnonzero(np.diff(hexagons.whole_cells, prepend=-1))
+    assert {*ends.owner} == {*first}
+    assert {*sides.owner} <= {*first}
+    assert is_closed([ends, sides])
+
+
+def test_coarse_boundaries_of_polyhedra_cover_the_same(hexagons, monkeypatch):
+    monkeypatch.setattr("slideviz.mesh.surfaces.LEAST", 1)
+    full = find_surfaces(hexagons)
+    coarse = coarse_surfaces(full, hexagons.points, cubes=1000)
+    for one, other in zip(full, coarse, strict=True):
+        assert {*one.owner} == {*other.owner}
+        assert other.facets.shape[1] == 4
+        totals = []
+        for surface in (one, other):
+            at = hexagons.points[surface.nodes[surface.facets]]
+            around = at - at[:, :1]
+            crossed = np.cross(around[:, 1:-1], around[:, 2:]).sum(axis=1)
+            totals.append(np.linalg.norm(crossed, axis=1).sum())
+        assert totals[0] == pytest.approx(totals[1])
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), whole=st.booleans())
+def test_a_section_has_one_polygon_of_each_cell(hexagons, seed, whole):
+    random = np.random.default_rng(seed)
+    normal = random.normal(size=3)
+    origin = random.uniform(hexagons.points.min(axis=0), hexagons.points.max(axis=0))
+    plane = Section.of("plane", tuple(origin), tuple(normal / np.linalg.norm(normal)), 0.0)
+    cutter = Cutter(hexagons)
+    cut = cutter.cut(hexagons.points, plane)
+    parts = Cutter(Mesh(hexagons.points, hexagons.cells)).cut(hexagons.points, plane)
+    assert areas(cut).sum() == pytest.approx(areas(parts).sum())
+    assert len({*cut.cells}) == len(cut)
+    assert {*hexagons.whole_cells[cut.cells]} == {*hexagons.whole_cells[parts.cells]}
+    assert {*cut.cells} <= {*np.flatnonzero(np.diff(hexagons.whole_cells, prepend=-1))}
+    if whole:
+        sides = cutter.surface(hexagons.points, cut.cell_ids)
+        assert {*sides.sizes} <= {4, 6}
+        assert {*sides.cells} <= {*cut.cells}
+
+
+def test_cells_of_a_plane_are_drawn_in_one_piece(flat):
+    assert len(flat.cells) == 54
+    cells = Cutter(flat).all_cells(flat.points)
+    assert cells.sizes.tolist() == [6] * 9
+    assert areas(cells) == pytest.approx(1.5 * np.sqrt(3))
+    shape = part_shape(flat, np.array([1, 7]))
+    assert shape.GetPolys().GetNumberOfCells() == 2
+    assert shape.cell_data[CELL].tolist() == [0, 6]
+    [surface] = find_surfaces(flat)
+    assert surface.facets.shape == (22, 2)
+
+
+@pytest.mark.parametrize("chosen", [[0], [3], [17, 18]])
+def test_any_part_stands_for_its_polyhedron(hexagons, chosen):
+    shape = part_shape(hexagons, np.array(chosen))
+    sizes = np.diff(np.array(shape.GetPolys().GetOffsetsArray()))
+    count = len({*hexagons.whole_cells[chosen]})
+    assert Counter(sizes) == {4: 6 * count, 6: 2 * count}
+    assert shape.point_data[POINT].max() < len(hexagons.points) - 18
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), groups=st.integers(1, 12))
+def test_polygons_of_a_group_are_one_if_a_simple_line_is_around_them(seed, groups):
+    cells = grid((4, 4), kind="mixed").cells
+    random = np.random.default_rng(seed)
+    group = random.integers(0, groups, len(cells))
+    offsets, nodes, kept = outlines(cells.offsets, cells.connectivity, group)
+    assert len({*kept}) == len(kept)
+    pieces = np.split(nodes, offsets[1:-1])
+    for number in {*group.tolist()}:
+        mine = [piece.tolist() for piece, k in zip(pieces, kept, strict=True) if group[k] == number]
+        all_nodes = np.split(cells.connectivity, cells.offsets[1:-1])
+        before = [piece.tolist() for piece, k in zip(all_nodes, group, strict=True) if k == number]
+
+        def lines(polygons):
+            every = [(a, b) for p in polygons for a, b in zip(p, [*p[1:], p[0]], strict=True)]
+            count = Counter(frozenset(line) for line in every)
+            return {line for line in every if count[frozenset(line)] == 1}
+
+        assert lines(mine) == lines(before)
+        assert len(mine) in (1, len(before))
+        starts = [line[0] for line in lines(before)]
+        if len(mine) > 1:
+            follow = dict(lines(before))
+            walk = [starts[0]]
+            while follow[walk[-1]] not in walk:
+                walk.append(follow[walk[-1]])
+            assert len({*starts}) < len(starts) or len(walk) < len(starts)
+
+
+def test_elements_are_not_changed(tmp_path):
+    mesh = grid((2, 2, 2), kind="mixed")
+    read = sv.read(write_mesh(tmp_path, mesh))
+    for one, other in zip(find_surfaces(read), find_surfaces(mesh), strict=True):
+        assert {frozenset(one.nodes[f]) for f in one.facets} == {
+            frozenset(other.nodes[f]) for f in other.facets
+        }
+
+
+def test_cells_of_several_faces_between_the_same_two(tmp_path):
+    """Faces that lie in one plane stay apart, as the file has them."""
+    mesh = grid((2, 2, 4))
+    groups = (mesh.points[mesh.cells.connectivity.reshape(-1, 8)].mean(axis=1)[:, 2] > 0.5) * 1
+    cells = merged(sides_of(mesh), groups.tolist())
+    patches = {"all": lambda corners: True}
+    write_polymesh(tmp_path / "polyMesh", mesh.points, cells, patches)
+    [surface] = find_surfaces(sv.read(tmp_path / "polyMesh"))
+    assert len(surface.facets) == 2 * 4 + 4 * 8
