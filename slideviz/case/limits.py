@@ -120,7 +120,7 @@ def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
         wanted = [one for one in found.markers if marker or one in found.layered]
         some = np.isin(boundary.marker, [boundary.names.index(one) for one in wanted])
         width = corner.shape[1]
-        cells = np.repeat(boundary.owner[some], width)
+        cells = np.repeat(measured.mesh.first_parts(boundary.owner[some]), width)
         at = np.repeat(boundary.marker[some], width)
         return Values(found.values[name][corner[some].ravel()], cells, at, boundary.names)
 

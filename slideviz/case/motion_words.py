@@ -81,7 +81,6 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     size, ends = bounds_words(mesh)
     points, cells = mesh.file_counts
     if mesh.whole_cells is not None:
-        cells = int(mesh.whole_cells[-1]) + 1
         about += f"{parts_words(mesh.whole_cells)}.\n".lstrip(".\n")
     count = f"{cells:,} cells{halo}   {points:,} points"
     if isinstance(mesh, Skin):

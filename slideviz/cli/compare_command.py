@@ -63,7 +63,7 @@ def main(arguments: Namespace) -> int:
     more = {option: names for option, names in known.items() if getattr(arguments, option) is None}
     _say(
         arguments,
-        f"{arguments.case}, {len(mesh.cells):,} cells: {announcement(wanted, cannot, more)}",
+        f"{arguments.case}, {mesh.file_counts[1]:,} cells: {announcement(wanted, cannot, more)}",
     )
     warm({one.method for one in wanted if one not in cannot})
     _say(arguments, terminal_head())

@@ -112,11 +112,14 @@ def _report(
     """Print the quality of a mesh or write it as JSON, and return the exit code."""
     worst = found.worst(WORST)
     reference = opened.reference
-    rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
-    report = quality_report(opened.source.mesh.name, found, rows)
+    mesh = opened.source.mesh
+    report = quality_report(mesh, found, worst, opened.source.types(worst).tolist())
     walls = None if layers is None else layers.summary()
     report |= {"walls": walls, "reference": str(reference) if reference else None}
-    report |= {"metrics": metrics_report(metrics), "limits": limits_report(limits)}
+    report |= {
+        "metrics": metrics_report(mesh, metrics),
+        "limits": limits_report(limits, cells=mesh.file_cells),
+    }
     if save_report(arguments, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")
@@ -161,9 +164,9 @@ def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> W
 def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
     """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
     measured = found.values, found.size, found.skew, *more.values()
-    texts = [map(repr, one.tolist()) for one in measured]
-    status = map(CELL_STATES.__getitem__, found.status.tolist())
-    rows = zip(range(len(found)), *texts[:3], status, *texts[3:], strict=True)
+    texts = [map(repr, one[found.whole].tolist()) for one in measured]
+    status = map(CELL_STATES.__getitem__, found.status[found.whole].tolist())
+    rows = ((at, *row) for at, row in enumerate(zip(*texts[:3], status, *texts[3:], strict=True)))
     write_csv(
         path, chain([("cell", "size_skew", "size", "skew", "status", *more)], rows), CaseError
     )

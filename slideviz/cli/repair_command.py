@@ -13,6 +13,7 @@ from slideviz.cli.report import Report, print_remarks, quality_lines, save_repor
 from slideviz.cli.terminal import DONE, INVERTED, say
 from slideviz.formats.files import quality_data
 from slideviz.formats.losses import warning_of_losses
+from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 
 
@@ -73,7 +74,7 @@ def main(arguments: Namespace) -> int:
         _print(report, f"{done.words()}, {done.moves}", found, before)
     print_remarks(done.warnings, quiet=arguments.quiet)
     if found.inverted:
-        print(f"slideviz: {_inverted(found)}", file=sys.stderr)
+        print(f"slideviz: {_inverted(found, mesh)}", file=sys.stderr)
         return INVERTED
     return DONE
 
@@ -85,10 +86,10 @@ def _print(report: Report, words: str, found: Quality, before: Quality) -> None:
     print(f"mesh: {report['output']}")
 
 
-def _inverted(found: Quality) -> str:
+def _inverted(found: Quality, mesh: Mesh) -> str:
     """Return a sentence with the number of inverted cells that are left, and remedies."""
     cells = found.inverted_cells(5)
-    named = ", ".join(map(str, cells))
+    named = ", ".join(map(str, mesh.file_cells(cells)))
     more = " ..." if found.inverted > len(cells) else ""
     return (
         f"{found.inverted} of {found.cells} cells are still inverted ({named}{more}); what may "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import zip_longest
 from math import isfinite
@@ -22,9 +22,9 @@ from slideviz.case.motions.onto import Remaining
 from slideviz.case.words import counted, first_of
 from slideviz.cli.terminal import DONE, INVERTED, LIMIT_MISSED
 from slideviz.errors import CaseError, Message, Remark, messages_of
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import CELL_NAMES
 from slideviz.mesh.metrics import MetricValues
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import statistics_of, wall_words
 from slideviz.mesh.zones import marker_zones
@@ -86,6 +86,7 @@ def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> Rep
         "limits": limits_report(
             check_case_limits(case, done.quality, last.mesh, mesh),
             check_case_limits(case, done.undeformed, mesh, mesh),
+            mesh.file_cells,
         ),
         "walls": None if walls is None else walls.summary(),
         **({} if done.safe is None else done.safe.report()),
@@ -121,9 +122,14 @@ def run_report(case: Case, done: RunResult, seconds: Mapping[str, float]) -> Rep
 
 
 def limits_report(
-    results: Sequence[LimitResult], before: Sequence[LimitResult] = ()
+    results: Sequence[LimitResult],
+    before: Sequence[LimitResult] = (),
+    cells: Callable[[IntArray], IntArray] = lambda cells: cells,
 ) -> list[Report]:
-    """Return the JSON array of limits, with ``before`` deforming if known, and the worst cells."""
+    """Return the JSON array of limits, with ``before`` deforming if known, and the worst cells.
+
+    ``cells``: returns the numbers of cells in the file.
+    """
 
     def actual(result: LimitResult | None) -> float | None:
         return float(result.actual) if result is not None and isfinite(result.actual) else None
@@ -141,15 +147,19 @@ def limits_report(
             "passed": result.passed,
             "boundaries": list(result.boundaries),
             "failing": len(result.cells),
-            "cells": result.cells[:LISTED].tolist(),
+            "cells": cells(result.cells[:LISTED]).tolist(),
         }
         for result, old in zip_longest(results, before)
     ]
 
 
-def metrics_report(found: Mapping[Metric, MetricValues]) -> Report:
+def metrics_report(mesh: Mesh, found: Mapping[Metric, MetricValues]) -> Report:
     """Return the summaries of metrics of a mesh, by the names of their fields."""
-    return {field_of(name): values.summary() for name, values in found.items()}
+    report = {field_of(name): values.summary() for name, values in found.items()}
+    for one in report.values():
+        if one["of"] == "cells":
+            one["worst_at"] = int(mesh.file_cells(np.array(one["worst_at"])))
+    return report
 
 
 def metric_lines(
@@ -223,26 +233,29 @@ def _repaired(steps: Sequence[Step]) -> MeshRepair | None:
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:
     """Return VTK type and first inverted step of the first ``LISTED`` inverted cells, by number."""
     cells = quality.inverted_cells(LISTED)
-    types = mesh.cells.types[cells].tolist()
+    numbers = mesh.file_cells(cells)
+    types = mesh.file_types[numbers].tolist()
     when = folded_at(steps, mesh, cells).tolist()
-    return dict(zip(cells.tolist(), zip(types, when, strict=True), strict=True))
+    return dict(zip(numbers.tolist(), zip(types, when, strict=True), strict=True))
 
 
 def _fields(value: object, keys: Iterable[str]) -> Report:
     return {key: getattr(value, key) for key in keys}
 
 
-def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> Report:
-    """Return the JSON object of ``quality --json``; ``worst`` has numbers and types of cells."""
+def quality_report(
+    mesh: Mesh, quality: Quality, worst: IntArray, types: Sequence[int]
+) -> Report:
+    """Return the JSON object of ``quality --json``; ``worst`` are cells of ``types`` (k,)."""
     counts, edges = quality.histogram()
     return {
-        "mesh": name,
+        "mesh": mesh.name,
         **quality.summary(),
         "metric": quality.metric,
-        "inverted_cells": quality.inverted_cells(LISTED).tolist(),
+        "inverted_cells": mesh.file_cells(quality.inverted_cells(LISTED)).tolist(),
         "worst": [
-            {"cell": cell, "type": ELEMENTS[vtk].name, "quality": float(quality.values[cell])}
-            for cell, vtk in worst
+            {"cell": number, "type": CELL_NAMES[vtk], "quality": float(quality.values[cell])}
+            for cell, number, vtk in zip(worst, mesh.file_cells(worst).tolist(), types, strict=True)
         ],
         "histogram": {"counts": counts.tolist(), "edges": edges.tolist()},
     }
@@ -261,7 +274,7 @@ def info_report(mesh: Mesh, pairs: Sequence[Any], counts: CellCounts, quality: Q
         "points": counts.points,
         "unused_points": counts.unused,
         "cells": sum(counts.types.values()),
-        "cells_by_type": {ELEMENTS[vtk].name: count for vtk, count in counts.types.items()},
+        "cells_by_type": {CELL_NAMES[vtk]: count for vtk, count in counts.types.items()},
         "extents": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
         "markers": [
             {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)}
@@ -441,9 +454,10 @@ def report_limits(limits: Sequence[ReportPart], advice: str = "") -> int:
 
 def write_qualities(path: Path, found: Quality) -> None:
     """Write a line with the size-skew quality of each cell, as RBF-SliDe's GENERATE_QUALITY."""
+    values = found.values[found.whole]
     with atomic_write(path, CaseError) as file:
-        for first in range(0, len(found), _ROWS):
-            part = np.asarray(found.values[first : first + _ROWS])
+        for first in range(0, len(values), _ROWS):
+            part = np.asarray(values[first : first + _ROWS])
             text = orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)
             file.write(text[1:-1].replace(b",", b"\n") + b"\n")
 
@@ -535,7 +549,8 @@ def _advice(case: Case, done: RunResult, limits: Sequence[ReportPart]) -> str:
     if done.walls is not None:
         cells = found.inverted_cells()
         if not found.inverted:
-            cells = np.array([cell for entry in missed for cell in entry["cells"]], np.int64)
+            numbers = [cell for entry in missed for cell in entry["cells"]]
+            cells = np.flatnonzero(np.isin(done.mesh.numbering.cells, numbers))
         beside = fixed_beside(case, done.mesh, cells)
         pitch = beyond_pitch(case, done.mesh)
     last = done.steps[-1]
@@ -552,7 +567,7 @@ def _inverted_sentence(report: dict, done: RunResult, advice: str) -> str:
     inverted = report["quality"]["inverted"]
     cells = report["quality"]["cells"]
     named = ", ".join(
-        f"{cell} ({ELEMENTS[vtk].name}, step {step})"
+        f"{cell} ({CELL_NAMES[vtk]}, step {step})"
         for cell, (vtk, step) in list(done.folded.items())[:5]
     )
     more = f" and {inverted - 5} more" if inverted > 5 else ""

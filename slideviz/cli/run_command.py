@@ -92,7 +92,8 @@ def main(arguments: Namespace) -> int:
     if arguments.metrics:
         before = _metrics_of(arguments, done.mesh, done.undeformed, done.mesh)
         after = _metrics_of(arguments, last, done.quality, done.mesh)
-        report["metrics"] = {"before": metrics_report(before), "after": metrics_report(after)}
+        both = {"before": before, "after": after}
+        report["metrics"] = {when: metrics_report(done.mesh, one) for when, one in both.items()}
     return report_outcome(arguments, case, done, report, {"mesh": output, CELLS: qualities})
 
 

@@ -69,7 +69,7 @@ def main(arguments: Namespace) -> int:
         )
         if not arguments.quiet:
             what = f"{counted(len(designs.rows), 'design')} of {', '.join(designs.columns)}"
-            cells = "" if mesh is None else f", {len(mesh.cells):,} cells"
+            cells = "" if mesh is None else f", {mesh.file_counts[1]:,} cells"
             print(f"{arguments.case}{cells}: {what}", flush=True)
         begin = time.perf_counter()
         results = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)

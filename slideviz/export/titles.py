@@ -171,7 +171,7 @@ def mark_words(session: Session) -> str:
     frame = session.frame
     if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
         return ""
-    words = f"cell {cell:,}"
+    words = f"cell {frame.mesh.cell_number(cell):,}"
     if frame.quality.status[cell] == INVERTED:
         return f"{words}: inverted"
     if session.view.color_by == "role" or session.mesh is None:

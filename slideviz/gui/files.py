@@ -170,7 +170,7 @@ class Files(QObject):
         self.window.show_opened(opened)
         self._designs.written = self._designs.table
         mesh = session.mesh
-        counts = len(mesh.cells), len(mesh.points), len(mesh.markers)
+        counts = *reversed(mesh.file_counts), len(mesh.markers)
         words = "opened %s: %dD, %d cells, %d points, %d boundaries"
         log.info(words, session.path, mesh.dim, *counts)
 

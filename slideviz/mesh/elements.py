@@ -43,6 +43,9 @@ ELEMENTS: dict[int, ElementType] = {
 }
 """Element type by VTK identifier; the table is ``elements.toml``."""
 
+CELL_NAMES = {row.vtk: row.name for row in _ROWS} | {7: "polygon", 42: "polyhedron"}
+"""Names of the types of cells that files have, by VTK identifier."""
+
 SIZES = np.zeros(256, np.int64)
 DIMS = np.zeros(256, np.int64)
 """Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.errors import point_words
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import CELL_NAMES
 from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
@@ -229,8 +229,9 @@ def step_safety(
         return SafeFraction(FARTHEST, step=step)
     nodes = cells.connectivity[cells.offsets[cell] : cells.offsets[cell + 1]]
     where = tuple(undeformed.points[nodes].mean(axis=0).tolist())
-    kind = ELEMENTS[int(cells.types[cell])].name
-    return SafeFraction(first + margin * length, cell, kind, where, step)
+    number = after.file_cells(np.array(cell))
+    kind = CELL_NAMES[int(after.file_types[number])]
+    return SafeFraction(first + margin * length, int(number), kind, where, step)
 
 
 def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:

@@ -417,6 +417,23 @@ class Mesh:
         begin = offsets_of([one[-1] + 1 for one in cells])
         return sealed(np.concatenate([one + a for one, a in zip(cells, begin, strict=False)]))
 
+    @cached_property
+    def file_types(self) -> NDArray[np.uint8]:
+        """Return the VTK identifier (c,) of each cell of the file; see `CELL_NAMES`."""
+        if self.whole_cells is None:
+            return self.cells.types
+        first = np.diff(self.whole_cells, prepend=-1) > 0
+        polyhedron = 7 if self.dim == 2 else 42
+        several = np.bincount(self.whole_cells) > 1
+        return np.where(several, polyhedron, self.cells.types[first]).astype(np.uint8)
+
+    def file_cells(self, cells: IntArray) -> IntArray:
+        """Return the numbers (k,) that cells (k,) have in the file: parts have their polyhedron's.
+
+        ``cells``: indices; of a mesh in its file, such numbers already.
+        """
+        return cells if self.whole_cells is None else self.whole_cells[cells]
+
     def first_parts(self, cells: IntArray) -> IntArray:
         """Return the first part (k,) of the polyhedron that each of cells (k,) is in."""
         whole = self.whole_cells
@@ -510,7 +527,7 @@ class Mesh:
     @property
     def file_counts(self) -> tuple[int, int]:
         """Return the numbers of points and cells that the mesh of its file has."""
-        return len(self.points), len(self.cells)
+        return len(self.points), len(self.file_types)
 
     @property
     def numbering(self) -> Part:
@@ -518,8 +535,8 @@ class Mesh:
 
         The arrays are made each time; `numbers` and `file_counts` need none.
         """
-        points, cells = self.file_counts
-        return Part(np.arange(points), np.arange(cells), points, cells)
+        cells = self.file_cells(np.arange(len(self.cells)))
+        return Part(np.arange(len(self.points)), cells, *self.file_counts)
 
     def numbers(self, nodes: IntArray) -> IntArray:
         """Return the numbers (k,) that nodes (k,) have in the file."""
@@ -531,7 +548,7 @@ class Mesh:
 
     def cell_number(self, cell: int) -> int:
         """Return the number that a cell has in its file, for messages."""
-        return cell
+        return int(self.file_cells(np.array(cell)))
 
     @check_types
     def with_points(self, points: ArrayLike) -> Self:
@@ -576,12 +593,12 @@ def _difference(mesh: Mesh, other: Mesh) -> str:
     if len(changed):
         cell = changed[0]
         kinds = (ELEMENTS[int(each.types[cell])].name for each in (other.cells, cells))
-        return f"cell {cell} is a {' instead of a '.join(kinds)}"
+        return f"cell {mesh.cell_number(cell)} is a {' instead of a '.join(kinds)}"
     changed = np.flatnonzero(cells.connectivity != other.cells.connectivity)
     if not len(changed):
         return ""
     cell = int(np.searchsorted(cells.offsets, changed[0], "right")) - 1
-    return f"cell {cell} has other nodes, or the same in another order"
+    return f"cell {mesh.cell_number(cell)} has other nodes, or the same in another order"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

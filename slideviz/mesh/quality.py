@@ -202,6 +202,11 @@ class Quality:
         return slice(None) if self.copies is None else ~self.copies
 
     @property
+    def whole(self) -> BoolArray | slice:
+        """Return an index into ``values`` that has each cell of the file once."""
+        return slice(None) if self.first is None else self.first
+
+    @property
     def copies(self) -> BoolArray | None:
         """Return a mask (m,) of the halo's cells, or of the further parts of polyhedra, or None."""
         return self.halo if self.first is None else ~self.first

@@ -143,8 +143,8 @@ def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
 def _flat_sentence(cell: int, mesh: Mesh) -> str:
     """Return the message that an undeformed cell has no positive volume."""
     return (
-        f"cell {cell} of the undeformed mesh has no positive volume to compare {mesh.name} with; "
-        "repair it, or leave out the reference"
+        f"cell {mesh.cell_number(cell)} of the undeformed mesh has no positive volume to compare "
+        f"{mesh.name} with; repair it, or leave out the reference"
     )
 
 

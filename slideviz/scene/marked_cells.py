@@ -308,7 +308,7 @@ class RepairLayer(KeyedLayer):
         mesh = done.mesh
         before = np.array(done.mesh.points)
         nodes = np.searchsorted(mesh.numbering.points, done.nodes)
-        cells = np.searchsorted(mesh.numbering.cells, done.cells)
+        cells = np.isin(mesh.numbering.cells, done.cells)
         before[nodes] = done.points
         lift = 4.0 * self.stage.lift(mesh)
         edges = np.concatenate(

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.mesh.axis_frame import in_axis_frame
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import CELL_NAMES
 from slideviz.mesh.model import Assembly, Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.polyhedra import outlines
@@ -129,14 +129,9 @@ class WorstCells:
     """(k,): the first frame at which each was worst; 0 is the undeformed mesh, -1 unknown."""
     kinds: tuple[str, ...]  # the names of their element types
     measure: ColorBy  # the quality in ``values``
-    numbers: IntArray | None = None
-    """(k,): the numbers of the cells in the file, where only a part of the mesh is in memory."""
+    known_as: IntArray
+    """(k,): the numbers of the cells that users see: those in the file."""
     zones: tuple[int, ...] = ()  # their zones, from 1; () where there is only one
-
-    @property
-    def known_as(self) -> IntArray:
-        """Return the numbers (k,) of the cells that users see: those in the file."""
-        return self.cells if self.numbers is None else self.numbers
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -173,22 +168,23 @@ def worst_cells(
     if frame.extra is not None:
         return _listed(frame, frame.extra, at, count)
     values = frame.values(what, reference or frames[0].mesh)
-    halo = frame.quality.halo
+    copies = frame.quality.copies
     rank = np.where(frame.quality.status == INVERTED, -np.inf, -badness(what, values))
     there = ~np.isnan(values)
-    cells = lowest(rank, count, there if halo is None else there & ~halo)
+    cells = lowest(rank, count, there if copies is None else there & ~copies)
     followed = what in SIZE_SKEW
     history = np.stack([each.values(what)[cells] for each in frames if followed or each is frame])
-    types = frame.mesh.cells.types[cells]
+    numbers = [frame.mesh.cell_number(int(cell)) for cell in cells]
     return WorstCells(
         cells,
         values[cells],
         frame.quality.status[cells] == INVERTED,
         cell_centers(frame.mesh, cells),
         history.argmin(axis=0) if followed else np.full(len(cells), -1),
-        tuple(ELEMENTS[int(vtk)].name for vtk in types),
+        tuple(cell_kind(frame.mesh, int(cell)) for cell in cells),
         what,
-        zones=zones_of_cells(frame.mesh, [frame.mesh.cell_number(int(cell)) for cell in cells]),
+        np.array(numbers),
+        zones_of_cells(frame.mesh, numbers),
     )
 
 
@@ -208,7 +204,7 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
         extra.quality.status[cells] == INVERTED,
         cell_centers(extra.mesh, cells),
         np.where(before <= values, 0, at),
-        tuple(ELEMENTS[int(vtk)].name for vtk in extra.mesh.cells.types[cells]),
+        tuple(cell_kind(extra.mesh, int(cell)) for cell in cells),
         "size-skew",
         numbers,
         zones_of_cells(frame.mesh, numbers),
@@ -223,6 +219,11 @@ def zones_of_cells(mesh: Mesh, numbers: IntArray | Sequence[int]) -> tuple[int, 
     return tuple(np.searchsorted(first, numbers, side="right").tolist())
 
 
+def cell_kind(mesh: Mesh, cell: int) -> str:
+    """Return the name of the type of a cell, of a part that of its polyhedron."""
+    return CELL_NAMES[int(mesh.file_types[mesh.file_cells(np.array(cell))])]
+
+
 def cell_centers(mesh: Mesh, cells: IntArray) -> FloatArray:
     """Return the mean (k, d) of the nodes of each of ``cells`` (k,)."""
     return np.array([mesh.points[nodes_of(mesh, int(cell))].mean(axis=0) for cell in cells])
@@ -230,16 +231,21 @@ def cell_centers(mesh: Mesh, cells: IntArray) -> FloatArray:
 
 def nodes_of(mesh: Mesh, cell: int) -> IntArray:
     """Return the nodes of a cell, (k,); of a part, those of its polyhedron, in 2D in order."""
-    begin = cell
-    end = cell + 1
-    whole = mesh.whole_cells
-    if whole is not None:
-        begin, end = np.searchsorted(whole, whole[cell] + np.arange(2))
-    offsets = mesh.cells.offsets[begin : end + 1]
+    parts = _parts(mesh, cell)
+    offsets = mesh.cells.offsets[parts.start : parts.stop + 1]
     nodes = mesh.cells.connectivity[offsets[0] : offsets[-1]]
     if mesh.dim == 3:
-        return nodes if end - begin == 1 else np.unique(nodes)
-    return outlines(offsets - offsets[0], nodes, np.zeros(end - begin, int))[1]
+        return nodes if len(parts) == 1 else np.unique(nodes)
+    return outlines(offsets - offsets[0], nodes, np.zeros(len(parts), int))[1]
+
+
+def _parts(mesh: Mesh, cell: int) -> range:
+    """Return the parts of the polyhedron that a cell is a part of; of others, itself."""
+    whole = mesh.whole_cells
+    if whole is None:
+        return range(cell, cell + 1)
+    begin, end = np.searchsorted(whole, whole[cell : cell + 1] + np.arange(2)).tolist()
+    return range(begin, end)
 
 
 def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
@@ -254,20 +260,21 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     frame, cell = frame.place_of(cell)
     mesh = frame.mesh
     found = frame.quality
-    sign = int(found.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
-    jacobians = corner_jacobians(mesh, cell, sign)
+    if not 0 <= cell < len(mesh.cells):
+        corner_jacobians(mesh, cell)  # says so
+    jacobians = [corner_jacobians(mesh, k, int(found.signs[k])) for k in _parts(mesh, cell)]
     status = found.status[cell]
     zones = zones_of_cells(zoned, [mesh.cell_number(cell)])
     return CellInfo(
         mesh.cell_number(cell),
-        ELEMENTS[int(mesh.cells.types[cell])].name
+        cell_kind(mesh, cell)
         + (" of the halo" if found.halo is not None and found.halo[cell] else ""),
         CELL_STATES[status],
         float(found.values[cell]),
         float(found.size[cell]),
         float(found.skew[cell]),
         zones[0] if zones else None,
-        jacobians,
+        np.concatenate(jacobians),
         mesh.points[nodes_of(mesh, cell)].mean(axis=0),
     )
 

@@ -37,7 +37,7 @@ from slideviz.formats.files import read, write
 from slideviz.formats.openfoam_paths import shown_name, stem_of
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import CELL_NAMES
 from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import FloatArray, Mesh, Skin
 from slideviz.mesh.periodic import find_pairs
@@ -92,18 +92,18 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
     found = frame.quality
     cells = frame.mesh.cells
     middles = cells.means(mesh.points)
-    names = {vtk: ELEMENTS[vtk].name for vtk in cells.by_type}
+    measured = found.size, found.skew, found.values, found.status, middles
+    columns = [mesh.file_types, *(column[found.whole] for column in measured)]
     tick = _tick(f"Writing {path.name}", report, stopped)
 
     def rows() -> Iterator[Sequence[object]]:
         yield "cell", "type", "size", "skew", "size_skew", "status", *"xyz"[: mesh.dim]
-        for start in range(0, len(found), _ROWS):
-            tick(start / len(found))
+        for start in range(0, len(columns[0]), _ROWS):
+            tick(start / len(columns[0]))
             part = slice(start, start + _ROWS)
-            columns = cells.types, found.size, found.skew, found.values, found.status, middles
             lists = zip(*(column[part].tolist() for column in columns), strict=True)
             for cell, (kind, *measured, status, middle) in enumerate(lists, start):
-                yield cell, names[kind], *measured, CELL_STATES[status], *middle
+                yield cell, CELL_NAMES[kind], *measured, CELL_STATES[status], *middle
 
     write_csv(path, rows())
     return path

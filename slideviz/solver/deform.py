@@ -247,8 +247,12 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     if not len(cells):
         return first
     part = Mesh(mesh.points, mesh.cells.take(cells))
+    rows: IntArray | slice = slice(None)
+    if mesh.whole_cells is not None:
+        part = mesh
+        rows = cells
     for step in steps:
-        status = quality(part.with_points(step.mesh.points), part).status
+        status = quality(part.with_points(step.mesh.points), part).status[rows]
         first[(first == 0) & (status == INVERTED)] = step.index
     return first
 

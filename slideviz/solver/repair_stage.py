@@ -263,17 +263,17 @@ def mend(
         beyond = np.flatnonzero(np.isin(now.halo.receivers, now.halo.outer))
         points = now.halo.move_receivers(now.points, points, beyond)
     moved = np.flatnonzero((points != now.points).any(axis=1))
-    number = np.arange(len(now.cells)) if cells is None else cells
+    number = now.file_cells(np.arange(len(now.cells)) if cells is None else cells)
     mended = now.with_points(sealed(points))
     before = sealed(now.points[moved])
     unmendable, warnings = unmendable_words(done.impossible, mesh, number)
     poor = domain.cells.take(np.setdiff1d(done.bad_after, done.folded_after))
     return MeshRepair(
         mended,
-        number[done.bad_before],
-        number[done.bad_after],
-        number[found.status != VALID],
-        number[done.folded_after],
+        np.unique(number[done.bad_before]),
+        np.unique(number[done.bad_after]),
+        np.unique(number[found.status != VALID]),
+        np.unique(number[done.folded_after]),
         moved,
         before,
         largest_norm(now.points[moved] - mended.points[moved]),
@@ -350,8 +350,11 @@ def unmendable_words(
         layers = " in layers" if any(one.layered for one in ones) else ""
         return f"held on {' and '.join(names)}{layers}" if names else f"held{layers}"
 
-    cells = [one.cell if number is None else int(number[one.cell]) for one in impossible]
-    reasons = [f"its nodes are {on([one])}" for one in impossible]
+    reasons = {
+        one.cell if number is None else int(number[one.cell]): f"its nodes are {on([one])}"
+        for one in impossible
+    }
+    cells = [*reasons]
     first = ", ".join(map(str, cells[:5]))
     first += " ..." if len(cells) > 5 else ""
     sentence = (
@@ -359,7 +362,7 @@ def unmendable_words(
         f"are {on(impossible)}, so moving the others does not help; let that boundary slide, "
         "move it less, or mend its mesh"
     )
-    return tuple(zip(cells, reasons, strict=True)), (sentence,)
+    return tuple(reasons.items()), (sentence,)
 
 
 def slide_advice(case: Case, mesh: Mesh, poor: Cells, limit: float) -> tuple[str, ...]:

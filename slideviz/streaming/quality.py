@@ -123,8 +123,7 @@ class CellCounts:
     def add(self, block: CellBlock) -> None:
         """Count the cells of a block."""
         self._used[block.nodes[block.mesh.cells.nodes]] = True
-        for vtk, (ids, _) in block.mesh.cells.by_type.items():
-            self._types[vtk] += len(ids)
+        self._types += np.bincount(block.mesh.file_types, minlength=256)
 
     @property
     def unused(self) -> int:

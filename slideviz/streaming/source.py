@@ -160,7 +160,7 @@ class MemorySource:
 
     def types(self, ids: IntArray) -> NDArray[np.uint8]:
         """Return the VTK types (k,) of the cells ``ids`` (k,)."""
-        return np.asarray(self.mesh.cells.types[ids])
+        return self.mesh.file_types[self.mesh.file_cells(ids)]
 
 
 @record

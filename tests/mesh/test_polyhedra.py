@@ -1,5 +1,7 @@
-"""Polyhedra are drawn as the cells of their file: faces, cuts and cells of a plane, in one piece."""
+"""Polyhedra are drawn as cells of their file: faces, cuts and cells of a plane, in one piece."""
 
+import csv
+import json
 from collections import Counter
 
 import numpy as np
@@ -8,12 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
+from slideviz.cli import run
+from slideviz.export.titles import mark_words
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.polyhedra import outlines
 from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces, is_closed
 from slideviz.scene.actors import CELL, POINT, part_shape
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.inspect import cell_at, cell_centers, cell_info, worst_cells
+from slideviz.session.jobs import save_quality
+from slideviz.session.opening import open_mesh
+from slideviz.session.state import StepFrame
 from tests.builders import grid
 from tests.polymesh_files import extruded, honeycomb, merged, sides_of, write_mesh, write_polymesh
 
@@ -164,3 +173,127 @@ def test_cells_of_several_faces_between_the_same_two(tmp_path):
     write_polymesh(tmp_path / "polyMesh", mesh.points, cells, patches)
     [surface] = find_surfaces(sv.read(tmp_path / "polyMesh"))
     assert len(surface.facets) == 2 * 4 + 4 * 8
+
+
+@pytest.fixture
+def folded(hexagons, tmp_path):
+    """The case of the hexagons with a node of two cells moved, its mesh, and the folded cells."""
+    node = int(np.argmax(hexagons.points[:-18] @ [1.0, -0.9, -0.01]))
+    points = hexagons.points.copy()
+    points[node] += [-3.0, 1.0, 0.0]
+    case = tmp_path / "folded"
+    sv.write(f"{case}.foam", hexagons.with_points(points))
+    mesh = hexagons.with_points(points)
+    parts = sv.quality(Mesh(points, mesh.cells), Mesh(hexagons.points, mesh.cells))
+    cells = {*hexagons.whole_cells[parts.inverted_cells()].tolist()}
+    assert 0 < len(cells) < 10
+    return case, mesh, cells
+
+
+def test_reports_have_numbers_and_types_of_the_files_cells(folded, hexagons, tmp_path, capsys):
+    case, _, cells = folded
+    original = hexagons.source.parent
+    assert run(["info", str(case), "--json", str(tmp_path / "i.json")]) == 0
+    report = json.loads((tmp_path / "i.json").read_text())
+    assert (report["cells"], report["cells_by_type"]) == (18, {"polyhedron": 18})
+    given = ["quality", str(case), "--reference", str(original)]
+    given += ["--metrics", "skewness,aspect-ratio", "--limits", "( inverted = 0 )"]
+    assert run([*given, "--json", str(tmp_path / "q.json")]) == 3
+    report = json.loads((tmp_path / "q.json").read_text())
+    assert {*report["inverted_cells"]} == cells
+    assert {one["cell"] for one in report["worst"][: len(cells)]} == cells
+    assert {one["type"] for one in report["worst"]} == {"polyhedron"}
+    assert {*report["limits"][0]["cells"]} == cells
+    assert all(one["worst_at"] < 18 for one in report["metrics"].values())
+    assert run([*given, "-o", str(tmp_path / "q.csv")]) == 3
+    rows = list(csv.DictReader((tmp_path / "q.csv").read_text().splitlines()))
+    assert [int(row["cell"]) for row in rows] == list(range(18))
+    assert {int(row["cell"]) for row in rows if row["status"] == "inverted"} == cells
+    capsys.readouterr()
+
+
+def test_messages_have_numbers_of_the_files_cells(folded, hexagons, tmp_path, capsys):
+    _, mesh, cells = folded
+    moved = np.flatnonzero((mesh.points != hexagons.points).any(axis=1))
+    shift = (mesh.points - hexagons.points)[moved[0]]
+    table = "\n".join(
+        f"{k} {' '.join(map(repr, (shift * (k == moved[0])).tolist()))}"
+        for k in hexagons.nodes_of(["ends", "sides"])
+    )
+    (tmp_path / "d.txt").write_text(table)
+    (tmp_path / "case.cfg").write_text(
+        f"MESH_FILENAME= {hexagons.source.parent}\nMARKER_MOVING= ( sides, ends )\n"
+        "DEFORMATION_FILENAME= d.txt\nRELAX= NO\nGENERATE_QUALITY= YES\nSUPPORT_RADIUS= 0.1\n"
+    )
+    out = tmp_path / "out.foam"
+    case = str(tmp_path / "case.cfg")
+    assert run(["run", case, "-o", str(out), "--json", str(tmp_path / "r")]) == 3
+    report = json.loads((tmp_path / "r").read_text())
+    assert {*report["quality"]["inverted_cells"]} == cells
+    assert {*report["quality"]["inverted_at_step"]} == {1}
+    assert report["safe_cell"] in cells
+    assert report["safe_kind"] == "polyhedron"
+    words = capsys.readouterr().err
+    assert f"{len(cells)} of 18 cells are inverted: {min(cells)} (polyhedron, step 1)" in words
+    assert len((tmp_path / "out" / "out_qual.txt").read_text().split()) == 18
+    plane = ",".join(map(str, (0.0, 0.0, 1.0, *mesh.points[moved[0]][:2], 0.5)))
+    given = ["section", str(tmp_path / "out"), "--reference", str(hexagons.source.parent)]
+    given += ["--plane", plane, "-o", str(tmp_path / "s.svg"), "--json", str(tmp_path / "s")]
+    assert run(given) == 3
+    report = json.loads((tmp_path / "s").read_text())
+    assert report["worst_cell"] in cells
+    assert report["cells"] <= 9
+
+
+def test_repair_counts_the_files_cells(folded, hexagons, capsys):
+    _, mesh, cells = folded
+    done = sv.repair(mesh, hexagons, fixed=["ends", "sides"])
+    assert {*done.folded.tolist()} == cells
+    assert {*done.cells.tolist()} >= cells
+    assert {cell for cell, _ in done.unmendable} <= cells
+    assert done.report()["folded_before"] == len(cells)
+    capsys.readouterr()
+
+
+def test_the_window_names_cells_of_the_file(folded, hexagons, tmp_path):
+    _, mesh, cells = folded
+    frame = StepFrame(mesh, sv.quality(mesh, hexagons))
+    session = open_mesh(StepFrame(hexagons, sv.quality(hexagons)), None)
+    session = changes.add_frames(changes.start_run(session), [frame])
+    worst = worst_cells(session.frames, 1, "size-skew")
+    assert {*worst.known_as[: len(cells)].tolist()} == cells
+    assert len(worst) == 18
+    assert {*worst.kinds} == {"polyhedron"}
+    cell = int(worst.cells[0])
+    info = cell_info(frame, cell)
+    assert (info.cell, info.kind, info.state) == (worst.known_as[0], "polyhedron", "inverted")
+    assert info.position == pytest.approx(worst.positions[0])
+    assert (info.jacobians < 0).any()
+    session = changes.mark_cell(session, cell)
+    assert mark_words(session) == f"cell {info.cell}: inverted"
+    save_quality(tmp_path / "w.csv", frame, lambda _: None, lambda: False)
+    rows = list(csv.DictReader((tmp_path / "w.csv").read_text().splitlines()))
+    assert len(rows) == 18
+    assert {int(row["cell"]) for row in rows if row["status"] == "inverted"} == cells
+
+
+def test_cells_of_several_regions_are_numbered_one_after_the_other(tmp_path):
+    for name in ("one", "two"):
+        where = tmp_path / "constant" / name / "polyMesh"
+        write_polymesh(where, *extruded(*honeycomb(), [0.0, 1.0]), ENDS)
+    text = "FoamFile { format ascii; }\nregions ( fluid (one two) );\n"
+    (tmp_path / "constant" / "regionProperties").write_text(text)
+    mesh = sv.read(tmp_path)
+    assert mesh.file_counts[1] == 18
+    assert [part.first_cell for part in mesh.parts] == [0, 9]
+    frame = StepFrame(mesh, sv.quality(mesh))
+    last = len(mesh.cells) - 1
+    info = cell_info(frame, last)
+    assert (info.cell, info.zone) == (17, 2)
+    assert tuple(sorted(worst_cells([frame], 0, "size-skew").zones)) == (1,) * 9 + (2,) * 9
+
+
+def test_a_point_of_a_plane_is_in_the_cell_of_the_file(flat):
+    values = np.ones(len(flat.cells))
+    for number, (x, y) in enumerate(cell_centers(flat, np.arange(0, 54, 6))):
+        assert cell_at(flat, x + 0.4, y + 0.2, values) == 6 * number

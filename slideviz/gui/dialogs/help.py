@@ -326,7 +326,7 @@ def details(window: Services) -> str:
         count = ", ".join(f"{roles.count(role)} {role}" for role in dict.fromkeys(roles))
         case = session.case
         lines += [
-            f"mesh: {mesh.dim}D, {len(mesh.cells)} cells, {len(mesh.points)} points",
+            f"mesh: {mesh.dim}D, {mesh.file_counts[1]} cells, {len(mesh.points)} points",
             f"boundaries: {count or 'none'}",
             f"sliding {case.sliding}, periodic {case.periodic}, steps {case.steps or 'automatic'}",
             f"runs: {len(session.runs)}, steps shown: {max(len(session.frames) - 1, 0)}",
