@@ -60,6 +60,7 @@ def span_ends(case: Case, mesh: Mesh, remedy: str = WALLS_KEY) -> tuple[str, str
             f"{mesh.name}: the names of boundaries do not say between which the span goes (hub: "
             f"{hubs}; shroud or casing: {shrouds}); name two, e.g. {remedy}, of "
             f"{', '.join(names)}"
+            + ("" if moving else "; to find those of a wing, give a case in which it moves")
         )
     return wing
 

@@ -186,7 +186,7 @@ def _read_ends(text: str) -> tuple[str, str] | None:
     if len(names) != 2:
         raise CaseError(
             f"{shown(text)} has {counted(len(names), 'name')}; expected AUTO, or two boundaries: "
-            "( hub, shroud )"
+            "( HUB, SHROUD ), of a wing ( ROOT, TIP )"
         )
     return names[0], names[1]
 
@@ -276,7 +276,7 @@ YES_NO = replace(
 PATH = Kind("a file name", _read_path, path_text)
 NAMES = Kind("( A, B, ... )", lambda text: _names(list_of(text)), _write_names)
 ENDS = Kind(
-    "AUTO | ( hub, shroud )",
+    "AUTO | ( HUB, SHROUD ) | ( ROOT, TIP )",
     _read_ends,
     lambda names: "AUTO" if names is None else _write_names(names),
 )

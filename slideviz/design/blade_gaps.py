@@ -21,7 +21,6 @@ from slideviz.machine.smallest_distances import (
     smallest,
     turned,
 )
-from slideviz.machine.straight_span import StraightSpan
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.interfaces import ROUNDING
 from slideviz.mesh.model import Assembly, FloatArray, IntArray, Mesh, frozen_array
@@ -190,7 +189,7 @@ class _Measure:
         ends = () if self.walls is None else (self.walls.hub, self.walls.shroud)
         moving = case.markers_with("moving")
         self.blades = tuple(name for name in moving if name not in ends)
-        if self.walls is not None and isinstance(self.walls.field, StraightSpan):
+        if self.walls is not None and not self.walls.field.about:
             self.blades = self.blades or moving  # a wing is its own tip
 
     def all(self, between: Sequence[tuple[str, str]]) -> Iterator[Gap]:
@@ -200,7 +199,7 @@ class _Measure:
         if self.walls is not None and self.blades:
             for name, wall, end in (
                 ("tip gap", self.walls.shroud, 1),
-                ("hub gap", self.walls.hub, 0),
+                (f"{self.walls.field.ends[0]} gap", self.walls.hub, 0),
             ):
                 if not np.isin(self.nodes(self.blades), self.nodes((wall,))).any():
                     yield self.wall_gap(name, wall, end)

@@ -19,6 +19,7 @@ from slideviz.mesh.axis_frame import Triple
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.terms import Vector
 
 Distances = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -68,6 +69,12 @@ class Span(ABC):
     """The axis or direction and a point on it; the middle of the third coordinate; the length of a
     unit of the third coordinate at the walls; (t, 4): triangles that close holes of the walls."""
     words: ClassVar[tuple[str, str]]  # what the first two coordinates are called
+    ends: ClassVar[tuple[str, str]] = ("hub", "shroud")  # what both ends are called
+
+    @property
+    def about(self) -> tuple[Vector, Vector] | None:
+        """Return the axis about which the span goes, and a point on it; None along a direction."""
+        return self.axis, self.origin
 
     @property
     @abstractmethod

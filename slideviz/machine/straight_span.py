@@ -41,6 +41,8 @@ class StraightSpan(Span):
     radius = 1.0
     holes = NO_NODES.reshape(0, 4)
     words = ("m", "h")
+    ends = ("root", "tip")
+    about = None
     revolved = True
     level_scale = 1.0
 

@@ -136,7 +136,7 @@ def coordinates(session: Session) -> dict[Coordinate, str]:
     """Return in words the coordinates that curves along the span can have; no z in 2D."""
     if session.mesh is None or session.mesh.dim == 2:
         return {"y": "along y", "x": "along x", "r": "along the radius"}
-    words: dict[Coordinate, str] = {"r": "along the radius", "span": "from hub to shroud"}
+    words: dict[Coordinate, str] = {"r": "along the radius", "span": "over the span"}
     return words | {"z": "along z", "y": "along y", "x": "along x"}
 
 

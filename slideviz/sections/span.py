@@ -20,7 +20,6 @@ from slideviz.case.spans import WALLS_KEY, span_between, span_ends
 from slideviz.case.zone_cases import each_zone
 from slideviz.errors import CaseError
 from slideviz.machine.span import Curves, Span
-from slideviz.machine.straight_span import StraightSpan
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import names_from
@@ -330,7 +329,7 @@ def between_walls(section: Section, walls: SpanWalls) -> Section:
     """Return a section of constant span between walls, of the class of their kind of span."""
     values = {each.name: getattr(section, each.name) for each in fields(section)}
     values["walls"] = walls
-    if not isinstance(walls.field, StraightSpan):
+    if walls.field.about:
         return ConstantSpan(**values)
     return SpanPlane(**values | {"direction": walls.field.axis, "origin": walls.field.origin})
 
@@ -365,8 +364,7 @@ def find_walls(
         if pair is not None and pair.kind != "rotational" and not one.markers_with("periodic"):
             pair = None  # it was guessed: inflow and outflow match, too
         field = span_between(one, zone, (hub, shroud), pair, about)
-        if not isinstance(field, StraightSpan):
-            about = field.axis, field.origin
+        about = field.about or about
         channels.append(SpanChannel(label[hub], label[shroud], field, number))
     if not channels:
         raise missing[0]

@@ -98,7 +98,7 @@ def test_root_and_tip_are_where_the_wing_meets_flat_walls(wing):
     through = box(((2, 4), (2, 4), (0, 6)))
     assert span_ends(case_of(TWIST), through) == ("z_m", "z_p")
     inside = box(((2, 4), (2, 4), (1, 4)))
-    with pytest.raises(CaseError, match="do not say between which the span goes"):
+    with pytest.raises(CaseError, match=r"do not say between which the span goes.*BLOCK$"):
         span_ends(case_of(TWIST), inside)
     free = case_of(TWIST, span_axis=(0.0, 0.0, -2.0))
     assert span_ends(free, inside) == ("BLOCK", "BLOCK")
@@ -233,6 +233,10 @@ def test_gaps_of_a_linear_cascade():
     assert throat.distances[inside] == pytest.approx(4 / 6, rel=1e-9)
     assert np.isnan(throat.distances[~inside]).all()
     assert tip.distances == pytest.approx(1 / 6, rel=1e-9)
+    lifted = box(((2, 4), (2, 4), (1, 6)))
+    throat, gap = sv.gaps(case_of(roles=roles, span=("z_m", "z_p")), lifted)
+    assert gap.name == "root gap"
+    assert gap.distances == pytest.approx(1 / 6, rel=1e-9)
     # A wing has a tip that is free, so there is no gap.
     assert sv.gaps(case_of(), box()) == ()
 

@@ -75,4 +75,5 @@ def test_the_command_draws_it_and_reports_the_means(tmp_path, monkeypatch, capsy
     assert run(["section", "cube.su2", "--span", "0.5", "-o", "m.png"]) == 1
     said = capsys.readouterr().err
     assert "name two, e.g. --between HUB,SHROUD, of " in said
+    assert said.endswith("; to find those of a wing, give a case in which it moves\n")
     assert "SPAN=" not in said
