@@ -164,8 +164,8 @@ def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> W
 def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
     """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
     measured = found.values, found.size, found.skew, *more.values()
-    texts = [map(repr, one[found.whole].tolist()) for one in measured]
-    status = map(CELL_STATES.__getitem__, found.status[found.whole].tolist())
+    texts = [map(repr, one[found.file_rows].tolist()) for one in measured]
+    status = map(CELL_STATES.__getitem__, found.status[found.file_rows].tolist())
     rows = ((at, *row) for at, row in enumerate(zip(*texts[:3], status, *texts[3:], strict=True)))
     write_csv(
         path, chain([("cell", "size_skew", "size", "skew", "status", *more)], rows), CaseError

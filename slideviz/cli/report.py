@@ -454,7 +454,7 @@ def report_limits(limits: Sequence[ReportPart], advice: str = "") -> int:
 
 def write_qualities(path: Path, found: Quality) -> None:
     """Write a line with the size-skew quality of each cell, as RBF-SliDe's GENERATE_QUALITY."""
-    values = found.values[found.whole]
+    values = found.values[found.file_rows]
     with atomic_write(path, CaseError) as file:
         for first in range(0, len(values), _ROWS):
             part = np.asarray(values[first : first + _ROWS])

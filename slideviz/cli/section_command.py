@@ -153,7 +153,7 @@ def _meridional(arguments: Namespace, case: Case | None) -> int:
     draw_meridional(figure, bins, replace(painted, color_map=arguments.map))
     if not arguments.axes:
         figure.axes[0].set_axis_off()
-    summary = painted.summary(np.arange(len(mesh.cells))[quality.whole])
+    summary = painted.summary(np.arange(len(mesh.cells))[quality.file_rows])
     name = Path(mesh.name).name
     facts = f"{painted.label}: {painted.worst} {summary[painted.worst]:.4g}, "
     facts += f"mean {summary['mean']:.4g}; {summary['cells']:,} cells"

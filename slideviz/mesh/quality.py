@@ -202,7 +202,7 @@ class Quality:
         return slice(None) if self.copies is None else ~self.copies
 
     @property
-    def whole(self) -> BoolArray | slice:
+    def file_rows(self) -> BoolArray | slice:
         """Return an index into ``values`` that has each cell of the file once."""
         return slice(None) if self.first is None else self.first
 

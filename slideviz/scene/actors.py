@@ -99,7 +99,7 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
         faces = shape.GetPolys()
         flat = faces.GetOffsetsArray(), faces.GetConnectivityArray(), shape.cell_data[CELL]
         arrays = (np.array(one, np.int64) for one in flat)
-        polygons = Polygons(points, *arrays).whole(mesh, sides=mesh.dim == 3)
+        polygons = Polygons(points, *arrays).of_file_cells(mesh, sides=mesh.dim == 3)
         shape.SetPolys(polygon_table(polygons))
         shape.cell_data[CELL] = polygons.cells
     return shape

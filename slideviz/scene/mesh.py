@@ -67,7 +67,7 @@ class CellLayer(Layer):
         if mesh.dim == 2:
             every = np.arange(len(mesh.cells))
             cells = mesh.cells.offsets, mesh.cells.connectivity, every
-            self.polygons = Polygons(padded(mesh.points), *cells).whole(mesh, sides=False)
+            self.polygons = Polygons(padded(mesh.points), *cells).of_file_cells(mesh, sides=False)
             self.cells = self.polygons.cells
             shape = actors.polygon_shape(self.polygons)
         elif not surfaces:

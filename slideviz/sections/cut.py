@@ -72,7 +72,7 @@ class Cutter:
         at = _crossings(points, a, b, level, section)
         polygons = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
         polygons = polygons.take(np.argsort(owners, kind="stable"))
-        return polygons.whole(self._mesh, sides=False)
+        return polygons.of_file_cells(self._mesh, sides=False)
 
     def which_cells(self, points: FloatArray, section: Section) -> IntArray:
         """Return the sorted numbers of the cells that the section cuts (see `cut`).
@@ -123,7 +123,7 @@ class Cutter:
         keep[facets[:, 2] == facets[:, 3], 3] = False
         used, corners = np.unique(facets[keep], return_inverse=True)
         polygons = Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
-        return polygons.whole(self._mesh, sides=self.dim == 3)
+        return polygons.of_file_cells(self._mesh, sides=self.dim == 3)
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
         if not section.can_cut(self.dim):

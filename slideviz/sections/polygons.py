@@ -82,7 +82,7 @@ class Polygons:
         """Return the same polygons at other points, (p, 3)."""
         return replace(self, points=points)
 
-    def whole(self, mesh: Mesh, *, sides: bool) -> Polygons:
+    def of_file_cells(self, mesh: Mesh, *, sides: bool) -> Polygons:
         """Return the polygons as those of the cells of the mesh's file (see `whole_polygons`)."""
         if mesh.whole_cells is None:
             return self

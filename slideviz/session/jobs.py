@@ -93,7 +93,7 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
     cells = frame.mesh.cells
     middles = cells.means(mesh.points)
     measured = found.size, found.skew, found.values, found.status, middles
-    columns = [mesh.file_types, *(column[found.whole] for column in measured)]
+    columns = [mesh.file_types, *(column[found.file_rows] for column in measured)]
     tick = _tick(f"Writing {path.name}", report, stopped)
 
     def rows() -> Iterator[Sequence[object]]:
