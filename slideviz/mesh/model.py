@@ -310,8 +310,8 @@ class Origin:
 
     ending: ClassVar[str] = ""
     """File name ending of the format, with its dot; "" where no more of the file is kept."""
-    extras: ClassVar[str] = ""
-    """What else such files have that no other format keeps, in words."""
+    extras: str = field(default="", kw_only=True)
+    """What else its file has that no other format keeps, in words."""
     ffd: bytes | None = field(default=None, kw_only=True)
     """Text of the boxes for free-form deformation that an SU2 file gets in place of those it had;
     None: those it had."""

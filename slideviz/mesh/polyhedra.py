@@ -145,15 +145,14 @@ class Polyhedra:
 def whole_polygons(
     mesh: Mesh, offsets: IntArray, nodes: IntArray, cells: IntArray, *, sides: bool
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return polygons of cells of a mesh as those of the file's cells.
+    """Return polygons of cells of a mesh with polyhedra as those of the file's cells.
 
     The polygons of the parts of a polyhedron are one, around them all; ``sides`` of parts are one
     where they are pieces of one face. ``offsets`` (q + 1,), ``nodes`` (k,): as those of `Faces`.
     ``cells`` (q,): the cell of each. Also returns the index (p,) of the first polygon in each.
     """
     whole = mesh.whole_cells
-    if whole is None:
-        return offsets, nodes, np.arange(len(cells))
+    assert whole is not None
     groups = whole[cells]
     if sides:
         of_zones = (zone.mesh.origin.polyhedra for zone in mesh.parts)

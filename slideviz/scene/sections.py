@@ -20,7 +20,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.plane import Box, box_around, union
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, matrices, period_of
-from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
+from slideviz.session.section_cuts import NO_POLYGONS, Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 
 NAME = "section:"
@@ -278,7 +278,7 @@ class PolygonActor:
         self.actor = stage.add(self.shape, name, lighting=False, pickable=pickable)
         self.mapper = self.actor.mapper
         """The actor's mapper, referenced here as VTK alone may lose its Python attributes."""
-        self.polygons = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
+        self.polygons = NO_POLYGONS
         """The polygons that are drawn."""
         self.actor.visibility = False
 

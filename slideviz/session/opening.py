@@ -134,7 +134,7 @@ def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
     axes: opposite sides of every box match.
     """
     guesses = {name: found for name in mesh.marker_names if (found := guess_by_name(name))}
-    guesses |= {name: Guess(role, "its patch is of that type") for name, role in mesh.roles.items()}
+    guesses |= {name: Guess(role, "its file says so") for name, role in mesh.roles.items()}
     guesses |= {i.marker: Guess("fixed", f"it is {i.describe()}") for i in mesh.interfaces}
     unnamed = [p for p in pairs if p.first not in guesses and p.second not in guesses]
     box = _is_box(mesh, unnamed)

@@ -2,10 +2,12 @@
 
 import re
 import resource
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from slideviz import quality
 from slideviz.cli import run
@@ -14,7 +16,7 @@ from slideviz.formats.cgns.read import read_cgns
 from slideviz.formats.files import read, write
 from slideviz.formats.losses import left_out
 from slideviz.formats.table import formats_for
-from tests.builders import cube
+from tests.builders import cube, grid
 from tests.cgns_files import passage_grid, save_passage
 from tests.formats.su2_samples import bits
 from tests.formats.test_cgns_read import judged, points_of
@@ -210,7 +212,72 @@ def test_the_window_offers_it_and_says_what_other_files_lose(passage, tmp_path):
     assert ".cgns" in formats_for(mesh)
     assert left_out(tmp_path / "a.cgns", mesh) == ""
     assert left_out(tmp_path / "a.su2", mesh) == (
-        "a.su2 does not hold other contents that the CGNS file may have, such as zones and "
-        "solutions."
+        "a.su2 does not hold other contents of the CGNS file (2 zones, FlowSolution_t)."
     )
     assert ".cgns" in formats_for(cube(4))
+
+
+def sector(turn):
+    """A block between two planes of constant y, or of constant angle about x; and these sides."""
+    mesh = grid((3, 4, 2), kind="mixed")
+    if turn:
+        x, y, z = mesh.points.T
+        r = 1.0 + z
+        mesh = mesh.with_points(np.stack([x, r * np.sin(y / 2), r * np.cos(y / 2)], axis=1))
+    roles = {"y_m": "periodic", "y_p": "periodic"}
+    return replace(mesh, origin=replace(mesh.origin, roles=roles))
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_periodic_interfaces_are_written_and_read_back(tmp_path, turn):
+    mesh = sector(turn)
+    write(tmp_path / "new.cgns", mesh)
+    back = read(tmp_path / "new.cgns")
+    assert back.roles == mesh.roles
+    assert back.marker_names == mesh.marker_names
+    assert np.array_equal(back.points, mesh.points)
+    assert not back.remarks
+    with h5py.File(tmp_path / "new.cgns") as file:
+        sides = file["Base/Zone/ZoneGridConnectivity"]
+        assert sorted(sides) == ["y_m", "y_p"]
+        for name, other in (("y_m", "y_p"), ("y_p", "y_m")):
+            here, there = (
+                sides[name][label][" data"][()].ravel() - 1
+                for label in ("PointList", "PointListDonor")
+            )
+            assert {*here.tolist()} == {*mesh.marker(name).nodes.tolist()}
+            assert {*there.tolist()} == {*mesh.marker(other).nodes.tolist()}
+            period = sides[name]["GridConnectivityProperty/Periodic"]
+            centre, angle, shift = (
+                period[label][" data"][()].astype(float)
+                for label in ("RotationCenter", "RotationAngle", "Translation")
+            )
+            moved = Rotation.from_rotvec(angle).apply(mesh.points[here] - centre) + centre + shift
+            assert np.abs(moved - mesh.points[there]).max() < 1e-6
+
+
+def test_without_roles_of_the_file_there_are_no_interfaces(tmp_path):
+    write(tmp_path / "new.cgns", grid((2, 2, 2)))
+    back = read(tmp_path / "new.cgns")
+    assert back.roles == {}
+    with h5py.File(tmp_path / "new.cgns") as file:
+        assert "ZoneGridConnectivity" not in file["Base/Zone"]
+
+
+def test_a_side_without_its_other_one_is_not_periodic(tmp_path):
+    write(tmp_path / "new.cgns", sector(False))
+    with h5py.File(tmp_path / "new.cgns", "r+") as file:
+        del file["Base/Zone/ZoneGridConnectivity/y_p"]
+    assert read(tmp_path / "new.cgns").roles == {}
+
+
+def test_a_warning_names_what_the_cgns_file_has_besides(tmp_path):
+    path = tmp_path / "new.cgns"
+    write(path, sector(True))
+    assert left_out(tmp_path / "a.su2", read(path)) == ""
+    with h5py.File(path, "r+") as file:
+        solution = file["Base/Zone"].create_group("Solution")
+        solution.attrs["label"] = np.bytes_("FlowSolution_t")
+    assert left_out(tmp_path / "a.su2", read(path)) == (
+        "a.su2 does not hold other contents of the CGNS file (FlowSolution_t)."
+    )

@@ -454,7 +454,7 @@ def test_patches_have_roles_by_themselves(tmp_path):
     given = sv.Case(roles={"y_p": "moving", **dict.fromkeys(mesh.roles, "fixed")}, motions=[motion])
     assert with_marker_names(given, mesh) == given
     guessed = guess_roles(mesh)
-    assert guessed["y_m"] == Guess("sliding", "its patch is of that type")
+    assert guessed["y_m"] == Guess("sliding", "its file says so")
 
 
 def plate_case(folder, kind="empty", polygons=None):

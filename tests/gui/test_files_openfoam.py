@@ -18,7 +18,7 @@ def test_a_case_is_opened_by_its_folder_and_saved_as_another(driver, answers, tm
     driver.settle()
     session = driver.session
     assert session.path == folder / "points"
-    assert session.guesses["ends"].reason == "its patch is of that type"
+    assert session.guesses["ends"].reason == "its file says so"
     assert session.case.roles["ends"] == "sliding"
     assert driver.window.files.stem() == "honeycomb"
     assert driver.window.files.folder() == tmp_path / "honeycomb"

@@ -23,7 +23,7 @@ from scipy.spatial import KDTree
 from slideviz.argument_types import record
 from slideviz.errors import path_error, printable
 from slideviz.formats.cgns.tree import Node, cgns_file
-from slideviz.formats.cgns.write import write_tree
+from slideviz.formats.cgns.write import LABELS, write_tree
 from slideviz.formats.cgns.zone import (
     CgnsZone,
     conditions,
@@ -41,7 +41,7 @@ from slideviz.mesh.check import check_mesh
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.nearest import row_groups
-from slideviz.terms import Numbers, Texts
+from slideviz.terms import Numbers, Role, Texts
 
 JOINED = 1e-6
 """Largest distance of merged nodes, as a fraction of the extent: R4 coordinates are rounded so."""
@@ -242,7 +242,6 @@ class CgnsForm(Origin):
     """Where the coordinates of a mesh are in the CGNS file it was read from."""
 
     ending = ".cgns"
-    extras = "other contents that the CGNS file may have, such as zones and solutions"
     datasets: tuple[Texts, ...]
     """For each zone the paths of the datasets of its coordinates."""
     numbers: tuple[IntArray, ...]
@@ -303,7 +302,8 @@ def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> 
     mesh = Mesh(form.points, cells, name=printable(path.name), source=path.resolve(), origin=form)
     check_mesh(mesh)
     markers, remarks = _markers(mesh, base, zones, joined)
-    mesh = replace(mesh, markers=markers, remarks=remarks)
+    form = replace(form, roles=_periodic(zones, joined, markers), extras=_extras(base, len(zones)))
+    mesh = replace(mesh, markers=markers, remarks=remarks, origin=form)
     check_mesh(mesh)
     return mesh
 
@@ -386,6 +386,33 @@ def _add_open(
             remarks.append(
                 f"{one.node.path} is not joined: {one.why}. Its faces are a boundary{where}."
             )
+
+
+def _extras(base: Node, zones: int) -> str:
+    """Return in words what a file has that no mesh keeps; "" for nothing."""
+    labels = set[str]()
+    base.group.visititems(lambda name, thing: labels.add(Node(base.file, thing, name).label))
+    others = sorted(labels - {"", *LABELS.split()})
+    what = [f"{zones} zones"] if zones > 1 else []
+    return f"other contents of the CGNS file ({', '.join(what + others)})" if what + others else ""
+
+
+def _periodic(
+    zones: Sequence[CgnsZone], joined: Joined, markers: Sequence[Marker]
+) -> dict[str, Role]:
+    """Return the role of the boundaries whose faces are of periodic interfaces, of both sides."""
+    periods = {one.period for one in joined.open}
+    facets = [Cells.joined([])]
+    for one in joined.open:
+        third = len(one.period) // 3
+        back = *one.period[:third], *(-move for move in one.period[third:])
+        if one.period and back in periods:
+            faces = facets_of(zones[one.zone], one.node)
+            facets.append(_renumbered([faces], [joined.numbers[one.zone]]))
+    every = Cells.joined(facets)
+    return {
+        one.name: "periodic" for one in markers if len(one.cells) and among(one.cells, every).all()
+    }
 
 
 def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:

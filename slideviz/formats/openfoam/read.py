@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +37,9 @@ class PolyMesh(Origin):
     """The points of the files that a mesh was read from, to write them back."""
 
     ending = ENDING
-    extras = "the other files of the OpenFOAM case, and its polyhedra as such"
+    extras: str = field(
+        default="the other files of the OpenFOAM case, and its polyhedra as such", kw_only=True
+    )
     file: FoamFile
     place: slice  # the bytes that hold the points
     points: FloatArray  # (n, 3)
