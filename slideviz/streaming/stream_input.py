@@ -16,6 +16,7 @@ from slideviz.case.model import Case
 from slideviz.errors import MeshError, printable
 from slideviz.formats.binary_copy import binary_layouts, write_layouts
 from slideviz.formats.losses import OTHER_ZONES, lost_of_texts, sentence_of_lost
+from slideviz.formats.openfoam_paths import stem_of
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.text import Text, find_texts
 from slideviz.formats.su2.write import PointChange, patched_blocks, require_text_names
@@ -132,7 +133,7 @@ def require_su2(path: Path, file_format: FileFormat | None) -> FileFormat:
     if kind is None:
         raise MeshError(
             f"{path}: only SU2 meshes, text or binary, can be streamed; make one with `slideviz "
-            f"convert {path.name} {path.stem}.su2b`"
+            f"convert {path} {stem_of(path)}.su2b`, or leave out --stream"
         )
     return kind
 

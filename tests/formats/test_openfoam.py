@@ -600,6 +600,12 @@ def test_regions_are_zones(tmp_path):
     sv.write(case, alone.with_points(alone.points + np.eye(3)[0]), overwrite=True)
     assert sv.read(case).points[:, 0].max() == 3
     assert sv.read(case / "constant" / "fluid").points[:, 0].max() == 1
+    regions = case / "constant" / "regionProperties"
+    text = regions.read_text()
+    regions.write_text("FoamFile { format ascii; }\nregions ( );\n")
+    with pytest.raises(MeshError, match=r"names no region; write e.g. regions \( fluid"):
+        sv.read(case)
+    regions.write_text(text)
     with pytest.raises(MeshError, match="there is no zone 3: its regions are fluid, solid"):
         sv.read(case, zone=3)
     with pytest.raises(MeshError, match="there is no zone 2: it has one region; leave it out"):
@@ -636,6 +642,16 @@ def test_a_deformed_case_has_its_reference(tmp_path, capsys):
     other = sv.read(write_mesh(tmp_path / "box", grid((2, 2, 2))))
     with pytest.raises(MeshError, match="it must have the same cells, but"):
         again.with_reference(other)
+
+
+def test_a_case_that_cannot_be_streamed_is_told_what_to_do(tmp_path, capsys):
+    case = write_mesh(tmp_path / "case", grid((2, 2, 2)))
+    assert run(["info", str(case), "--stream"]) == 1
+    told = capsys.readouterr().err
+    points = case / "constant" / "polyMesh" / "points"
+    assert f"`slideviz convert {points} case.su2b`, or leave out --stream" in told
+    assert run(["convert", str(points), str(tmp_path / "case.su2b")]) == 0
+    assert run(["info", str(tmp_path / "case.su2b"), "--stream"]) == 0
 
 
 def test_a_polyhedron_that_is_not_star_shaped(tmp_path):

@@ -73,7 +73,9 @@ def read_polymesh(path: Path, zone: int | None, progress: Tick) -> Mesh:
         [(often, _)] = Counter(names).most_common(1)
         raise path_error(path, f"names the region {printable(often)!r} twice; name each once")
     numbers = range(1, len(names) + 1) if zone is None else (zone,)
-    if not names or not 1 <= numbers[0] <= len(names):
+    if not names:
+        raise path_error(path, "names no region; write e.g. regions ( fluid ( air ) );")
+    if not 1 <= numbers[0] <= len(names):
         raise path_error(path, f"there is no zone {zone or 1}: its regions are {', '.join(names)}")
     zones = []
     for number in numbers:
