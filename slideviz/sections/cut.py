@@ -33,10 +33,9 @@ class Cutter:
     """Cuts the cells of a mesh at any positions of its nodes; made once for a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
-        cells = mesh.cells
-        self.dim = max((ELEMENTS[vtk].dim for vtk in cells.by_type), default=3)
+        self.dim = mesh.dim
         self._mesh = mesh
-        self._blocks = [_Block(vtk, *found) for vtk, found in cells.by_type.items()]
+        self._blocks = [_Block(vtk, *found) for vtk, found in mesh.cells.by_type.items()]
 
     @property
     def used(self) -> IntArray:

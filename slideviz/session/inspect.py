@@ -260,9 +260,9 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     frame, cell = frame.place_of(cell)
     mesh = frame.mesh
     found = frame.quality
-    if not 0 <= cell < len(mesh.cells):
-        corner_jacobians(mesh, cell)  # says so
-    jacobians = [corner_jacobians(mesh, k, int(found.signs[k])) for k in _parts(mesh, cell)]
+    signs = found.signs.take(_parts(mesh, cell), mode="clip").tolist()
+    each = zip(_parts(mesh, cell), signs, strict=True)
+    jacobians = [corner_jacobians(mesh, part, sign) for part, sign in each]
     status = found.status[cell]
     zones = zones_of_cells(zoned, [mesh.cell_number(cell)])
     return CellInfo(
