@@ -483,6 +483,7 @@ def worst_at(positions, numbers):
         np.zeros(count, np.int64),
         ("quadrilateral",) * count,
         "size-skew",
+        np.array(numbers),
     )
 
 
