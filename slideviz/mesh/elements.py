@@ -43,7 +43,7 @@ ELEMENTS: dict[int, ElementType] = {
 }
 """Element type by VTK identifier; the table is ``elements.toml``."""
 
-CELL_NAMES = {row.vtk: row.name for row in _ROWS} | {7: "polygon", 42: "polyhedron"}
+CELL_NAMES = {vtk: row.name for vtk, row in ELEMENTS.items()} | {7: "polygon", 42: "polyhedron"}
 """Names of the types of cells that files have, by VTK identifier."""
 
 SIZES = np.zeros(256, np.int64)
