@@ -243,9 +243,7 @@ def _fields(value: object, keys: Iterable[str]) -> Report:
     return {key: getattr(value, key) for key in keys}
 
 
-def quality_report(
-    mesh: Mesh, quality: Quality, worst: IntArray, types: Sequence[int]
-) -> Report:
+def quality_report(mesh: Mesh, quality: Quality, worst: IntArray, types: Sequence[int]) -> Report:
     """Return the JSON object of ``quality --json``; ``worst`` are cells of ``types`` (k,)."""
     counts, edges = quality.histogram()
     return {
