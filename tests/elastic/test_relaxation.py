@@ -366,6 +366,20 @@ def test_the_same_problem_has_the_same_mesh(make, change, relax):
     assert np.abs(back - found[0]).max() < 1e-9 * mesh.extent
 
 
+@pytest.mark.parametrize(("dim", "part"), [(2, 0.5), (2, 0.9), (3, 0.5), (3, 0.7)])
+def test_one_step_nearly_goes_as_far_as_there_is_room(dim, part):
+    """A block is moved into a corner, over a part of the gap: at first cells are folded."""
+    mesh = builders.square(20) if dim == 2 else builders.cube(8)
+    corner = mesh.points[mesh.marker("BLOCK").nodes].min(axis=0)
+    away = part * (mesh.points.min(axis=0) - corner)
+    roles = dict.fromkeys(mesh.marker_names, "fixed") | {"BLOCK": "moving"}
+    case = sv.Case(roles=roles, motions=(sv.Translate("BLOCK", tuple(away)),), steps=1)
+    window = {"relax": "auto", "layers": "auto", "repair": "auto"}
+    found = [sv.quality(last(one, mesh).mesh, mesh) for one in (case, case.change(**window))]
+    assert found[1].inverted == 0
+    assert found[0].inverted > 0 or found[1].mean > found[0].mean
+
+
 def test_derivatives_where_a_motion_nearly_closes_a_gap():
     mesh = builders.square(20)
     gap = mesh.points[mesh.marker("BLOCK").nodes, 0].min() - mesh.points[:, 0].min()
