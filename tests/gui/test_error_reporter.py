@@ -218,6 +218,15 @@ def test_what_qt_and_vtk_and_python_complain_of_stands_in_the_log(caught, qtbot)
     assert "VTK: ERROR: In vtkX.cxx, line 3 no input" in log_text(caught)
 
 
+def test_what_vtk_logs_by_itself_is_not_on_the_terminal(caught, capfd):
+    """As the four lines about the sizes of buffers, on Wayland."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "vtkX.cxx", 3, "no red")
+    assert caught.banner is not None
+    assert capfd.readouterr().err == ""
+
+
 # Crashes ----------------------------------------------------------------------------------
 
 CRASH = """

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
 from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
 from slideviz.system.cleanup import private_file, private_folder
@@ -161,9 +161,12 @@ def _vtk_heard() -> Iterator[None]:
         says.CallDataType = "string0"  # type: ignore[attr-defined]
         heard.AddObserver(event, says)  # type: ignore[arg-type]  # a name is taken, too
     vtkOutputWindow.SetInstance(heard)
+    # What passes it by is harmless, such as four lines about the sizes of buffers on Wayland.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     try:
         yield
     finally:
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
         vtkOutputWindow.SetInstance(before)
 
 
