@@ -126,7 +126,14 @@ class MeasuredSystem:
         Warns with ConditionWarning if the field of a solution is not accurate to `TRUSTED`.
         """
         weights = self(right, data)
-        self._warn("derivative", "between the boundary nodes it", np.inf, self._refined)
+        worst = float(self.error_estimate.max(initial=0.0))
+        if worst > TRUSTED:
+            warnings.warn(
+                "the system of the derivative is nearly singular: between the boundary nodes it "
+                f"may be wrong by {wrong_by(worst, bounded=self._refined)}; {REMEDY}",
+                ConditionWarning,
+                stacklevel=2,
+            )
         return weights
 
     def adjoint(self, right: FloatArray, data: FloatArray | None = None) -> FloatArray:
@@ -137,18 +144,16 @@ class MeasuredSystem:
         if not self._refined:  # the error of a field is not a measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
         weights = self(right, data, of_weights=True)
-        what = "gradients with respect to nodes that nearly coincide"
-        self._warn("gradient", what, 1.0, bounded=True)
-        return weights
-
-    def _warn(self, of: str, what: str, most: float, bounded: bool) -> None:
-        worst = min(float(self.error_estimate.max(initial=0.0)), most)
+        worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
-            message = (
-                f"the system of the {of} is nearly singular: {what} may be wrong by "
-                f"{wrong_by(worst, bounded=bounded)}; {REMEDY}"
+            warnings.warn(
+                "the system of the gradient is nearly singular: gradients with respect to nodes "
+                f"that nearly coincide may be wrong by {wrong_by(min(worst, 1.0), bounded=True)}; "
+                f"{REMEDY}",
+                ConditionWarning,
+                stacklevel=2,
             )
-            warnings.warn(message, ConditionWarning, stacklevel=3)
+        return weights
 
 
 class WithPolynomial:
