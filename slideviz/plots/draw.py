@@ -17,7 +17,6 @@ from matplotlib.ticker import NullLocator
 from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray, IntArray, run_begins
 from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
-from slideviz.rbf.problem import Cycle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,16 +44,6 @@ class GreedyRun:
     level: IntArray  # (c,): number of the level of each cycle
     tolerance: float | None = None
     series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
-
-    @classmethod
-    def of(
-        cls, label: str, cycles: Sequence[Cycle], tolerance: float | None, series: int
-    ) -> GreedyRun:
-        """Return the convergence of the cycles of a step."""
-        names = ("control_nodes", "error", "level")
-        columns = [np.array([getattr(cycle, name) for cycle in cycles]) for name in names]
-        nodes, error, level = columns
-        return cls(label, nodes, error, level, tolerance, series)
 
 
 @dataclass(frozen=True)

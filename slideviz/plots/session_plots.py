@@ -86,9 +86,15 @@ def greedy_run(session: Session) -> GreedyRun | None:
     run = session.run_shown
     if frame is None or run is None or frame.step is None or not frame.step.history:
         return None
-    step = frame.step
-    label = f"{run.label}, step {step.index}"
-    return GreedyRun.of(label, step.history, step.tolerance, series_of(run))
+    cycles = frame.step.history
+    return GreedyRun(
+        f"{run.label}, step {frame.step.index}",
+        np.array([cycle.control_nodes for cycle in cycles]),
+        np.array([cycle.error for cycle in cycles]),
+        np.array([cycle.level for cycle in cycles]),
+        frame.step.tolerance,
+        series_of(run),
+    )
 
 
 _PROFILES = WeakCache()

@@ -222,7 +222,16 @@ def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
         if not line.result.history:
             continue
         cycles = [cycle for step, cycle in line.result.history if step == 1]
-        runs.append(GreedyRun.of(line.label, cycles, line.result.tolerance, line.series))
+        runs.append(
+            GreedyRun(
+                line.label,
+                np.array([cycle.control_nodes for cycle in cycles]),
+                np.array([cycle.error for cycle in cycles]),
+                np.array([cycle.level for cycle in cycles]),
+                line.result.tolerance,
+                line.series,
+            )
+        )
     convergence(axes, runs, style=_QUIET)
 
 
