@@ -25,7 +25,7 @@ from slideviz.errors import CaseError, Doubt, Message, most_similar, note
 from slideviz.mesh.model import Assembly, Mesh
 from slideviz.mesh.zones import without_zone
 from slideviz.system.grouping import grouped
-from slideviz.terms import KERNELS, ROLES, SLIDES
+from slideviz.terms import KERNELS, ROLES, SLIDES, Texts
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -325,7 +325,7 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[Message]:
             yield Message(rule, "in 2D it is z", keys=("PERIODIC_AXIS",))
 
 
-def idle_roles(case: Case) -> tuple[str, ...]:
+def idle_roles(case: Case) -> Texts:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     problems = []
     periodic = case.markers_with("periodic")

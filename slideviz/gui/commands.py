@@ -29,7 +29,7 @@ from slideviz.session.run_messages import to_mend
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 from slideviz.system.tables import table_beside
-from slideviz.terms import SHOWN, Shown, ShownTerm
+from slideviz.terms import SHOWN, Shown, ShownTerm, Texts
 
 if TYPE_CHECKING:
     from slideviz.gui.widgets.services import Services
@@ -223,7 +223,7 @@ def is_2d(now: CommandState) -> bool:
     return now.session.mesh is not None and now.session.mesh.dim == 2
 
 
-def target_boundaries(session: Session) -> tuple[str, ...]:
+def target_boundaries(session: Session) -> Texts:
     """Return the boundaries a command acts on: the selected ones, or else those that move."""
     return session.view.selected or session.case.markers_with("moving")
 

@@ -14,7 +14,7 @@ from slideviz.plots.section_paint import clipped
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table, remove_actor
 from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
-from slideviz.terms import WALL_VALUES
+from slideviz.terms import WALL_VALUES, Texts
 
 USUAL_DPI = 72.0  # VTK's dots per inch of a screen with a device pixel ratio of 1
 STRIP = 104
@@ -49,7 +49,7 @@ class Layer:
 class KeyedLayer(Layer):
     """The base of layers that are drawn anew whenever the key of what they show differs."""
 
-    names: tuple[str, ...] = ()  # the names of its actors, removed before each drawing
+    names: Texts = ()  # the names of its actors, removed before each drawing
 
     def clear(self) -> None:
         self._key: object = ()

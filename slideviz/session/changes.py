@@ -31,7 +31,7 @@ from slideviz.session.state import (
     StepFrame,
     ViewState,
 )
-from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, FfdSystem, Role
+from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, FfdSystem, Role, Texts
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -328,7 +328,7 @@ def set_keys(session: Session, **keys: str) -> Session:
     return replace(session, case=session.case.set(**keys))
 
 
-def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
+def set_invalid(session: Session, place: PanelPlace, sentences: Texts) -> Session:
     """Return the session with ``sentences`` on the invalid fields of the panel ``place``."""
     # The order of the panels does not count: two of them would change it in turns, for ever.
     if tuple(said for where, said in session.invalid if where == place) == sentences:

@@ -27,7 +27,7 @@ from slideviz.errors import CaseError, Doubt, Message, not_one_of
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.topology import vertex_normals
-from slideviz.terms import SIDES, Term
+from slideviz.terms import SIDES, Range, Term, WholeNumbers
 
 if TYPE_CHECKING:
     from typing import Self
@@ -45,7 +45,7 @@ class OnAirfoil(Motion):
     """A motion of nodes along y, from their undeformed places, whatever motions come before."""
 
     height: float
-    chord: tuple[float, float]
+    chord: Range
     form: ClassVar[str]
     """The words after the verb, for messages, with the place of the ``side``."""
 
@@ -129,8 +129,8 @@ class OnAirfoil(Motion):
 
     @classmethod
     def numbers(
-        cls, words: Words, before: int, allowed: tuple[int, ...], side: str = ""
-    ) -> tuple[list[float], tuple[float, float]]:
+        cls, words: Words, before: int, allowed: WholeNumbers, side: str = ""
+    ) -> tuple[list[float], Range]:
         """Return ``before`` numbers of shape and height, and the two of the chord, in words.
 
         Raises CaseError with a sentence where there are not as many as ``allowed``, or the chord is
@@ -168,9 +168,7 @@ class OneSided(OnAirfoil):
         return 1.0
 
     @classmethod
-    def sided_numbers(
-        cls, words: Words, before: int
-    ) -> tuple[terms.Side, list[float], tuple[float, float]]:
+    def sided_numbers(cls, words: Words, before: int) -> tuple[terms.Side, list[float], Range]:
         """Return the side, and what `numbers` returns of the words after it."""
         items = without_brackets(words)
         side = next((s for s in SIDES if items[:1] and s == items[0].text.lower()), None)
@@ -216,7 +214,7 @@ class HicksHenne(_WithPeak, OneSided):
     height: float
     peak: float = 0.5
     side: terms.Side = field(default="upper", metadata=SIDES)
-    chord: tuple[float, float] = WHOLE_CHORD
+    chord: Range = WHOLE_CHORD
 
     kind_term = Term("Hicks-Henne")
     verbs = ("hicks-henne",)
@@ -255,7 +253,7 @@ class Cst(OneSided):
     height: float
     term: tuple[int, int] = (1, 1)
     side: terms.Side = field(default="upper", metadata=SIDES)
-    chord: tuple[float, float] = WHOLE_CHORD
+    chord: Range = WHOLE_CHORD
 
     kind_term = Term("airfoil by CST")
     verbs = ("cst",)
@@ -291,7 +289,7 @@ class Bump(_WithPeak):
     marker: Target
     height: float
     peak: float = 0.5
-    chord: tuple[float, float] = WHOLE_CHORD
+    chord: Range = WHOLE_CHORD
 
     kind_term = Term("bump upwards")
     verbs = ("bump",)

@@ -41,7 +41,7 @@ from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, Mesh, ZonePart
 from slideviz.system.weak_cache import WeakCache, weak_cache
-from slideviz.terms import Term, Vector
+from slideviz.terms import Numbers, Term, Vector, WholeNumbers
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -84,7 +84,7 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
 
 
 def _defined(
-    case: Case, dim: int, name: str, numbers: tuple[float, ...], degrees: tuple[int, int, int]
+    case: Case, dim: int, name: str, numbers: Numbers, degrees: tuple[int, int, int]
 ) -> Box:
     corners = np.array(numbers).reshape(8, 3)
     system = system_of(case)
@@ -178,7 +178,7 @@ class BoxMotion(Motion):
         yield from ()
 
     @property
-    def place_in_box(self) -> tuple[int, ...]:
+    def place_in_box(self) -> WholeNumbers:
         """Return the indices of the control points that move, as the user gives them."""
         raise NotImplementedError
 
@@ -305,7 +305,7 @@ class Ffd(BoxMotion):
         return f"{self.control_words()} {vector_words(self.vector, form)}"
 
     @property
-    def place_in_box(self) -> tuple[int, ...]:
+    def place_in_box(self) -> WholeNumbers:
         return self.index
 
     def lattice_index(self, dim: int) -> Index:
@@ -355,7 +355,7 @@ class _Column(BoxMotion):
         return f"{self.what} {self.control_words()} {self.amount:+{form}}"
 
     @property
-    def place_in_box(self) -> tuple[int, ...]:
+    def place_in_box(self) -> WholeNumbers:
         return self.index
 
     def lattice_index(self, dim: int) -> Index:
@@ -431,7 +431,7 @@ class FfdTwist(BoxMotion):
     box: str
     plane: int
     angle_deg: float
-    point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    point: Numbers = (0.0, 0.0, 0.0)
     axis: Vector = (0.0, 1.0, 0.0)
 
     kind_term = Term("twist by box")
@@ -477,7 +477,7 @@ class FfdTwist(BoxMotion):
         return f"twist {planes} of {self.box_words} {self.angle_deg:+{form}}°"
 
     @property
-    def place_in_box(self) -> tuple[int, ...]:
+    def place_in_box(self) -> WholeNumbers:
         return (self.plane,)
 
     def lattice_index(self, dim: int) -> Index:
@@ -499,7 +499,7 @@ class FfdTwist(BoxMotion):
             )
 
 
-def _require_words(items: Words, counts: tuple[int, ...], after_box: str) -> None:
+def _require_words(items: Words, counts: WholeNumbers, after_box: str) -> None:
     """Raise CaseError where the name of a box and what follows it are not in one of the counts."""
     if len(items) not in counts or not items[0].text:
         raise CaseError(f"expected the box, {after_box}")

@@ -16,15 +16,15 @@ from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacemen
 from slideviz.case.words import Words, name_text
 from slideviz.errors import ROUNDING, CaseError, Doubt, Message
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, ZonePart
-from slideviz.terms import AXES, Term, Texts, Vector
+from slideviz.terms import AXES, Numbers, Term, Texts, Vector
 
 if TYPE_CHECKING:
     from typing import Self
 
     from slideviz.case.model import Case
 
-Point = tuple[float, ...] | Literal["centroid"]
-Target = str | tuple[str, ...]
+Point = Numbers | Literal["centroid"]
+Target = str | Texts
 """The markers a motion moves: one, several as one body, or, where it is empty, all moving ones."""
 Axis = tuple[Vector, Vector]
 """An axis: its direction, and a point on it."""
@@ -39,7 +39,7 @@ _PREFIXES = {"vector": "", "point": "point_", "axis": "axis_", "factors": "facto
 """Prefixes of the names of components, by field, where they are not the field's name."""
 
 
-def named(target: Target) -> tuple[str, ...]:
+def named(target: Target) -> Texts:
     """Return the names of the markers in a target; () where it is all moving markers."""
     if isinstance(target, str):
         return (target,) if target else ()
@@ -63,7 +63,7 @@ class NewMotion:
 
     dim: int  # of the mesh
     machine: Axis | None = None  # the axis about which the mesh repeats
-    boxes: tuple[str, ...] = ()  # names of the boxes for free-form deformation
+    boxes: Texts = ()  # names of the boxes for free-form deformation
     chord: tuple[float, float] = (0.0, 1.0)  # x of the leading and the trailing edge
 
 

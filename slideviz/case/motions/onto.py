@@ -31,7 +31,7 @@ from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame, coords_slopes, corners, make_frame, on_axis
 from slideviz.rbf.projection import as_simplices, simplex_vectors, surface_rim
 from slideviz.system.weak_cache import WeakCache
-from slideviz.terms import Term
+from slideviz.terms import Term, Texts
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -164,7 +164,7 @@ def is_laid(case: Case, mesh: Mesh) -> bool:
     return all(_LAID.has(mesh, key) for names, key in keys if names)
 
 
-def _key(motion: Onto, case: Case, markers: Iterable[str]) -> tuple[tuple[str, ...], Key]:
+def _key(motion: Onto, case: Case, markers: Iterable[str]) -> tuple[Texts, Key]:
     """Return the markers that a motion moves, and the key of their displacements."""
     names = tuple(name for name in markers if applies_to(motion, name))
     key = motion, names, case.markers_with("periodic"), case.periodic, case.periodic_type
@@ -175,7 +175,7 @@ def _key(motion: Onto, case: Case, markers: Iterable[str]) -> tuple[tuple[str, .
     return names, (*key, case.axis, case.origin, state.st_mtime_ns, state.st_size)
 
 
-def _lay(motion: Onto, case: Case, mesh: Mesh, names: tuple[str, ...]) -> Displacements:
+def _lay(motion: Onto, case: Case, mesh: Mesh, names: Texts) -> Displacements:
     boundary = boundary_of(mesh)
     index = [boundary.names.index(name) for name in names]
     facets = boundary.facets[np.isin(boundary.marker, index)]
@@ -248,7 +248,7 @@ def _on_wall(tree: ClosestPoints, frame: Frame, x: FloatArray) -> tuple[FloatArr
 
 
 def _checked(
-    motion: Onto, names: tuple[str, ...], laid: Laid, walls: dict[str, Wall], size: float
+    motion: Onto, names: Texts, laid: Laid, walls: dict[str, Wall], size: float
 ) -> Remaining:
     """Return the note on a boundary laid onto a target; CaseError where they do not fit."""
     of = " and ".join(names)
@@ -287,7 +287,7 @@ def _checked(
     return Remaining(words, level="note", report=report)
 
 
-def _read_target(path: Path, mesh: Mesh, names: tuple[str, ...]) -> tuple[TargetSurface, float]:
+def _read_target(path: Path, mesh: Mesh, names: Texts) -> tuple[TargetSurface, float]:
     """Return the surface in a file, all facets or markers of a mesh, and its size; or CaseError."""
     try:
         read = read_surface(path)
@@ -318,7 +318,7 @@ def _dims(mesh: Mesh) -> set[int]:
     return {ELEMENTS[vtk].dim for vtk in mesh.cells.by_type}
 
 
-def _facets_of(read: Mesh, names: tuple[str, ...], path: Path) -> IntArray:
+def _facets_of(read: Mesh, names: Texts, path: Path) -> IntArray:
     """Return the facets of markers of a mesh: those with the names, or its only marker."""
     there = read.marker_names
     if not set(names) <= {*there} and len(there) != 1:

@@ -33,7 +33,7 @@ from slideviz.case.words import Word, Words, angle_deg, number
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.terms import Term, Vector
+from slideviz.terms import Numbers, Term, Texts, Vector
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -59,7 +59,7 @@ class Translate(ByFormula):
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
     marker: Target
-    vector: tuple[float, ...]
+    vector: Numbers
 
     kind_term = Term("translate")
     affine = True
@@ -102,7 +102,7 @@ class _AboutPoint(ByFormula):
     point: Point
 
     depends_on_place = True
-    stays_at: ClassVar[tuple[str, ...]] = ("centroid", "point")
+    stays_at: ClassVar[Texts] = ("centroid", "point")
 
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
         if self.point != "centroid":
@@ -203,7 +203,7 @@ class Scale(_AboutPoint):
     """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
 
     marker: Target
-    factors: tuple[float, ...]
+    factors: Numbers
     point: Point = "centroid"
 
     kind_term = Term("scale")
@@ -282,7 +282,7 @@ class Radial(_AboutPoint):
     factor: float = 1.0
     distance: float = 0.0
     axis: Vector = (0.0, 0.0, 1.0)
-    point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    point: Numbers = (0.0, 0.0, 0.0)
 
     kind_term = Term("push radially")
     verbs = ("radial",)
@@ -384,7 +384,7 @@ def _point_text(point: Point) -> str:
     return point if isinstance(point, str) else vector_text(point)
 
 
-def _factor_words(values: tuple[float, ...], form: str = ".4g") -> str:
+def _factor_words(values: Numbers, form: str = ".4g") -> str:
     return " × ".join(format(value, form) for value in values)
 
 

@@ -31,7 +31,7 @@ from slideviz.machine.span import Span
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.system.weak_cache import WeakCache
-from slideviz.terms import SPAN_KINDS, SpanKind, Term, Vector
+from slideviz.terms import SPAN_KINDS, Numbers, SpanKind, Term, Vector, WholeNumbers
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -61,8 +61,8 @@ class SpanMotion(Motion):
 
     marker: Target
     kind: SpanKind = field(metadata=SPAN_KINDS)
-    spans: tuple[float, ...]
-    values: tuple[float, ...]
+    spans: Numbers
+    values: Numbers
     point: Vector | None = None
 
     kind_term = Term("blade over span")
@@ -189,7 +189,7 @@ class SpanMotion(Motion):
             yield ("value" if len(self.spans) == 1 else f"{span:.15g}"), "values", k
 
 
-def read_curve(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def read_curve(text: str) -> tuple[Numbers, Numbers]:
     """Return spans and values of a curve as ``0:0, 0.5:1.5, 1:4``, or of a single value.
 
     Raises CaseError with a sentence.
@@ -227,7 +227,7 @@ class Blade:
 
     nodes: IntArray  # (n,): of the mesh, ascending
     sections: BladeSections  # of these nodes
-    places: tuple[int, ...]  # of the motions in the case
+    places: WholeNumbers  # of the motions in the case
     motions: tuple[SpanMotion, ...]
     reached: tuple[np.ndarray, ...]  # (n,) bool for each motion: the nodes that it moves
 
