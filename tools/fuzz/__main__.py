@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import select
 import subprocess
 import sys
@@ -18,18 +19,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from tools.fuzz.judge import SECONDS, Verdict
-from tools.fuzz.kinds import KINDS, write_base
+from tools.fuzz.judge import ON_THE_CLOCK, SECONDS, Verdict
+from tools.fuzz.kinds import KINDS, PLAIN, write_base
 from tools.fuzz.minimise import minimised
 
 CORPUS = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "slideviz-fuzz"
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-_PER_PROCESS = 2000
+_PER_PROCESS = 20_000
 """Inputs after which a fresh process takes over."""
+BATCH = 32
+"""Inputs that are drawn at a time: the process that judges them then never waits."""
 SLOW = ("hang", "crash", "memory")
 """Beginnings of problems that take long to see again."""
 _MOST_OF_A_KIND = 400
@@ -41,55 +45,89 @@ class Judge:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.process: subprocess.Popen[str] | None = None
-        self.judged = 0
+        self.process: subprocess.Popen[bytes] | None = None
+        self.judged = 0  # inputs of this process
+        self.limit = 0.0  # seconds until the next answer
+        self.answers = b""  # read, and not taken yet
 
     def verdict(self, kind: str, content: bytes) -> Verdict:
-        """Return the verdict on an input; that of a process that crashes or hangs, too.
+        """Return the verdict on one input, as `verdicts`."""
+        return next(iter(self.verdicts([(kind, content)])))
+
+    def verdicts(self, inputs: Sequence[tuple[str, bytes]]) -> list[Verdict]:
+        """Return the verdicts on inputs; those of a process that crashes or hangs, too.
 
         Where an isolated reader does so, the verdict is that on the program with it.
         """
-        verdict = self._verdict(kind, content, alone=False)
-        if verdict.problem.startswith(SLOW) and KINDS[kind].isolated:
-            alone = self._verdict(kind, content, alone=True)
-            # Limits are those of processor time; on a busy machine the clock goes on.
-            in_time = alone.problem.startswith("hang") and "it takes longer" in alone.signature
-            return replace(alone, problem="") if in_time else alone
-        return verdict
+        found: list[Verdict] = []
+        while len(found) < len(inputs):
+            found += self._judged(inputs[len(found) :], alone=False)
+        for place, (verdict, one) in enumerate(zip(found, inputs, strict=True)):
+            if verdict.problem.startswith(SLOW) and KINDS[one[0]].isolated:
+                [alone] = self._judged([one], alone=True)
+                # Limits are those of processor time; on a busy machine the clock goes on.
+                in_time = alone.problem.startswith("hang") and "it takes longer" in alone.signature
+                found[place] = replace(alone, problem="") if in_time else alone
+        return found
 
-    def _verdict(self, kind: str, content: bytes, alone: bool) -> Verdict:
-        if self.process is None or self.judged % _PER_PROCESS == 0:
-            self.end()
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "tools.fuzz.judge", str(self.folder)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL if "SLIDEVIZ_DEBUG" not in os.environ else None,
-                text=True,
-                env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
-            )
-            self.limit = 10 * SECONDS  # it loads and may compile
-        self.judged += 1
-        (self.folder / "input").write_bytes(content)
+    def _judged(self, inputs: Sequence[tuple[str, bytes]], alone: bool) -> list[Verdict]:
+        """Return verdicts on inputs, up to the first one that ends the process."""
+        if self.process is None or self.judged >= _PER_PROCESS:
+            self._start()
+        assert self.process is not None
         assert self.process.stdin is not None
         assert self.process.stdout is not None
-        begin = time.monotonic()
-        self.process.stdin.write(json.dumps([kind, "input", alone]) + "\n")
+        words = []
+        for place, (kind, content) in enumerate(inputs):
+            (self.folder / f"input{place}").write_bytes(content)
+            words.append([kind, f"input{place}", alone])
+        self.process.stdin.write(json.dumps(words).encode() + b"\n")
         self.process.stdin.flush()
-        answer = ""
-        if select.select([self.process.stdout], [], [], self.limit * (1 + 9 * alone))[0]:
-            answer = self.process.stdout.readline()
-        seconds = time.monotonic() - begin
-        self.limit = 2 * SECONDS
-        if answer:
-            return Verdict(**json.loads(answer))
-        code = self.process.poll()
-        if seconds >= SECONDS:
+        found: list[Verdict] = []
+        while len(found) < len(inputs):
+            begin = time.monotonic()
+            answer = self._line(self.limit)
+            seconds = time.monotonic() - begin
+            self.limit = ON_THE_CLOCK * SECONDS
+            self.judged += 1
+            if answer:
+                found.append(Verdict(**json.loads(answer)))
+                continue
+            if self.process.poll() is None and seconds >= SECONDS:
+                found.append(Verdict(f"hang: took {seconds:.0f} s", "hang", False, seconds))
+            else:
+                code = self.process.wait()
+                found.append(Verdict(f"crash: exit code {code}", f"crash {code}", False, seconds))
             self.end()
-            return Verdict(f"hang: took {seconds:.0f} s", "hang", False, seconds)
-        code = self.process.wait()
-        self.process = None
-        return Verdict(f"crash: exit code {code}", f"crash {code}", False, seconds)
+            break
+        return found
+
+    def _start(self) -> None:
+        self.end()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tools.fuzz.judge", str(self.folder)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if "SLIDEVIZ_DEBUG" not in os.environ else None,
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+        )
+        self.judged = 0
+        self.answers = b""
+        self.limit = 2 * ON_THE_CLOCK * SECONDS  # it loads and may compile
+
+    def _line(self, seconds: float) -> bytes:
+        """Return the next line of the process; b"" where it ended, or did not answer in time."""
+        assert self.process is not None
+        assert self.process.stdout is not None
+        while b"\n" not in self.answers:
+            if not select.select([self.process.stdout], [], [], seconds)[0]:
+                return b""
+            more = os.read(self.process.stdout.fileno(), 1 << 16)
+            if not more:
+                return b""
+            self.answers += more
+        line, _, self.answers = self.answers.partition(b"\n")
+        return line
 
     def end(self) -> None:
         """Kill the process."""
@@ -154,13 +192,9 @@ def search(arguments: argparse.Namespace, kinds: Sequence[str], place: Path) -> 
     begin = time.monotonic()
     corpus, judge = Corpus(arguments.corpus), Judge(place)
     arguments.corpus.mkdir(parents=True, exist_ok=True)
-    base = place / "base"
-    base.mkdir()
-    write_base(base)
-    made = place / "made"
-    made.mkdir()
-    write_base(made)
-    seeds = {kind: list(KINDS[kind].make(made)) for kind in kinds}
+    for name in ("base", "made"):
+        write_base(place / name)
+    seeds = {kind: list(KINDS[kind].make(place / "made" / PLAIN)) for kind in kinds}
     counts, found = Counter[str](), set[str]()
     for kind, contents in seeds.items():
         for content in contents:
@@ -172,17 +206,21 @@ def search(arguments: argparse.Namespace, kinds: Sequence[str], place: Path) -> 
     rng = np.random.default_rng(arguments.seed)
     _say(f"seed {arguments.seed}, corpus {arguments.corpus}")
     while time.monotonic() - begin < 60 * arguments.minutes and counts.total() < arguments.inputs:
-        kind = kinds[int(rng.choice(len(kinds), p=shares / shares.sum()))]
-        content = KINDS[kind].input(rng, [*seeds[kind], *corpus.inputs[kind]])
-        if KINDS[kind].ending == ".cfg" and _takes_long(content):
-            continue
-        verdict = judge.verdict(kind, content)
-        counts[kind] += 1
-        if verdict.problem:
-            _keep(corpus, judge, kind, content, verdict, found)
-        corpus.add(kind, content, verdict)
+        batch: list[tuple[str, bytes]] = []
+        while len(batch) < BATCH:
+            kind = kinds[int(rng.choice(len(kinds), p=shares / shares.sum()))]
+            content = KINDS[kind].input(rng, [*seeds[kind], *corpus.inputs[kind]])
+            if KINDS[kind].ending != ".cfg" or not _takes_long(content):
+                batch.append((kind, content))
+        for (kind, content), verdict in zip(batch, judge.verdicts(batch), strict=True):
+            counts[kind] += 1
+            if verdict.problem:
+                _keep(corpus, judge, kind, content, verdict, found)
+            corpus.add(kind, content, verdict)
     judge.end()
-    _say(f"{counts.total():,} inputs in {(time.monotonic() - begin) / 60:.1f} minutes:")
+    used = sum(sum(resource.getrusage(who)[:2]) for who in (RUSAGE_SELF, RUSAGE_CHILDREN))
+    minutes = (time.monotonic() - begin) / 60
+    _say(f"{counts.total():,} inputs in {minutes:.1f} minutes, {used:.0f} s of processor time:")
     _say(", ".join(f"{count} {kind}" for kind, count in counts.most_common()))
     _say(f"{len(found)} findings" + (f" in {arguments.corpus / 'findings'}" if found else ""))
     return 1 if found else 0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gzip
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,18 +19,22 @@ from slideviz.case.model import Case
 from slideviz.design.su2.gradients import MAGIC, NAME_BYTES
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.formats.table import FORMATS, format_for
+from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
 from slideviz.session.session_file import PICTURE_KEY
 from slideviz.session.state import StepFrame
-from tests import builders, cgns_files
+from tests import builders, cgns_files, polymesh_files
 from tests.formats.su2_samples import MESSY, SQUARE
 from tests.formats.su2_samples import SOLID as SOLID_TEXT
+from tests.polymesh_files import Form
 from tools.fuzz.damage import NUMBERS, WORDS, Rng, damaged
 
+PLAIN = "plain"
+"""The folder of files that lie beside each input."""
 MESH, SOLID, CASE, REPEATS = "mesh.su2", "solid.su2", "case.cfg", "repeats.cfg"
-"""Files that lie beside each input."""
+"""Files in it."""
 
 ZONES = f"NZONE= 2\nIZONE= 1\n{SQUARE}IZONE= 2\n{SQUARE.replace('lower', 'wall')}FFD_NBOX= 0\n"
 BASE = """MESH_FILENAME= mesh.su2
@@ -83,6 +89,18 @@ DV_VALUE= 0.01, 0.01
 """
 
 
+FOAM = """MESH_FILENAME= case
+MARKER_MOVING= ( y_p )
+MARKER_SLIDING= ( x_m, x_p )
+MOTION= (y_p, translate, 0.02, 0.03, 0.0)
+"""
+FOAM_ZONES = """MESH_FILENAME= case
+MARKER_MOVING= ( 1:y_p, 2:y_p )
+MARKER_SLIDING= ( 1:x_m )
+MOTION= (1:y_p, translate, 0.02, 0.03, 0.0) ; (2:y_p, translate, 0.0, 0.0, 0.01)
+"""
+
+
 @dataclass(frozen=True)
 class Kind:
     """Inputs of one kind. In the words of commands ``@`` is the input."""
@@ -95,11 +113,14 @@ class Kind:
     draw: Callable[[Rng, Sequence[bytes], bool], bytes] | None = None
     """Returns an input from those of the corpus; `damaged` of one of them by default."""
     share: float = 1.0  # how often it is drawn, relative to others
+    folder: str = PLAIN
+    """The folder of `write_base` with the files beside the input. Below another one than `PLAIN`
+    the input replaces a file: its first line has the name."""
 
     @property
     def isolated(self) -> bool:
         """Return whether inputs are read in a process of its own."""
-        return self.ending != ".csv" and format_for(Path(f"a{self.ending}")).isolated
+        return self.ending not in (".csv", ".foam") and format_for(Path(f"a{self.ending}")).isolated
 
     def input(self, rng: Rng, corpus: Sequence[bytes]) -> bytes:
         """Return a random input."""
@@ -108,13 +129,45 @@ class Kind:
         return damaged(rng, corpus[int(rng.integers(len(corpus)))], corpus, self.text)
 
 
-def write_base(folder: Path) -> None:
-    """Write the files that lie beside each input."""
+def write_base(base: Path) -> None:
+    """Write the files that lie beside inputs, into a folder for each `Kind.folder`."""
+    for name, (mesh, patches, form) in _foam_cases().items():
+        polymesh_files.write_mesh(base / name / "case", mesh, patches, form)
+        (base / name / CASE).write_text(FOAM)
+    regions = base / "foam regions" / "case" / "constant"
+    for name, form in (("air", Form()), ("wall", Form(binary=True))):
+        polymesh_files.write_mesh(base / name, builders.grid((2, 2, 2)), None, form)
+        regions.mkdir(parents=True, exist_ok=True)
+        (base / name / "constant").rename(regions / name)
+        (base / name).rmdir()
+    head = polymesh_files.HEADER.format(form="ascii", arch="", kind="dictionary", name="regions")
+    (regions / "regionProperties").write_text(f"{head}regions ( fluid (air) solid (wall) );\n")
+    (base / "foam regions" / CASE).write_text(FOAM_ZONES)
+    _write_plain(base / PLAIN)
+
+
+def _foam_cases() -> dict[str, tuple[Mesh, dict[str, str] | None, Form]]:
+    """Return the meshes of OpenFOAM by folder, with the types of their patches, and their forms."""
+    solid = builders.grid((2, 2, 2), kind="mixed")
+    plane = {"z_m": "empty", "z_p": "empty"}
+    return {
+        "foam": (solid, None, Form()),
+        "foam binary": (solid, {"x_m": "symmetry"}, Form(binary=True)),
+        "foam wide": (builders.grid((2, 2, 2)), None, Form(binary=True, label=64, scalar=32)),
+        "foam packed": (builders.grid((2, 2, 2)), None, Form(packed=True)),
+        "foam plane": (builders.grid((3, 3, 1)), plane, Form()),
+    }
+
+
+def _write_plain(folder: Path) -> None:
+    folder.mkdir()
     mesh = builders.square(5, "mixed")
     sv.write(folder / MESH, mesh)
     sv.write(folder / SOLID, builders.passage((3, 4, 4)))
     (folder / CASE).write_text(BASE)
     (folder / REPEATS).write_text(PERIODIC)
+    open_sides = PERIODIC.replace("MODE= moving", "MODE= none").replace("MODE= ds", "MODE= none")
+    (folder / "open.cfg").write_text(open_sides)
     (folder / "config.cfg").write_text(CONFIG)
     (folder / "designs.csv").write_text("STEPS\n1\n2\n3\n")
     case = Case.read(folder / CASE)
@@ -131,10 +184,15 @@ def _texts(*texts: str) -> Callable[[Path], Sequence[bytes]]:
 
 def _meshes(ending: str) -> Callable[[Path], Sequence[bytes]]:
     """Return what makes meshes in a format, of two and of three dimensions."""
+    meshes = (
+        builders.square(3, "mixed"),
+        builders.cube(3, "simplex"),
+        builders.grid((2, 2, 2), kind="mixed"),
+    )
 
     def make(folder: Path) -> Sequence[bytes]:
         found = []
-        for number, mesh in enumerate((builders.square(3, "mixed"), builders.cube(3, "simplex"))):
+        for number, mesh in enumerate(meshes):
             path = folder / f"made{number}{ending}"
             if mesh.dim in FORMATS[ending].dims:
                 sv.write(path, mesh)
@@ -145,8 +203,63 @@ def _meshes(ending: str) -> Callable[[Path], Sequence[bytes]]:
 
 
 def _cgns(folder: Path) -> Sequence[bytes]:
+    """Return a CGNS file with two structured zones, and new ones of slideviz."""
     grid = cgns_files.passage_grid((2, 2, 2))
-    return [cgns_files.save_passage(folder / "made.cgns", grid).read_bytes()]
+    passage = cgns_files.save_passage(folder / "passage.cgns", grid).read_bytes()
+    return [passage, *_meshes(".cgns")(folder)]
+
+
+def _of_meshio(
+    ending: str, forms: Sequence[Mapping[str, object]]
+) -> Callable[[Path], Sequence[bytes]]:
+    """Return what makes meshes in a format: as slideviz writes it, and in ``forms`` of meshio."""
+
+    def make(folder: Path) -> Sequence[bytes]:
+        # Late: only here.
+        import meshio
+
+        cube = builders.cube(3, "simplex")
+        # It writes elements of one type to Gmsh's newest form.
+        mesh = meshio.Mesh(cube.points, [("tetra", cube.cells.by_type[10][1])])
+        found = [*_meshes(ending)(folder)]
+        path = folder / f"made{ending}"
+        for options in forms:
+            meshio.write(path, mesh, **options)
+            found.append(path.read_bytes())
+        return found
+
+    return make
+
+
+def _files_of(name: str) -> Callable[[Path], Sequence[bytes]]:
+    """Return what makes inputs of the files of a folder of OpenFOAM's cases."""
+
+    def make(folder: Path) -> Sequence[bytes]:
+        place = folder.parent / name
+        files = sorted(path for path in place.rglob("*") if "constant" in path.parts)
+        return [
+            str(path.relative_to(place)).encode() + b"\n" + path.read_bytes()
+            for path in files
+            if path.is_file()
+        ]
+
+    return make
+
+
+def damaged_file(rng: Rng, corpus: Sequence[bytes], _text: bool) -> bytes:
+    """Return a damaged file of a case; of one that is compressed mostly what is in it."""
+    parts = [one.partition(b"\n") for one in corpus]
+    name, _, content = parts[int(rng.integers(len(parts)))]
+    others = [body for _, _, body in parts]
+    packed = name.endswith(b".gz") and rng.random() < 0.8
+    if packed:
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            content = unpacker.decompress(content, 1 << 20)
+        except zlib.error:
+            packed = False
+    content = damaged(rng, content, others, b" binary;" not in content)
+    return name + b"\n" + (gzip.compress(content, mtime=0) if packed else content)
 
 
 def _surfaces(ending: str) -> Callable[[Path], Sequence[bytes]]:
@@ -155,9 +268,9 @@ def _surfaces(ending: str) -> Callable[[Path], Sequence[bytes]]:
         import meshio
 
         blade = sv.read(folder / SOLID).marker("blade")
-        points = sv.read(folder / SOLID).points[blade.nodes] + [0.005, 0.01, 0.0]
+        points = sv.read(folder / SOLID).points[blade.nodes] + np.array([0.005, 0.01, 0.0])
         quads = np.searchsorted(blade.nodes, blade.cells.by_type[9][1])
-        cells = [("triangle", np.concatenate([quads[:, [2, 1, 0]], quads[:, [3, 2, 0]]]))]
+        cells = [("triangle", np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))]
         path = folder / f"surface{ending}"
         found = []
         for binary in (True, False) if ending == ".stl" else (None,):
@@ -253,12 +366,23 @@ def _absurd_value(rng: Rng, default: str, lines: Sequence[str]) -> str:
     return damaged(rng, default.encode(), [b"1, 2"], True).decode("utf-8", "replace")
 
 
-_READ = ("info @", "convert @ out.su2")
+_READ = ("read @", "info @", "convert @ out.su2")
 _RUN = "run {} -q -o out.su2 --json report.json"
+_FOAM = ("read case", "convert case out.su2", "run case.cfg -q -o new --json report.json")
+GMSH = (
+    {"file_format": "gmsh", "binary": False},
+    {"file_format": "gmsh22", "binary": False},
+    {"file_format": "gmsh22", "binary": True},
+)
+NASTRAN = tuple(
+    {"file_format": "nastran", "point_format": name} for name in ("fixed-small", "fixed-large")
+)
+"""Forms of files that slideviz reads and does not write."""
+FOAM_FOLDERS = (*_foam_cases(), "foam regions")
 KINDS: dict[str, Kind] = {
     "su2": Kind(
         ".su2",
-        ("info @", "quality @ -o out.csv", "convert @ out.su2", "convert @ out.su2b"),
+        ("read @", "info @", "quality @ -o out.csv", "convert @ out.su2", "convert @ out.su2b"),
         _texts(SQUARE, SOLID_TEXT, MESSY, ZONES),
         share=3.0,
     ),
@@ -280,20 +404,23 @@ KINDS: dict[str, Kind] = {
     "vtk": Kind(".vtk", _READ, _meshes(".vtk"), text=False),
     "xdmf": Kind(".xdmf", _READ, _meshes(".xdmf")),
     "med": Kind(".med", _READ, _meshes(".med"), text=False),
-    "msh": Kind(".msh", _READ, _meshes(".msh"), text=False),
+    "msh": Kind(".msh", _READ, _meshes(".msh"), text=False, share=2.0),
+    "msh text": Kind(".msh", _READ, _of_meshio(".msh", GMSH)),
+    "ugrid": Kind(".b8.ugrid", _READ, _meshes(".b8.ugrid"), text=False),
+    "ugrid little": Kind(".lb8.ugrid", _READ, _meshes(".lb8.ugrid"), text=False),
     "inp": Kind(".inp", _READ, _meshes(".inp")),
     "vol": Kind(".vol", _READ, _meshes(".vol")),
     "mesh": Kind(".mesh", _READ, _meshes(".mesh")),
-    "bdf": Kind(".bdf", _READ, _meshes(".bdf")),
+    "bdf": Kind(".bdf", _READ, _of_meshio(".bdf", NASTRAN)),
     "stl": Kind(
         ".stl",
-        ("info @", _RUN.format("repeats.cfg --set 'MOTION=(blade, onto, @, 0.5)'")),
+        (_RUN.format("repeats.cfg --set 'MOTION=(blade, onto, @, 0.5)'"), "info @"),
         _surfaces(".stl"),
         text=False,
     ),
     "ply": Kind(
         ".ply",
-        ("info @", _RUN.format("repeats.cfg --set 'MOTION=(blade, onto, @, 0.5)'")),
+        (_RUN.format("repeats.cfg --set 'MOTION=(blade, onto, @, 0.5)'"), "info @"),
         _surfaces(".ply"),
     ),
     "case": Kind(".cfg", (_RUN.format("@"),), _texts(BASE, PERIODIC), share=3.0),
@@ -354,7 +481,7 @@ KINDS: dict[str, Kind] = {
     ),
     "wheel designs": Kind(
         ".csv",
-        ("wheel repeats.cfg -q -o out.su2 --designs @ --steps 1 --set PERIODIC_MODE=fixed",),
+        ("wheel open.cfg -q -o out.su2 --designs @ --steps 1",),
         _texts("blade.rotate.angle_deg\n1\n2\n", "blade.lean.1\n0.01\n0.02\n"),
         share=0.3,
     ),
@@ -366,6 +493,10 @@ KINDS: dict[str, Kind] = {
         share=0.5,
     ),
     "session": Kind(".slideviz", ("session @",), _sessions, text=False, share=2.0),
+    **{
+        name: Kind(".foam", _FOAM, _files_of(name), draw=damaged_file, folder=name)
+        for name in FOAM_FOLDERS
+    },
 }
 """The kinds by name."""
 
