@@ -88,6 +88,19 @@ def test_zsh_takes_the_script(capsys, tmp_path):
     assert len([one for one in lines if one.startswith("*-")]) == len(some)
 
 
+def test_zsh_completes_at_the_first_tab(capsys, tmp_path):
+    """From a folder of its path the file itself is the function, the first time."""
+    shell_or_skip("zsh")
+    (tmp_path / "_slideviz").write_text(script_of("zsh", capsys), newline="\n")
+    ask = (
+        f"fpath=({tmp_path} $fpath); autoload -Uz _slideviz; compdef() {{ print defined }}; "
+        "_describe() { print -l ${commands%%:*} }; _files() { : }; "
+        "words=(slideviz ''); CURRENT=2; _slideviz; print; _slideviz"
+    )
+    once = "\n".join(COMMANDS)
+    assert said("zsh", "-f", "-c", ask) == f"{once}\n\n{once}\n"
+
+
 def test_samples_are_completed_by_name(capsys):
     text = script_of("bash", capsys)
     assert re.search(rf"sample\) _slideviz_words .*{' '.join(SAMPLES)}", text)

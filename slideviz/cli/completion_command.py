@@ -132,7 +132,12 @@ _slideviz() {{
 {cases}
     esac
 }}
-compdef _slideviz slideviz"""
+# From a folder of $fpath it is this function's body at the first Tab, and is to complete.
+if [[ $funcstack[1] == _slideviz ]]; then
+    _slideviz "$@"
+else
+    compdef _slideviz slideviz
+fi"""
 
 
 def _fish() -> str:
