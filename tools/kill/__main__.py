@@ -134,7 +134,7 @@ class Command:
 def undisturbed(folder: Path, words: str) -> float:
     """Run a command, and return its seconds."""
     begin = time.monotonic()
-    code, told = Command(folder, words).ended(signal.SIGKILL, _PATIENCE)
+    code, told = Command(folder, words).ended(signal.SIGKILL, 10 * _PATIENCE)
     if code not in DONE:
         raise SystemExit(f"{words}: {code}: {told}")
     return time.monotonic() - begin
