@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QFileDialog, QLabel, QMessageBox
 from slideviz.gui.panels.run import _shortened
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.build import wrapped
+from slideviz.gui.widgets.build import tool_button, wrapped
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 
 pytestmark = [pytest.mark.usefixtures("unpainted"), pytest.mark.window("shared")]
@@ -90,3 +90,10 @@ def test_labels_do_not_guess(window, tmp_path):
     page.show_recent([tmp_path / "<i>a.su2"])
     texts = [label.text() for label in page.findChildren(QLabel)]
     assert "<b>&lt;i&gt;a.su2</b>" in texts
+
+
+def test_a_button_with_a_picture_alone_has_a_name_for_screen_readers(qtbot):
+    for text, name in (("", "Remove the run (Delete)"), ("Remove", "")):
+        button = tool_button("Remove the run (Delete)", image="remove", text=text)
+        qtbot.addWidget(button)
+        assert button.accessibleName() == name

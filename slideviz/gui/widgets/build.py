@@ -389,6 +389,8 @@ def tool_button(
     button.setObjectName(name)
     button.setToolTip(wrapped(tip))
     button.setText(text)
+    if not text:
+        button.setAccessibleName(tip)  # for screen readers
     if image:
         set_icon(button, image)
     if image and text:
