@@ -200,7 +200,7 @@ def gaps_of(session: Session) -> list[Measured]:
     return measured
 
 
-class CurveRows:
+class SectionCurveMaker:
     """Makes the curves of sessions, and caches the undeformed mesh's cuts."""
 
     def __init__(self) -> None:

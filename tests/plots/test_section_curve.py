@@ -24,7 +24,7 @@ from slideviz.plots.section_paint import Paint, paint, shown_paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
 from slideviz.plots.session_plots import (
     UNDEFORMED,
-    CurveRows,
+    SectionCurveMaker,
     facts_of,
     series_of,
 )
@@ -174,7 +174,7 @@ def session(mesh):
 
 
 def test_a_session_has_the_curve_of_its_run_above_that_of_the_undeformed_mesh(session):
-    made = CurveRows()
+    made = SectionCurveMaker()
     rows = made.of([(session, Cuts())], LINE)
     assert [one.label for one in rows] == ["undeformed", "run 1"]
     assert [one.series for one in rows] == [UNDEFORMED, series_of(session.runs[0])]
@@ -191,13 +191,13 @@ def test_of_two_runs_that_are_compared_both_have_a_curve(session):
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.show_beside(session, 1)
     shown = [(session, Cuts()), (second_view(session), Cuts())]
-    rows = CurveRows().of(shown, LINE)
+    rows = SectionCurveMaker().of(shown, LINE)
     assert [one.label for one in rows] == ["undeformed", "run 1", "run 2"]
 
 
 def test_the_curve_is_of_what_the_colors_say(session):
     moved = changes.set_view(session, color_by="displacement")
-    (only,) = CurveRows().of([(moved, Cuts())], LINE)
+    (only,) = SectionCurveMaker().of([(moved, Cuts())], LINE)
     assert only.curve.values.max() > 0.02
     assert labels_of(LINE, shown_paint(moved)) == ("x", "displacement [mesh units]")
     assert shown_paint(moved).limits == moved.color_range

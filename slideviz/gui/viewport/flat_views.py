@@ -21,7 +21,7 @@ from slideviz.gui.widgets.build import ALIGN_RIGHT, ElidedLabel, in_column, set_
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea
 from slideviz.plots.section_curve import CurveRow, draw_curves, labels_of
 from slideviz.plots.section_paint import Paint, shown_paint
-from slideviz.plots.session_plots import CurveRows, facts_of
+from slideviz.plots.session_plots import SectionCurveMaker, facts_of
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import ticks
 from slideviz.scene.flat_scene import FlatScene
@@ -304,7 +304,7 @@ class CurveView(_SectionView):
         canvas.picked = self._picked
         canvas.setToolTip("Click to mark the cell at a place.")
         in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
-        self._made = CurveRows()
+        self._made = SectionCurveMaker()
         self.rows: tuple[CurveRow, ...] = ()
         self._draw: Draw = lambda _figure, _style: None
         self.set_scheme(scheme)
