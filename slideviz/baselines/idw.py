@@ -24,7 +24,7 @@ from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis, Tick, no_tick, padded_rows, summed
 from slideviz.rbf.methods import largest_norm, within
 from slideviz.rbf.operations import columns
-from slideviz.rbf.problem import PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import PhaseTimer, Problem, StepSolution
 from slideviz.rbf.tape import Array, join, put, take, value
 
 TINY = 1e-24
@@ -72,7 +72,7 @@ def weighted_means(
     return summed(add_up, targets, c, values.shape[1], tick)
 
 
-def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
+def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> StepSolution:
     """Return the solution of one step: displacements are weighted means of those of the boundary.
 
     Raises DeformError if coinciding nodes are asked to move differently.
@@ -91,7 +91,7 @@ def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solutio
         values = join(values, slid)
     displacement, field = _means(problem, timer, nodes, values, problem.features, weights)
     errors = largest_norm(take(displacement, nodes) - values)
-    return Solution(
+    return StepSolution(
         put(displacement, nodes, values, overwrite=True),
         len(field.values),
         errors,

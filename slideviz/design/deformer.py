@@ -49,7 +49,7 @@ from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR, ImageDisplacements, largest_misfit, misfits
 from slideviz.rbf.loops import farthest, to_points
 from slideviz.rbf.operations import difference_from, flat
-from slideviz.rbf.problem import Solution
+from slideviz.rbf.problem import StepSolution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness, wall_warnings
@@ -207,7 +207,7 @@ class Checks:
             largest = part * largest_norm(target)
             reach = max(largest, part * self.least)
             if far[k] > GROWTH * reach or lost[k] > HOPELESS * largest:
-                solution = Solution(
+                solution = StepSolution(
                     coords[k],
                     0,
                     0.0,
@@ -865,7 +865,7 @@ class Deformer:
         """Return points (..., n, d), errors and error estimates (...,) of designs (..., m, d).
 
         The largest error at the boundary, and the estimate between boundary nodes as of a
-        ``Solution``. Raises DeformError where a result cannot be right or images are displaced
+        ``StepSolution``. Raises DeformError where a result cannot be right or images are displaced
         differently.
         """
         if displacement.ndim == 2:

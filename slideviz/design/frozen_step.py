@@ -42,7 +42,7 @@ from slideviz.rbf.problem import (
     Levels,
     PhaseTimer,
     Problem,
-    Solution,
+    StepSolution,
 )
 from slideviz.rbf.projection import projection_matrices
 from slideviz.rbf.refine import TRUSTED, System
@@ -591,7 +591,7 @@ class StepState:
     """The state of a deformation after some steps."""
 
     coords: Array  # (..., n, d): positions in the frame
-    solution: Solution | None = None
+    solution: StepSolution | None = None
     """Of the step; its errors are arrays (...,). None before the first step."""
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
     """(..., n, d): Cartesian positions; empty before the first step."""
@@ -627,8 +627,8 @@ class FrozenStep:
     condition: float  # estimated condition number of the last system, at the reference
     refined: float = 0.0
     """Where systems are solved with twice the digits, as at the reference: the estimated error of
-    ordinary solutions, as of a ``Solution``; else 0."""
-    error_estimate: float = 0.0  # as of a ``Solution``, at the reference
+    ordinary solutions, as of a ``StepSolution``; else 0."""
+    error_estimate: float = 0.0  # as of a ``StepSolution``, at the reference
     reuse: bool = False
     """Whether a later step keeps the factors of the last positions that it began at."""
     choices: ChoiceCache = made_by(default_factory=ChoiceCache)
@@ -886,17 +886,17 @@ def choose_steps(
 
 def _continued(
     setup: Setup, stages: tuple[Levels, ...], problem: Problem, timer: PhaseTimer
-) -> Solution:
+) -> StepSolution:
     return setup.solve(replace(problem, stages=stages), timer)
 
 
 def _reference(
     case: Case, mesh: Mesh, setup: Setup, report: Report
-) -> tuple[list[float], list[Solution], FloatArray]:
+) -> tuple[list[float], list[StepSolution], FloatArray]:
     """Run the solver; return the part of the displacement at each step, solutions, and points."""
-    made: list[Solution] = []
+    made: list[StepSolution] = []
 
-    def solve(problem: Problem, timer: PhaseTimer) -> Solution:
+    def solve(problem: Problem, timer: PhaseTimer) -> StepSolution:
         made.append(setup.solve(problem, timer))
         return made[-1]
 
@@ -907,8 +907,8 @@ def _reference(
 
 
 def _further(
-    mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], report: Report
-) -> list[Solution]:
+    mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[StepSolution], report: Report
+) -> list[StepSolution]:
     """Run the steps for ``setup.target``; return their solutions.
 
     Each selection begins with the control nodes of ``chosen``, the solution of the same step for
@@ -916,7 +916,7 @@ def _further(
     """
     coords = setup.coords
     total = len(parts)
-    made: list[Solution] = []
+    made: list[StepSolution] = []
     carried: CarriedError | None = None
     for k, (part, solution) in enumerate(zip(parts, chosen, strict=True)):
         control = solution.control

@@ -18,7 +18,7 @@ from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import AGREE, merge
 from slideviz.rbf.methods import within
-from slideviz.rbf.problem import PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import PhaseTimer, Problem, StepSolution
 from slideviz.rbf.tape import (
     Array,
     Linear,
@@ -31,7 +31,7 @@ from slideviz.rbf.tape import (
 ASSEMBLING = 0.2  # the part of the phase solve that the matrix takes
 
 
-def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
+def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> StepSolution:
     """Return the solution of one step as an elastic body.
 
     Sliding nodes move in the tangent planes of their boundary. Where a boundary is curved, or a
@@ -52,7 +52,7 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
         gap = np.abs(value(slid) - value(free)).max()
         if gap > AGREE * problem.basis.radius:
             displacement = _equilibrium(problem, timer, body, nodes, values, displacement)
-    return Solution(
+    return StepSolution(
         put(displacement, nodes, values, overwrite=True),
         len(merge(problem, nodes, values)[0]),
         0.0,

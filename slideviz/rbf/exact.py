@@ -39,7 +39,7 @@ class Fit:
     short = ""  # why it is above its tolerance, and a remedy; empty where it is not
     error_estimate: Any = 0.0
     refined = 0.0
-    """`error_estimate`, `refined`: as of a ``Solution``."""
+    """`error_estimate`, `refined`: as of a ``StepSolution``."""
 
     def __init__(self, problem: Problem) -> None:
         """Begin without rows."""

@@ -37,7 +37,7 @@ from slideviz.rbf.problem import (
     CarriedError,
     PhaseTimer,
     Problem,
-    Solution,
+    StepSolution,
 )
 from slideviz.rbf.reduction import GAMMA
 from slideviz.rbf.tape import Array, add_at, dot, join, multiply, put, take, value
@@ -57,14 +57,14 @@ NEGLIGIBLE = 1e-14  # errors below this part of the support radius are rounding,
 IMAGES = (0, -1, 1)  # periods by which the sources of the correction are shifted, in this order
 
 
-def regular(problem: Problem, timer: PhaseTimer) -> Solution:
+def regular(problem: Problem, timer: PhaseTimer) -> StepSolution:
     """Interpolate the known displacements (thesis section 2.1)."""
     fit = _fit(problem, timer)
     fit.add(full_rows(problem, problem.known, problem.values))
     return _finish(problem, timer, fit, problem.known, problem.values)
 
 
-def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
+def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> StepSolution:
     """Displace sliding nodes by interpolation, project them, and add them to the known nodes.
 
     Edges first, then surfaces; then interpolate with all of them (section 2.4.2).
@@ -85,7 +85,7 @@ def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
     return _finish(problem, timer, fit, nodes, values)
 
 
-def direct_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
+def direct_sliding(problem: Problem, timer: PhaseTimer) -> StepSolution:
     """Let sliding nodes move within their boundary by the system itself (section 2.4.1).
 
     Where the boundary is curved, or a node slid past the end of its piece, the slid nodes are
@@ -131,7 +131,7 @@ def within(problem: Problem, nodes: IntArray, free: Array) -> Array:
     return add_at(free, at, -multiply(normals, dot(take(free, at), normals)))
 
 
-SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], Solution]] = {
+SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], StepSolution]] = {
     "none": regular,
     "ps": pseudo_sliding,
     "ds": direct_sliding,
@@ -180,7 +180,7 @@ def largest_norm(vectors: Array) -> Any:
 
 def _finish(
     problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray, values: Array
-) -> Solution:
+) -> StepSolution:
     """Return the solution, exact at ``nodes`` (b,) by ``values``; elsewhere errors are spread."""
     displacement = _at(problem, timer, fit, slice(None))
     errors = values - take(displacement, nodes)
@@ -203,7 +203,7 @@ def _finish(
     if correction is not None:
         with timer.phase("correct") as tick:
             correct(problem, value(displacement), nodes, correction, tick)
-    solution = Solution(
+    solution = StepSolution(
         put(displacement, nodes, values, overwrite=True),
         0,
         largest_norm(total),

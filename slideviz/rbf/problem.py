@@ -114,7 +114,7 @@ class Problem:
     """`coords`, `shift` (n, d), (d,): current positions in the frame, and one period in it (zero:
     none), for the correction."""
     reduction: Reduction | None = None  # none: all candidates are control nodes
-    before: Solution | None = None  # of the step before; None in the first step
+    before: StepSolution | None = None  # of the step before; None in the first step
     stages: tuple[Levels, ...] = ()
     """The rows that were chosen for other data, of each system: a selection in levels takes them
     first."""
@@ -208,7 +208,7 @@ class Relaxed:
 
 
 @record
-class Solution:
+class StepSolution:
     """The result of one step: displacements, control nodes and errors."""
 
     displacement: Array  # (..., n, d): of all nodes, in the frame

@@ -27,7 +27,7 @@ from slideviz.mesh.model import (
     largest_norm,
     row_norms,
 )
-from slideviz.rbf.problem import Solution
+from slideviz.rbf.problem import StepSolution
 from slideviz.rbf.rims import Rims
 from slideviz.solver.domain import Domain, find_domain, roles_of_copies
 from slideviz.solver.prescribed import displaced, motion_messages
@@ -67,7 +67,7 @@ this part of the largest displacement."""
 def unsoundness(
     setup: Setup,
     mesh: Mesh,
-    solution: Solution,
+    solution: StepSolution,
     moved: FloatArray,
     *,
     part: float,

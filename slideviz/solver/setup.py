@@ -40,7 +40,7 @@ from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.operations import add_displacement
-from slideviz.rbf.problem import PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import PhaseTimer, Problem, StepSolution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.rims import Keep, Rims
@@ -214,7 +214,7 @@ class Setup(Domain):
     layers: float  # as of a ``Step``
     tracks: Tracks  # the edges and surfaces along which nodes slide
     span: Span | None  # along which blades move; None: they do not
-    solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
+    solve: Callable[[Problem, PhaseTimer], StepSolution]  # of a step, by the method of the case
     zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
     minimum_gap: float  # of the case, below which layers give way
     rims: Rims | None  # nodes that moving boundaries share with walls; None: there are none
@@ -411,7 +411,7 @@ def setup_of(
 
 def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
-) -> Callable[[Problem, PhaseTimer], Solution]:
+) -> Callable[[Problem, PhaseTimer], StepSolution]:
     if case.method == "idw":
         weights = Weights(case.idw_power or float(mesh.dim), case.idw_fixed_weight)
         return partial(deform_idw, weights=weights)

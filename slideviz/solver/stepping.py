@@ -24,7 +24,7 @@ from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.operations import features
-from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Relaxed, Solution
+from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Relaxed, StepSolution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.growth import (
@@ -80,7 +80,7 @@ class _Finding:
     max_error: float
     error_estimate: float
     refined: float
-    """`condition`, `max_error`, `error_estimate`, `refined`: as of `Solution`."""
+    """`condition`, `max_error`, `error_estimate`, `refined`: as of `StepSolution`."""
     short: list[Remark]  # that its data reduction ended too early, or []
     dropped: list[Remark]  # that singular nodes were left out, or []
     others: list[Remark]  # what is said of every step
@@ -94,7 +94,7 @@ class _State:
     coords: FloatArray  # (n, d): of all nodes, in the frame
     index: int = 0  # the number of steps so far
     part: float = 0.0  # of the displacement that is made
-    solution: Solution | None = None  # of the last step
+    solution: StepSolution | None = None  # of the last step
     findings: tuple[_Finding, ...] = ()  # of all steps so far
     inverted: int = 0  # inverted cells, where steps are halved
 
@@ -253,7 +253,7 @@ class Stepping:
         index: int,
         total: int,
         points: FloatArray,
-        solution: Solution,
+        solution: StepSolution,
         timer: PhaseTimer,
         part: float,
     ) -> Step:
@@ -303,9 +303,9 @@ def one_step(
     coords: Array,
     goal: Array,
     timer: PhaseTimer,
-    before: Solution | None,
+    before: StepSolution | None,
     frozen: FrozenChoices | None = None,
-) -> Solution:
+) -> StepSolution:
     """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
 
     Of periodic images only the representative is in the problem; its displacement is copied to the
@@ -418,7 +418,7 @@ def problem_at(
     setup: Setup,
     coords: Array,
     goal: Array,
-    before: Solution | None = None,
+    before: StepSolution | None = None,
     frozen: FrozenChoices | None = None,
 ) -> Problem:
     """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
@@ -512,7 +512,7 @@ def with_halo_copies(
     return points, out
 
 
-def _finding(setup: Setup, mesh: Mesh, step: Step, solution: Solution) -> _Finding:
+def _finding(setup: Setup, mesh: Mesh, step: Step, solution: StepSolution) -> _Finding:
     others: list[Remark] = [f"step {step.index}: {text}" for text in solution.warnings]
     if step.repaired is not None:
         others += step.repaired.warnings
@@ -560,7 +560,7 @@ def _run_warnings(
     return [*dict.fromkeys([*before, *others]), *of_nodes, *doubt]
 
 
-def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
+def _short_warning(setup: Setup, solution: StepSolution, index: int) -> str:
     assert setup.reduction is not None
     return (
         f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at an "
@@ -593,7 +593,7 @@ def _doubt_warning(
 
 
 def _dropped_warning(
-    setup: Setup, solution: Solution, index: int, total: int, mesh: Mesh
+    setup: Setup, solution: StepSolution, index: int, total: int, mesh: Mesh
 ) -> list[Remark]:
     """Return the warning, or the note if negligible, that singular nodes were left out; or []."""
     if not len(solution.dropped):
