@@ -26,7 +26,7 @@ from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
     ElidedLabel,
     QuietBar,
-    WrappingRow,
+    TwoPartRow,
     as_widget,
     hint_label,
     in_column,
@@ -94,7 +94,7 @@ class StartPage(QScrollArea):
         title.setWordWrap(True)
         return in_row(picture, 10, title, wide=[title])
 
-    def _make_buttons(self, can_try: bool) -> WrappingRow:
+    def _make_buttons(self, can_try: bool) -> TwoPartRow:
         self.attempt = push_button(
             TRY,
             "Open the sample “passage” and deform it at once.",
@@ -112,7 +112,7 @@ class StartPage(QScrollArea):
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
             set_policy(button, "Fixed", "Fixed")
-        return WrappingRow([self.attempt], [self.open], spacing=10, apart=False)
+        return TwoPartRow([self.attempt], [self.open], spacing=10, apart=False)
 
     def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
         self._cards = QGridLayout()

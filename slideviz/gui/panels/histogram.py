@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QLabel
 
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.gui.responsiveness.timers import SELECTING_MS, single_shot
-from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_button
+from slideviz.gui.widgets.build import TwoPartRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas
 from slideviz.gui.widgets.theme import alarm
@@ -139,7 +139,7 @@ class HistogramPanel(Panel):
         escape.activated.connect(self.clear_range)
         self.follow(_shown, seen=True)
 
-    def _make_buttons(self) -> WrappingRow:
+    def _make_buttons(self) -> TwoPartRow:
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
         self.whole = check_box(
@@ -157,7 +157,7 @@ class HistogramPanel(Panel):
         )
         tip = "Save the histogram as PNG, SVG or PDF."
         self.save = push_button("Save…", tip, lambda: self.canvas.save("histogram"))
-        return WrappingRow((self.log, self.whole), (self.show_all, self.save))
+        return TwoPartRow((self.log, self.whole), (self.show_all, self.save))
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:

@@ -26,7 +26,7 @@ from slideviz.gui.commands import BY_NAME, RUN_MENU, Command, fill_compare
 from slideviz.gui.widgets.build import (
     ALIGN_LEFT,
     ModelIndex,
-    WrappingRow,
+    TwoPartRow,
     hint_label,
     in_column,
     tool_button,
@@ -274,7 +274,7 @@ class RunsPanel(Panel):
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
         every = list(self.buttons.values())
         left = 1 + RUN_MENU.entries.index(None)
-        row = WrappingRow(every[:left], every[left:], spacing=2)
+        row = TwoPartRow(every[:left], every[left:], spacing=2)
         parts = (self.empty, self.tree, row)
         in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.follow(lambda one: (one.runs, one.shown, one.view.beside), self._fill)

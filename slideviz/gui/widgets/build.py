@@ -281,7 +281,7 @@ def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
 
-class WrappingRow(Fitted, QWidget):
+class TwoPartRow(Fitted, QWidget):
     """A row with some parts at the left and some at the right, which are below where it is narrow.
 
     ``spacing``: space between the parts in pixels; negative: the style's. ``apart``: whether the
