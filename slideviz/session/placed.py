@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from slideviz.argument_types import record
 from slideviz.case.motions.box import Ffd
-from slideviz.case.motions.motion import Motion, NewMotion, Target, applies_to, named
+from slideviz.case.motions.motion import Motion, MotionStart, Target, applies_to, named
 from slideviz.case.motions.rigid import ByFormula, Radial, Rotate, Scale, Translate, rotated
 from slideviz.ffd.box import CoordinateSystem, points_at
 from slideviz.mesh.model import FloatArray, Mesh
@@ -265,7 +265,7 @@ class PlacedBoundary(Placed):
 
     def turn(self, axis: int | None) -> Number:
         machine = machine_axis(self.session)
-        new = Rotate.new(self.marker, NewMotion(self.dim, machine))
+        new = Rotate.new(self.marker, MotionStart(self.dim, machine))
         assert isinstance(new, Rotate)
         if axis is not None:
             way = triple(np.round(self.axes[axis], 12))

@@ -12,7 +12,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness
 from slideviz.case.motions.file import FromFile
-from slideviz.case.motions.motion import NewMotion, applies_to, named
+from slideviz.case.motions.motion import MotionStart, applies_to, named
 from slideviz.case.motions.rigid import Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.case.moving_nodes import by_zone, displacements
@@ -96,7 +96,7 @@ def test_a_new_box_has_all_nodes_of_its_motion_inside(square, cube, dim, count, 
     session = changes.set_role(session, names, "moving")
     target = names if count > 1 else names[0]
     for number in (1, 2):  # the second has a name of its own
-        session = changes.add_motion(session, kind.new(target, NewMotion(dim)))
+        session = changes.add_motion(session, kind.new(target, MotionStart(dim)))
         session = changes.add_box(session, number - 1)
     case = session.case
     assert [motion.box for motion in case.motions] == ["BOX", "BOX_2"] == list(box_names(session))

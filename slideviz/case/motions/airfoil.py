@@ -13,7 +13,7 @@ from slideviz import terms
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
-    NewMotion,
+    MotionStart,
     Target,
     applies_to,
     marker_words,
@@ -70,7 +70,7 @@ class OnAirfoil(Motion):
         raise NotImplementedError
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, 0.0, chord=start.chord)  # type: ignore[call-arg]
 
     def described(self, dim: int, extent: float) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
-    NewMotion,
+    MotionStart,
     Target,
     applies_to,
     axis_length,
@@ -291,7 +291,7 @@ class Ffd(BoxMotion):
         return cls(marker, items[0].text, (i, j, k), (dx, dy, dz))
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, _first_box(start), (0, 0, _last_index(start)), (0.0, 0.0, 0.0))
 
     def arguments(self) -> list[str]:
@@ -344,7 +344,7 @@ class _Column(BoxMotion):
         return cls(marker, items[0].text, (i, j), amount)  # type: ignore[call-arg]
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         index = (0, _last_index(start))
         return cls(marker, _first_box(start), index, 0.0)  # type: ignore[call-arg]
 
@@ -460,7 +460,7 @@ class FfdTwist(BoxMotion):
         return cls(marker, items[0].text, plane, angle_deg(items[2].text), point, axis)
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, _first_box(start), 0, 0.0)
 
     def arguments(self) -> list[str]:
@@ -510,11 +510,11 @@ def _across(dim: int) -> int:
     return 2 if dim == 3 else 1
 
 
-def _first_box(start: NewMotion) -> str:
+def _first_box(start: MotionStart) -> str:
     return start.boxes[0] if start.boxes else ""
 
 
-def _last_index(start: NewMotion) -> int:
+def _last_index(start: MotionStart) -> int:
     return 0 if start.dim == 3 else -1
 
 

@@ -21,7 +21,7 @@ from slideviz.case.displacement import (
 from slideviz.case.motions.motion import (
     DesignNumbers,
     Motion,
-    NewMotion,
+    MotionStart,
     Target,
     applies_to,
     named,
@@ -73,7 +73,7 @@ class FromFile(Motion):
         return cls(read_path(words), marker)
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(Path(), marker)
 
     def arguments(self) -> list[str]:

@@ -58,7 +58,7 @@ def nodes_moved(motion: Motion, on: NodesOn) -> IntArray:
 
 
 @dataclass(frozen=True)
-class NewMotion:
+class MotionStart:
     """What a motion begins with that the user adds."""
 
     dim: int  # of the mesh
@@ -143,7 +143,7 @@ class Motion(CheckedFields):
         raise NotImplementedError
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         """Return a motion that moves nothing yet."""
         raise NotImplementedError
 

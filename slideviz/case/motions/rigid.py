@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.case.displacement import Displacements
 from slideviz.case.motions.motion import (
     Motion,
-    NewMotion,
+    MotionStart,
     Point,
     Target,
     axis_length,
@@ -73,7 +73,7 @@ class Translate(ByFormula):
         return cls(marker, read_vector(without_brackets(words), "the shift"))
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, (0.0,) * start.dim)
 
     def arguments(self) -> list[str]:
@@ -167,7 +167,7 @@ class Rotate(_AboutPoint):
         return cls(marker, angle, point, axis)
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         if start.machine is None:
             return cls(marker, 0.0)
         axis, origin = start.machine
@@ -242,7 +242,7 @@ class Scale(_AboutPoint):
         return cls(marker, values, read_vector(place, "the point") if place else "centroid")
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, (1.0,) * start.dim)
 
     def arguments(self) -> list[str]:
@@ -312,7 +312,7 @@ class Radial(_AboutPoint):
         return cls(marker, factor, number(items[1].text), axis, point)
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         axis, origin = start.machine or (_Z, (0.0, 0.0, 0.0))
         return cls(marker, 1.0, 0.0, axis, origin[: start.dim])
 

@@ -15,7 +15,7 @@ from slideviz.case.motions.motion import (
     Amount,
     DesignNumbers,
     Motion,
-    NewMotion,
+    MotionStart,
     Target,
     applies_to,
     place_words,
@@ -118,7 +118,7 @@ class SpanMotion(Motion):
         return cls(marker, verb, spans, values, stack)  # type: ignore[arg-type]
 
     @classmethod
-    def new(cls, marker: Target, start: NewMotion) -> Motion:
+    def new(cls, marker: Target, start: MotionStart) -> Motion:
         return cls(marker, "twist", (0.0, 1.0), (0.0, 0.0))
 
     def arguments(self) -> list[str]:

@@ -16,7 +16,7 @@ from slideviz.case.motions.kinds import KINDS
 from slideviz.case.motions.motion import (
     Axis,
     Motion,
-    NewMotion,
+    MotionStart,
     Target,
     direction_words,
     named,
@@ -409,7 +409,7 @@ class MotionEditor(QWidget):
         if self._motion is not None and self._motion.kind_term != kind.kind_term:
             marker = self._motion.marker
             chord = self.chord_of(marker)
-            start = NewMotion(self._dim, self.machine, self.boxes, chord)
+            start = MotionStart(self._dim, self.machine, self.boxes, chord)
             self.changed.emit(kind.new(marker, start))
 
     def _about_chosen(self, what: str) -> None:

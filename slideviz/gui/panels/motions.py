@@ -26,7 +26,7 @@ from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.case.motions.file import FromFile
 from slideviz.case.motions.kinds import KINDS
-from slideviz.case.motions.motion import Motion, NewMotion, Target, named
+from slideviz.case.motions.motion import Motion, MotionStart, Target, named
 from slideviz.case.motions.rigid import Translate
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.motion_editor import KIND_LABELS, MotionEditor
@@ -315,7 +315,7 @@ class MotionPanel(Panel):
         boxes = box_names(session)
         machine = machine_axis(session)
         chord = self._chord(target)
-        motion = kind.new(target, NewMotion(session.mesh.dim, machine, boxes, chord))
+        motion = kind.new(target, MotionStart(session.mesh.dim, machine, boxes, chord))
         self.change(changes.add_motion, motion)
         self.editor.focus()
 
