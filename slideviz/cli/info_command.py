@@ -16,7 +16,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.polyhedra import parts_words
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.zones import marker_zones
-from slideviz.streaming.quality import CellCounts
+from slideviz.streaming.block_quality import CellCounts
 
 
 def main(arguments: Namespace) -> int:

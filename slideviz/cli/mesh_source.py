@@ -27,7 +27,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.solver.prepare import referenced
 from slideviz.solver.steps import Progress
-from slideviz.streaming.quality import CellCounts, measure_mesh
+from slideviz.streaming.block_quality import CellCounts, measure_mesh
 from slideviz.streaming.source import FileSource, MemorySource, MeshSource, has_cells_of
 from slideviz.streaming.stream_input import StreamInput, open_read_only
 from slideviz.terms import ROLES, FileFormat, Metric, Role

@@ -33,7 +33,7 @@ from slideviz.solver.deform import Step, folded_at
 from slideviz.solver.layers import height_warnings
 from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 from slideviz.solver.steps import MeshRepair, RunResult
-from slideviz.streaming.quality import CellCounts
+from slideviz.streaming.block_quality import CellCounts
 from slideviz.system.atomic import atomic_write, write_whole
 from slideviz.system.csv_table import write_csv
 from slideviz.terms import NO_REFERENCE, WALL_VALUES, Metric, Quantity, field_of

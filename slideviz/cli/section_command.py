@@ -28,7 +28,7 @@ from slideviz.plots.section_picture import SectionInRun, SectionStyle, require_p
 from slideviz.sections.model import Section
 from slideviz.sections.span import SpanWalls, between_walls, find_walls
 from slideviz.session.passages import find_period, find_periods, keeps, passages
-from slideviz.streaming.quality import quality_blocks
+from slideviz.streaming.block_quality import quality_blocks
 from slideviz.streaming.source import cut_cells
 
 WALLS_OPTION = "--between HUB,SHROUD"

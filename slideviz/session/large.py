@@ -14,7 +14,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import QualityTotals, quality
 from slideviz.session.inspect import WORST
 from slideviz.session.state import StepFrame
-from slideviz.streaming.quality import measure_mesh
+from slideviz.streaming.block_quality import measure_mesh
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.source import CellBlock, FileSource
 from slideviz.streaming.stream_input import NEEDED

@@ -41,9 +41,7 @@ from slideviz.solver.prepare import NOT_STREAMED, Prepared, beginning_with, prep
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, Report, RunResult, Step, step_timer
-from slideviz.streaming.converting import text_of_binary
-from slideviz.streaming.interior import InteriorDisplacer
-from slideviz.streaming.quality import (
+from slideviz.streaming.block_quality import (
     MeasuredBlock,
     QualityCollector,
     RunCollector,
@@ -51,6 +49,8 @@ from slideviz.streaming.quality import (
     orientations_of,
     require_consistent_orientation,
 )
+from slideviz.streaming.converting import text_of_binary
+from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.skin import without_cells
 from slideviz.streaming.source import FileSource, PointTable, ZoneSource
 from slideviz.streaming.stream_input import (

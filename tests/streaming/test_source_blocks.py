@@ -9,7 +9,7 @@ import slideviz as sv
 from slideviz.errors import MeshError
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.streaming.quality import CellCounts, measure_mesh, quality_blocks
+from slideviz.streaming.block_quality import CellCounts, measure_mesh, quality_blocks
 from slideviz.streaming.source import FileSource, MemorySource, cut_cells, join_blocks
 from tests.builders import grid
 from tests.formats.test_su2b import WHOLE

@@ -14,7 +14,7 @@ from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.samples.table import write_sample
 from slideviz.session.large import first_frame
-from slideviz.streaming import quality, skin, source
+from slideviz.streaming import block_quality, skin, source
 from slideviz.system.cleanup import PREFIX
 from tests.builders import grid
 from tests.formats.test_su2b import WHOLE, change
@@ -27,7 +27,7 @@ def small(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scratch").mkdir()
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "scratch"))
-    for module in (source, quality):
+    for module in (source, block_quality):
         monkeypatch.setattr(module, "CELLS", 29)
     monkeypatch.setattr(skin, "BLOCK", 31)
     return tmp_path
@@ -203,8 +203,8 @@ def test_numbers_of_cells_are_in_files_that_end(small):
 
     with ExitStack() as stack:
         mesh = source.FileSource.open(stack, (Path("mesh.su2b"), None))
-        counts = quality.CellCounts(mesh)
-        quality.measure_mesh(stack, Path("scratch"), mesh, counts=counts)
+        counts = block_quality.CellCounts(mesh)
+        block_quality.measure_mesh(stack, Path("scratch"), mesh, counts=counts)
         assert len(list(Path("scratch").glob(f"{PREFIX}*"))) == 2
         assert counts.types == {9: 16}
     assert not list(Path("scratch").iterdir())
