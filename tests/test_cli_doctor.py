@@ -7,7 +7,7 @@ from importlib import metadata
 import pytest
 
 from slideviz.cli import doctor_command, run
-from slideviz.system import libraries
+from slideviz.system import missing_libraries
 
 
 def test_it_prints_every_section_and_that_nothing_is_missing(capsys, monkeypatch):
@@ -78,10 +78,8 @@ def test_without_opengl_the_packages_are_named(monkeypatch, capsys):
     assert run(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "OpenGL             missing" in out
-    assert (
-        f"pictures, films and the window lack OpenGL\n    {libraries.apt_install(libraries.OPENGL)}"
-        in out
-    )
+    command = missing_libraries.apt_install(missing_libraries.OPENGL)
+    assert f"pictures, films and the window lack OpenGL\n    {command}" in out
 
 
 def test_a_broken_library_hides_nothing_else(monkeypatch, capsys):

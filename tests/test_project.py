@@ -12,7 +12,7 @@ import yaml
 
 import slideviz
 from slideviz.cli import PACKAGES
-from slideviz.system import libraries
+from slideviz.system import missing_libraries
 from tools import smoke
 
 ROOT = Path(__file__).parents[1]
@@ -83,7 +83,7 @@ def test_setup_installs_the_libraries_that_the_window_needs():
     text = (ROOT / "tools" / "setup.sh").read_text(encoding="utf-8")
     (listed,) = re.findall(r"^PACKAGES=\((.*?)\)$", text, re.MULTILINE | re.DOTALL)
     # These come with one of the others.
-    assert {*libraries.WINDOW.values(), *libraries.OPENGL} - {*listed.split()} <= {
+    assert {*missing_libraries.WINDOW.values(), *missing_libraries.OPENGL} - {*listed.split()} <= {
         "libx11-xcb1", "libxcb-xkb1", "libgl1-mesa-dri",
     }  # fmt: skip
 

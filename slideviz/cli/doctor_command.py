@@ -19,7 +19,7 @@ from slideviz import __version__
 from slideviz.cli.terminal import DONE
 from slideviz.errors import CaseError
 from slideviz.system.atomic import write_whole
-from slideviz.system.libraries import OPENGL, apt_install, missing_for_window
+from slideviz.system.missing_libraries import OPENGL, apt_install, missing_for_window
 from slideviz.system.platform import free_memory, needs_server
 
 Problem = tuple[str, str]

@@ -14,7 +14,7 @@ from slideviz.cli.argument_readers import glued
 from slideviz.cli.commands import COMMANDS, add_arguments
 from slideviz.errors import CaseError, nearest
 from slideviz.formats.openfoam_paths import mesh_path
-from slideviz.system.libraries import apt_install, missing_for_window
+from slideviz.system.missing_libraries import apt_install, missing_for_window
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.

@@ -21,7 +21,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderWindow
 from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.scene.legend import set_letters
-from slideviz.system.libraries import OPENGL, apt_install, is_loadable
+from slideviz.system.missing_libraries import OPENGL, apt_install, is_loadable
 from slideviz.system.platform import has_wayland, has_x_server, needs_server
 
 SMALLEST = 64

@@ -10,7 +10,7 @@ from slideviz.errors import SlidevizError
 from slideviz.export import offscreen
 from slideviz.export.offscreen import check_drawable, has_opengl
 from slideviz.samples.table import write_sample
-from slideviz.system import libraries
+from slideviz.system import missing_libraries
 
 LACKING = (
     "pictures need OpenGL, which this system does not have; on Debian or Ubuntu use `sudo apt-"
@@ -68,14 +68,14 @@ def test_libraries_of_the_window_are_named_by_their_packages(monkeypatch, tmp_pa
         if "xcb-cursor" in name or "libGL." in name:
             raise OSError(name)
 
-    monkeypatch.setattr(libraries.ctypes, "CDLL", load)
-    monkeypatch.setattr(libraries, "needs_server", lambda: True)
-    assert libraries.missing_for_window() == ["libgl1", "libxcb-cursor0"]
+    monkeypatch.setattr(missing_libraries.ctypes, "CDLL", load)
+    monkeypatch.setattr(missing_libraries, "needs_server", lambda: True)
+    assert missing_libraries.missing_for_window() == ["libgl1", "libxcb-cursor0"]
     monkeypatch.setattr(offscreen, "display_fault", lambda: "")
     assert run([]) == 1
     assert "use `sudo apt-get install libgl1 libxcb-cursor0`" in capsys.readouterr().err
-    monkeypatch.setattr(libraries.sys, "_MEIPASS", str(tmp_path), raising=False)
+    monkeypatch.setattr(missing_libraries.sys, "_MEIPASS", str(tmp_path), raising=False)
     (tmp_path / "libxcb-cursor.so.0").touch()
-    assert libraries.missing_for_window() == ["libgl1"]
-    monkeypatch.setattr(libraries, "needs_server", lambda: False)
-    assert libraries.missing_for_window() == []
+    assert missing_libraries.missing_for_window() == ["libgl1"]
+    monkeypatch.setattr(missing_libraries, "needs_server", lambda: False)
+    assert missing_libraries.missing_for_window() == []
