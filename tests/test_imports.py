@@ -58,6 +58,21 @@ def test_a_small_run_loads_nothing_that_takes_long_and_is_not_needed(tmp_path):
     assert not done.stdout.strip()
 
 
+PARSED = """
+import sys
+from slideviz.cli.parser import parse
+
+parse(["quality", "mesh.su2"])
+print(*(name for name in ("numpy", "scipy", "numba") if name in sys.modules))
+"""
+
+
+def test_a_command_line_is_parsed_before_numpy_is_loaded():
+    call = [sys.executable, "-c", PARSED]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    assert not done.stdout.strip()
+
+
 PACKAGE = Path(__file__).parents[1] / "slideviz"
 UNFINISHED = ("case/model.py",)
 """Modules whose circle of imports is still to be cut; there shall be none."""

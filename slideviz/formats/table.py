@@ -13,11 +13,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
-from slideviz.mesh.model import CellRows
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_regular_file
 from slideviz.system.tables import table_beside
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import FloatArray, Marker, Mesh
+    from slideviz.mesh.model import CellRows, FloatArray, Marker, Mesh
 
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 """Endings of files whose format may be found by their content."""
@@ -44,7 +42,7 @@ class WriteOptions:
     """Called between blocks of a file; what it raises stops the writing."""
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class ZoneContent:
     """The content of a zone to write, with functions that return parts of its large arrays.
 
