@@ -233,11 +233,6 @@ def has_boxes(now: CommandState) -> bool:
     return "ffd" in now.session.view.drawn or bool(box_names(now.session))
 
 
-def colored_by_value(now: CommandState) -> bool:
-    """Return whether cells are colored by a value."""
-    return has_mesh(now) and now.session.view.color_by != "role"
-
-
 CONDITIONS: Mapping[str, Callable[[Any], object]] = {
     "mesh": has_mesh,
     "3d": lambda now: not is_2d(now),
