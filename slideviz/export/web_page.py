@@ -50,11 +50,7 @@ class _Group:
         """Return what the page has of the group, relative to a point, in a unit of length."""
         places = (np.concatenate(self.places) - middle) / unit
         colors = np.concatenate(self.colors).round().astype(np.uint8)
-        return {
-            "lines": self.lines,
-            "bold": self.bold,
-            "glass": self.glass,
-            "lit": self.lit,
+        return vars(self) | {
             "count": len(places),
             "places": b64encode(places.astype("<f4").tobytes()).decode(),
             "colors": b64encode(colors.tobytes()).decode(),
