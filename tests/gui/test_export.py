@@ -926,7 +926,7 @@ def test_a_report_has_the_view_and_all_runs(with_runs, tmp_path, answers):
 
 
 def test_the_view_becomes_a_web_page(ran, tmp_path, answers):
-    answers("ask_save", tmp_path / "view")
+    answers("ask_save", tmp_path / "view.html")
     ran.window.actions_table.by_name["export_page"].trigger()
     text = (tmp_path / "view.html").read_text(encoding="utf-8")
     assert "<canvas" in text

@@ -83,7 +83,7 @@ class Exports(QObject):
         with self._renderer() as renderer:
             choices = str(settings.value("picture", ""))
             dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), choices)
-            accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
+            accepted = dialog.exec()
             options = dialog.picture_options
             choices = dialog.choices
             dialog.deleteLater()
@@ -155,7 +155,7 @@ class Exports(QObject):
         if path := self._ask("Save web page", WEB_PAGE, "HTML page (*.html)"):
             with self._renderer() as renderer:
                 options = PictureOptions(title=True, fill=False).like(self._session.view)
-                self._write_picture(renderer, options, path.with_suffix(WEB_PAGE))
+                self._write_picture(renderer, options, path)
 
     # Films -----------------------------------------------------------------------------
     def make_film(self) -> None:
@@ -246,7 +246,7 @@ class Exports(QObject):
             return
         with self._renderer() as renderer:
             dialog = WheelDialog(self.window, renderer, around)
-            accepted = dialog.exec() == WheelDialog.DialogCode.Accepted
+            accepted = dialog.exec()
             several = dialog.count
             numbered = dialog.numbered.isChecked()
             dialog.deleteLater()
