@@ -111,7 +111,15 @@ def test_the_page_of_sweeps_has_what_sweep_json_holds(tmp_path):
     assert {"slideviz", "mesh", "SLIDING_MODE"} <= set(found)
 
 
-@pytest.mark.parametrize("name", [name for name in sv.__all__ if not name.startswith("_")])
+NAMES = [name for name in sv.__all__ if not name.startswith("_")]
+
+
+def test_the_reference_of_python_has_every_public_name():
+    page = (DOCS / "reference" / "python.rst").read_text(encoding="utf-8")
+    assert {*NAMES} <= {*re.findall(r"^\.\. auto\w+:: (\w+)$", page, re.MULTILINE)}
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_in_docstrings(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     thing = getattr(sv, name)
