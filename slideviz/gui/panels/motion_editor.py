@@ -87,6 +87,10 @@ class FormRow(NamedTuple):
     """Returns what the field shows for a value of the attribute."""
     read: Callable[[Any], Any] = _unchanged
     """Returns the value of the attribute for that of the field."""
+    per_axis: bool = False
+    """Whether the field has a number for each axis of the mesh."""
+    is_length: bool = False
+    """Whether numbers are in the mesh's length unit: arrow keys then step by the mesh's size."""
 
 
 def _row(
@@ -94,12 +98,10 @@ def _row(
     attribute: str,
     field: Callable[..., QWidget],
     tip: str,
-    *,
-    shown: Callable[[Any], Any] = _unchanged,
-    read: Callable[[Any], Any] = _unchanged,
     **facts: Any,
 ) -> FormRow:
-    return FormRow(title, attribute, partial(field, tip=tip, **facts), shown, read)
+    of_row = {name: facts.pop(name) for name in FormRow._fields if name in facts}
+    return FormRow(title, attribute, partial(field, tip=tip, **facts), **of_row)
 
 
 def _factors() -> VectorField:
@@ -122,21 +124,23 @@ ROWS: dict[str, FormRow] = {
         "The plane of control points, counted from 0 along j; -1 is all.",
         allowed=lambda value: control_point_problem((value,)), read=int),
     "vector": _row("By", "vector", VectorField,
-        "How far it moves along each axis, in the mesh's length unit."),
+        "How far it moves along each axis, in the mesh's length unit.",
+        per_axis=True, is_length=True),
     "amount": _row("By", "amount", NumberField,
         "How far control points move, in the mesh's length unit. With the thickness, the last "
-        "ones move forwards, and the first ones as far backwards."),
+        "ones move forwards, and the first ones as far backwards.", is_length=True),
     "angle": _row("Angle (°)", "angle_deg", NumberField,
         "Degrees; positive turns counter-clockwise seen against the axis."),
     "factors": FormRow(
-        "Factors", "factors", _factors, lambda one: one if len(one) > 1 else one * 3),
+        "Factors", "factors", _factors, lambda one: one if len(one) > 1 else one * 3,
+        per_axis=True),
     "percent": _row("Radius by (%)", "factor", NumberField,
         "How much larger the radius becomes, in percent: 3 is 3 % outwards.",
         allowed=unless(lambda value: value > -100.0, "-100 % or less would fold the boundary"),
         shown=lambda factor: round(100.0 * (factor - 1.0), 10),
         read=lambda percent: round(1.0 + percent / 100.0, 14)),
     "distance": _row("and by (length)", "distance", NumberField,
-        "How far it also moves outwards, in the mesh's length unit."),
+        "How far it also moves outwards, in the mesh's length unit.", is_length=True),
     "change": _row("Changes", "kind", Choice, "What of the blade's sections the curve changes.",
         words={kind: f"{term.label} ({term.unit})" for kind, term in SPAN_KINDS.items()},
         tips=tips(SPAN_KINDS)),
@@ -145,7 +149,8 @@ ROWS: dict[str, FormRow] = {
         "0.5:1.5, 1:4; or one value for all. A smooth curve goes through them."),
     "about": _row("About", "point", Choice, "What stays in place while it turns or grows.",
         words={what: ABOUT[what] for what in ("centroid", "point")}),
-    "point": _row("Point", "point", VectorField, "The point that stays in place."),
+    "point": _row("Point", "point", VectorField, "The point that stays in place.",
+        per_axis=True, is_length=True),
     "axis": _row("Axis", "axis", VectorField,
         "Direction of the axis; its length does not matter.",
         values=(0.0, 0.0, 1.0), allowed=a_direction),
@@ -163,15 +168,15 @@ ROWS: dict[str, FormRow] = {
         shown=lambda peak: round(100.0 * peak, 10),
         read=lambda percent: round(percent / 100.0, 14)),
     "raised": _row("Raised by", "height", NumberField,
-        "How far it is raised, in the mesh's length unit."),
+        "How far it is raised, in the mesh's length unit.", is_length=True),
     "chord": _row("Chord", "chord", VectorField,
         "x of the leading and of the trailing edge: the airfoil lies along x.",
-        values=(0.0, 1.0), names=("x from", "to"),
+        values=(0.0, 1.0), names=("x from", "to"), is_length=True,
         allowed=unless(lambda ends: ends[0] < ends[1], "the trailing edge has the larger x")),
     "path": FormRow("File", "path", TextField),
     "limit": _row("At most away", "limit", NumberField,
         "How far a node may stay away, a length; 0 is 1 % of the boundary's size.",
-        allowed=unless(lambda value: value >= 0.0, "a distance is not below 0")),
+        allowed=unless(lambda value: value >= 0.0, "a distance is not below 0"), is_length=True),
 }
 # fmt: on
 """The rows of the form; each field is also an attribute of `MotionEditor`, by its name here."""
@@ -265,36 +270,25 @@ class MotionEditor(QWidget):
             if name == "box":
                 self.form.addRow("", self.new_box)
                 self.form.addRow("Degrees", self.degree)
-        self.form.addRow(self.walls.title, self.walls)
         # One width for all labels, so that the fields do not jump from motion to motion.
         widest = max(label.sizeHint().width() for label in self._titles.values())
         for label in self._titles.values():
             label.setMinimumWidth(widest)
-        for choice in (
-            self.kind,
-            self.marker,
-            self.about,
-            self.box,
-            self.side,
-            self.change,
-            self.coordinates,
-        ):
+        for choice in self.findChildren(Choice):
             set_policy(choice, "Ignored", "Fixed")
+        self.form.addRow(self.walls.title, self.walls)
 
     def _connect(self) -> None:
         self.kind.chosen.connect(self._kind_chosen)
-        self.about.chosen.connect(self._about_chosen)
-        self.change.chosen.connect(self.drawn.change_kind)
-        for choice in (self.marker, self.box, self.side):
-            choice.chosen.connect(lambda _: self._emit_changed())
-        kinds = NumberField, VectorField, CheckedText
-        self._checked = [each for each in self._rows.values() if isinstance(each, kinds)]
-        for field in self._checked:
-            field.changed.connect(lambda _: self._emit_changed())
+        own = {"about": self._about_chosen, "change": self.drawn.change_kind}
+        signals: dict[type[QWidget], str] = {Choice: "chosen", TextField: "textEdited"}
+        for name in ("marker", *ROWS):
+            field = getattr(self, name)
+            signal = getattr(field, signals.get(type(field), "changed"))
+            signal.connect(own.get(name, lambda _: self._emit_changed()))
         self.degree.changed.connect(self._degree_typed)
         self.coordinates.chosen.connect(lambda system: self.box_changed.emit(None, system))
         self.drawn.changed.connect(self.changed)
-        self.path.textEdited.connect(lambda _: self._emit_changed())
 
     def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
         """Show a motion, offering ``targets`` and ``dim`` components; None hides the editor."""
@@ -335,12 +329,12 @@ class MotionEditor(QWidget):
         self.coordinates.show_value(self.system)
         self.coordinates.setVisible(mine and dim == 3)
         self.new_box.setText(f"New box around {target_words(motion.marker)}")
-        for vector in (self.vector, self.factors, self.point):
-            vector.set_count(dim)
         if "index" in shown:
             self.index.set_count(len(getattr(motion, ROWS["index"].attribute)) - (3 - dim))
-        for name, widget in self._rows.items():
-            self.form.setRowVisible(widget, name in shown)
+        for name, row in ROWS.items():
+            self.form.setRowVisible(self._rows[name], name in shown)
+            if row.per_axis:
+                getattr(self, name).set_count(dim)
 
     def _show_value(self, name: str, value: Any) -> None:
         """Show a value in the field of a row."""
@@ -436,8 +430,9 @@ class MotionEditor(QWidget):
     def show_another(self) -> None:
         """Reset what is not of the motion before another is shown: “a point”, invalid texts."""
         self._as_point = False
-        for field in self._checked:
-            field.restore()
+        for field in self._rows.values():
+            if isinstance(field, NumberField | VectorField | CheckedText):
+                field.restore()
 
     def focus(self) -> None:
         """Put the cursor into the first number field of the shown motion, and select its text."""
@@ -451,9 +446,11 @@ class MotionEditor(QWidget):
     def set_extent(self, extent: float) -> None:
         """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
         self.point.set_scale(extent)
-        lengths = self.amount, self.raised, self.distance, *self.vector.fields, *self.point.fields
-        for field in lengths:
-            field.extent = extent
+        for name, row in ROWS.items():
+            if row.is_length:
+                field = getattr(self, name)
+                for each in getattr(field, "fields", [field]):
+                    each.extent = extent
         self.drawn.set_extent(extent)
 
     def _emit_changed(self) -> None:
@@ -466,8 +463,8 @@ class MotionEditor(QWidget):
         if motion.stays_at:
             fixed = {"centroid": "centroid", "radial": "centroid", "line": None}
             values["point"] = fixed.get(self.about.currentData(), self.point.value)
-        if motion.stays_at and hasattr(motion, "axis"):
-            values["axis"] = self._typed("axis") if self._dim == 3 else Z
+            if hasattr(motion, "axis"):
+                values["axis"] = self._typed("axis") if self._dim == 3 else Z
         edited = replace(motion, marker=self._targets[self.marker.currentData()], **values)
         if edited != motion:
             self.changed.emit(edited)
