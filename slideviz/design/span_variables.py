@@ -1,4 +1,4 @@
-"""The values of curves over span as design variables: displacements, with exact derivatives."""
+"""Numbers of motions as design variables, as of curves over span, with exact derivatives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 
 class SpanVariables:
-    """The values at the points of all `SpanMotion` curves of a case, as design variables.
+    """The numbers of all motions of a case that have derivatives, as design variables.
+
+    These are the values at the points of all `SpanMotion` curves.
 
     `displacement` is what a `Deformer` of the same mesh and case takes, and `vjp` continues what
     its ``vjp`` returns, so that an optimiser has the gradient by the variables.
@@ -33,7 +35,7 @@ class SpanVariables:
     Notes
     -----
     Derivatives are exact where curves over span are smooth: not where two slopes in turn change
-    their sign. Motions of other kinds keep their values.
+    their sign. Other motions keep their values.
 
     Examples
     --------
@@ -57,18 +59,18 @@ class SpanVariables:
         Raises
         ------
         CaseError
-            The case has no motion over the span, or rotates, scales or pushes the same boundary
-            after one; or the case does not fit the mesh.
+            The case has no motion with derivatives, or a rotation, scale or push after one; or it
+            does not fit the mesh.
         """
-        span = [k for k, motion in enumerate(case.motions) if motion.has_derivatives]
-        if not span:
-            raise CaseError("the case has no motion over the span; add one, e.g. SpanMotion(...)")
-        _require_last(case, span[0])
+        known = [k for k, motion in enumerate(case.motions) if motion.has_derivatives]
+        if not known:
+            raise CaseError("the case has no motion with derivatives; add one, as SpanMotion(...)")
+        _require_last(case, known[0])
         moved = displacements(case, mesh)
         self.mesh = mesh
         self.case = case
         self.nodes = moved.nodes
-        self._at = {name: at for name, at in numbers_of(case).items() if at.motion in span}
+        self._at = {name: at for name, at in numbers_of(case).items() if at.motion in known}
         self.names = tuple(self._at)
         self.values = np.array([at.of(case) for at in self._at.values()])
 
@@ -137,10 +139,10 @@ class SpanVariables:
 
 
 def _require_last(case: Case, first: int) -> None:
-    """Raise CaseError if motion ``first``, over the span, comes before one of moved places."""
+    """Raise CaseError if a motion of moved places follows ``first``, which has derivatives."""
     for place, motion in enumerate(case.motions[first:], start=first + 1):
         if motion.depends_on_place:
             raise CaseError(
-                f"motion {place} turns or scales nodes that motion {first + 1} has moved over the "
-                "span, which has no derivatives; put it before that motion"
+                f"motion {place} turns or scales nodes that motion {first + 1} has moved, which "
+                "has no derivatives; put it before that motion"
             )

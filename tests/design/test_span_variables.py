@@ -85,7 +85,7 @@ def test_the_case_has_the_values_and_other_motions_stay(impeller):
 
 def test_what_has_no_such_derivatives_is_refused(impeller):
     mesh, case = impeller.mesh, impeller.case
-    with pytest.raises(CaseError, match="has no motion over the span; add one"):
+    with pytest.raises(CaseError, match="has no motion with derivatives; add one"):
         sv.SpanVariables(mesh, case.change(motions=(sv.Rotate("BLADE", 1.0),)))
     with pytest.raises(CaseError, match="motion 3 turns or scales nodes that motion 1 has moved"):
         sv.SpanVariables(mesh, case.change(motions=(*case.motions, sv.Rotate("BLADE", 1.0))))
