@@ -96,7 +96,11 @@ class Motion(CheckedFields):
     height_row: ClassVar[tuple[str, str]] = ("Raised by", "towards +y")
     """Title and direction of the row ``raised``."""
     stays_at: ClassVar[Texts] = ()
-    """What can stay in place: centroid or line, and point; () where the user does not choose."""
+    """What can stay in place: centroid or line, and point; () where the user does not choose.
+
+    Else its fields ``point`` and ``axis``, if it has one, are the rows About, Point and Axis of the
+    form, beside ``rows``; in 2D the window sets the axis to z.
+    """
     rows: ClassVar[Texts] = ()
     """The rows of its form in the window; the first one has the cursor at the beginning."""
     proportional: ClassVar[Texts] = ()
@@ -104,19 +108,25 @@ class Motion(CheckedFields):
     ratios: ClassVar[Texts] = ()
     """Fields that are 1 where nothing moves."""
     chosen: ClassVar[Texts] = ()
-    """Fields with numbers that say what moves, not how far."""
+    """Fields with numbers that say what moves, not how far; they are no design numbers."""
     file_words: ClassVar[str] = ""
     """What its file is."""
     has_table: ClassVar[bool] = False
     """Whether its file is a table that the user can edit in the window."""
     words: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Words of ``grammar`` for numbers that `design_numbers` names otherwise, and these names."""
+    """Each (word in ``grammar``, name in `design_numbers`), where these differ.
+
+    Known for all kinds: dx, dy, dz; px, py, pz; angle.
+    """
     in_zones: ClassVar[bool] = True
     """Whether what `placed` returns is found in each zone of a mesh alone."""
     one_zone: ClassVar[bool] = False
     """Whether it cannot move boundaries of several zones together."""
     has_derivatives: ClassVar[bool] = False
-    """Whether `derivatives` has those of its displacement by its numbers."""
+    """Whether `derivatives` has those of its displacement by its numbers.
+
+    `SpanVariables` then takes all its `design_numbers`. Not with ``depends_on_place``.
+    """
     lists_nodes: ClassVar[bool] = False
     """Whether it lists displacements of nodes; they cannot be scaled, and may be rounded."""
     only_3d: ClassVar[bool] = False
