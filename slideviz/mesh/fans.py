@@ -24,7 +24,14 @@ from slideviz.mesh.model import (
     row_dots,
     sealed,
 )
-from slideviz.mesh.topology import TINY, Boundary, corner_vectors, facet_vectors, unit
+from slideviz.mesh.topology import (
+    TINY,
+    Boundary,
+    corner_vectors,
+    facet_vectors,
+    real_corners,
+    unit,
+)
 from slideviz.system.jit_cache import njit
 
 
@@ -61,9 +68,7 @@ def find_fans(
     count, width = boundary.facets.shape
     facet = np.repeat(np.arange(count), width)
     node = boundary.facets.ravel()
-    real = np.ones(len(node), bool)
-    if width == 4:
-        real[3::4] = boundary.facets[:, 2] != boundary.facets[:, 3]
+    real = real_corners(boundary.facets).ravel()
     facet = facet[real]
     node = node[real]
     row = np.full(count * width, -1, np.int64)

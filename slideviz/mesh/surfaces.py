@@ -11,7 +11,14 @@ from slideviz.argument_types import record
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, offsets_of, row_norms
 from slideviz.mesh.polyhedra import whole_polygons
-from slideviz.mesh.topology import Boundary, distinct_edges, edge_keys, facet_edges, single_edges
+from slideviz.mesh.topology import (
+    Boundary,
+    distinct_edges,
+    edge_keys,
+    facet_edges,
+    real_corners,
+    single_edges,
+)
 from slideviz.system.weak_cache import WeakCache
 
 LEAST = 30_000  # facets of all boundaries together, below which there are no coarse surfaces
@@ -186,9 +193,8 @@ def lifted(points: FloatArray, by: float) -> FloatArray:
 
 def facet_connectivity(facets: IntArray) -> IntArray:
     """Return facets (f, 2 or k) as VTK's flat array: for each its number of nodes, then these."""
-    width = facets.shape[1]
-    sizes = min(width, 3) + (facets[:, 2:-1] != facets[:, 3:]).sum(axis=1)
-    return np.column_stack([sizes, facets])[np.arange(width + 1) <= sizes[:, None]]
+    sizes = real_corners(facets).sum(axis=1)
+    return np.column_stack([sizes, facets])[np.arange(facets.shape[1] + 1) <= sizes[:, None]]
 
 
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
@@ -215,8 +221,7 @@ def _whole_faces(mesh: Mesh, boundary: Boundary) -> tuple[IntArray, IntArray | s
     facets = boundary.facets
     if mesh.whole_cells is None or mesh.dim == 2:
         return facets, slice(None)
-    keep = np.ones(facets.shape, bool)
-    keep[facets[:, 2] == facets[:, 3], 3] = False
+    keep = real_corners(facets)
     offsets = offsets_of(keep.sum(axis=1))
     offsets, nodes, kept = whole_polygons(mesh, offsets, facets[keep], boundary.owner, sides=True)
     sizes = np.diff(offsets)[:, None]

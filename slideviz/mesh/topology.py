@@ -207,6 +207,13 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
     return turned
 
 
+def real_corners(facets: IntArray) -> BoolArray:
+    """Return the mask (f, k) of the corners of facets that do not repeat the last node."""
+    real = np.ones(facets.shape, bool)
+    real[:, 3:] = facets[:, 3:] != facets[:, 2:-1]
+    return real
+
+
 def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:
     """Return a normal (f, d) of each facet: its length is the line's (2D) or twice the area (3D).
 

@@ -53,7 +53,7 @@ from slideviz.mesh.model import (
     run_begins,
     sealed,
 )
-from slideviz.mesh.topology import Boundary, facet_vectors, unit
+from slideviz.mesh.topology import Boundary, facet_vectors, real_corners, unit
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.system.weak_cache import weak_cache
@@ -390,11 +390,9 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     """
     facets = columns.boundary.facets
     nodes = columns.nodes
-    width = _widths(facets)
     inward = -unit(facet_vectors(points, facets))
     total = np.zeros((len(nodes) + len(columns.bare), points.shape[1]))
-    for k in range(facets.shape[1]):  # a facet counts once in each of its columns
-        some = k < width
+    for k, some in enumerate(real_corners(facets).T):  # a facet counts once in each of its columns
         np.add.at(total, columns.corner[some, k], inward[some])
     normal = unit(total)
     edge = points[nodes[:, 1]] - points[nodes[:, 0]]
@@ -422,16 +420,10 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     return {name: sealed(part) for name, part in zip(VALUES, parts, strict=True)}
 
 
-def _widths(facets: IntArray) -> IntArray:
-    """Return the number of nodes (f,) of facets (f, 2 or 4)."""
-    return facets.shape[1] - (facets[:, -2] == facets[:, -1]).astype(int)
-
-
 def _middles(points: FloatArray, facets: IntArray) -> FloatArray:
     """Return the mean (f, d) of the nodes of facets (f, 2 or 4), each once."""
-    width = _widths(facets)[:, None, None]
-    real = np.arange(facets.shape[1])[:, None] < width
-    return np.sum(points[facets] * real / width, axis=1)
+    real = real_corners(facets)[:, :, None]
+    return np.sum(points[facets] * real / real.sum(axis=1, keepdims=True), axis=1)
 
 
 @record

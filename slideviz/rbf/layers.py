@@ -43,7 +43,7 @@ from slideviz.mesh.model import (
     row_numbers,
     run_begins,
 )
-from slideviz.mesh.topology import TINY, corner_vectors, distinct_edges, facet_edges
+from slideviz.mesh.topology import TINY, corner_vectors, distinct_edges, facet_edges, real_corners
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
@@ -182,9 +182,7 @@ class WallNodes:
         start = self.start
         dim = self.start.shape[1]
         count = len(start)
-        once = np.ones(facets.shape)
-        if dim == 3:  # a triangle repeats its last node, but counts once there
-            once[facets[:, 2] == facets[:, 3], 3] = 0.0
+        once = real_corners(facets).astype(float)
         corner = np.arange(facets.size) // facets.shape[1]
         at = facets.reshape(-1)
         total = np.bincount(at, once.reshape(-1), count)[:, None]

@@ -12,6 +12,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, Mesh, offsets_of
 from slideviz.mesh.surfaces import padded
+from slideviz.mesh.topology import real_corners
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import InPlane, Section
 from slideviz.system.jit_cache import njit
@@ -118,8 +119,7 @@ class Cutter:
             outer = _single(facets)
             facets = facets[outer]
             owner = owner[outer]
-        keep = np.ones(facets.shape, bool)
-        keep[facets[:, 2] == facets[:, 3], 3] = False
+        keep = real_corners(facets)
         used, corners = np.unique(facets[keep], return_inverse=True)
         polygons = Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
         return polygons.of_file_cells(self._mesh, sides=self.dim == 3)
