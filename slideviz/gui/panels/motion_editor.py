@@ -43,7 +43,17 @@ from slideviz.gui.widgets.fields import (
 from slideviz.gui.widgets.panel import SpanWalls
 from slideviz.gui.widgets.span_curve import SpanCurveField
 from slideviz.session.motions import radial
-from slideviz.terms import SIDES, SPAN_KINDS, FfdSystem, Numbers, Texts, WholeNumbers, labels, tips
+from slideviz.terms import (
+    AXES,
+    SIDES,
+    SPAN_KINDS,
+    FfdSystem,
+    Numbers,
+    Texts,
+    WholeNumbers,
+    labels,
+    tips,
+)
 
 ABOUT = {
     "centroid": "its centroid (mean of nodes)",
@@ -59,7 +69,6 @@ MEAN = (
 """Tip of the centroids among these."""
 
 
-Z = (0.0, 0.0, 1.0)  # axis of rotations in 2D
 KIND_LABELS = {kind: kind.kind_term.label for kind in KINDS}
 
 
@@ -464,7 +473,7 @@ class MotionEditor(QWidget):
             fixed = {"centroid": "centroid", "radial": "centroid", "line": None}
             values["point"] = fixed.get(self.about.currentData(), self.point.value)
             if hasattr(motion, "axis"):
-                values["axis"] = self._typed("axis") if self._dim == 3 else Z
+                values["axis"] = self._typed("axis") if self._dim == 3 else AXES["z"]
         edited = replace(motion, marker=self._targets[self.marker.currentData()], **values)
         if edited != motion:
             self.changed.emit(edited)

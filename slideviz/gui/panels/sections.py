@@ -43,18 +43,17 @@ from slideviz.gui.widgets.panel import Panel, SpanWalls
 from slideviz.gui.widgets.theme import set_icon
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.section_picture import SectionStyle
-from slideviz.sections.model import Section, Triple
+from slideviz.sections.model import Section
 from slideviz.session import changes, section_cuts
 from slideviz.session.passages import period_of
 from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import with_walls
 from slideviz.session.section_cuts import can_cut, first_section
 from slideviz.session.state import Session
+from slideviz.terms import AXES
 
 STEPS = 1000  # positions of the slider
-FREE = "free"
-AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-"""The directions that can be chosen by name."""
+FREE = "free"  # besides `AXES`, the direction that can be chosen
 
 
 class SectionEditor(QWidget):
