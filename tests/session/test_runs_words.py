@@ -8,7 +8,11 @@ import pytest
 from slideviz.case.keys import KEYS, METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.model import Case
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
 from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import KINDS
+from slideviz.case.motions.onto import Onto
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.mesh.quality import quality
@@ -95,28 +99,47 @@ def test_the_boundary_is_named_where_several_move():
     assert motion_labels([whole, BASE]) == ["all.txt", "rotate +5°"]
 
 
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (Rotate("blade", 5.0), Rotate("blade", 5.0, (0.0, 1.0))),
-        (Rotate("blade", 5.0), Rotate("blade", 5.0, "centroid", (0.0, 1.0, 0.0))),
-        (Rotate("blade", 5.0), Rotate("blade", 5.000001)),
-        (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0), (0.5, 0.0))),
-        (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0000001))),
-        (Radial("blade", 1.03), Radial("blade", 1.03, 0.0, (1.0, 0.0, 0.0))),
-        (Radial("blade", 1.03), Radial("blade", 1.0300001)),
-        (
-            SpanMotion("blade", "lean", (0.0,), (1.0,)),
-            SpanMotion("blade", "lean", (0.0,), (1.0,), (1, 2, 3)),
-        ),
-        (
-            SpanMotion("blade", "chord", (0.0,), (1.1,)),
-            SpanMotion("blade", "chord", (0.0,), (1.1000001,)),
-        ),
-        (Translate("blade", (0.1, 0.2)), Translate("blade", (0.1, 0.2000001))),
-        (FromFile(Path("a/shape.txt")), FromFile(Path("b/shape.txt"))),
-    ],
-)
+ALMOST = [
+    (Rotate("blade", 5.0), Rotate("blade", 5.0, (0.0, 1.0))),
+    (Rotate("blade", 5.0), Rotate("blade", 5.0, "centroid", (0.0, 1.0, 0.0))),
+    (Rotate("blade", 5.0), Rotate("blade", 5.000001)),
+    (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0), (0.5, 0.0))),
+    (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0000001))),
+    (Radial("blade", 1.03), Radial("blade", 1.03, 0.0, (1.0, 0.0, 0.0))),
+    (Radial("blade", 1.03), Radial("blade", 1.0300001)),
+    (
+        SpanMotion("blade", "lean", (0.0,), (1.0,)),
+        SpanMotion("blade", "lean", (0.0,), (1.0,), (1, 2, 3)),
+    ),
+    (
+        SpanMotion("blade", "chord", (0.0,), (1.1,)),
+        SpanMotion("blade", "chord", (0.0,), (1.1000001,)),
+    ),
+    (Translate("blade", (0.1, 0.2)), Translate("blade", (0.1, 0.2000001))),
+    (FromFile(Path("a/shape.txt")), FromFile(Path("b/shape.txt"))),
+    (Onto(Path("a/shape.stl")), Onto(Path("b/shape.stl"))),
+    (Onto(Path("shape.stl")), Onto(Path("shape.stl"), limit=0.1)),
+    (HicksHenne("blade", 0.1), HicksHenne("blade", 0.1, 0.5000001)),
+    (HicksHenne("blade", 0.1), HicksHenne("blade", 0.1, side="lower")),
+    (HicksHenne("blade", 0.1), HicksHenne("blade", 0.1, chord=(0.0, 1.0000001))),
+    (Cst("blade", 0.1), Cst("blade", 0.1, (1, 2))),
+    (Bump("blade", 0.1), Bump("blade", 0.1000001)),
+    (Ffd("blade", "A", (0, 1, 2), (0.0, 0.0, 1.0)), Ffd("blade", "B", (0, 1, 2), (0.0, 0.0, 1.0))),
+    (Ffd("blade", "A", (0, 1, 2), (0.0, 0.0, 1.0)), Ffd("blade", "A", (0, 2, 2), (0.0, 0.0, 1.0))),
+    (FfdCamber("blade", "A", (0, 1), 1.0), FfdCamber("blade", "A", (0, -1), 1.0)),
+    (FfdThickness("blade", "A", (0, 1), 1.0), FfdThickness("blade", "A", (0, 1), 1.0000001)),
+    (FfdTwist("blade", "A", 0, 5.0), FfdTwist("blade", "A", 0, 5.0, (1.0, 0.0, 0.0))),
+    (FfdTwist("blade", "A", 0, 5.0), FfdTwist("blade", "A", 0, 5.0, axis=(1.0, 0.0, 0.0))),
+    (FfdTwist("blade", "A", 0, 5.0), FfdTwist("blade", "A", 1, 5.0)),
+]
+"""Two motions each that differ in little, or where labels that are not exact have no word for."""
+
+
+def test_there_are_such_motions_of_every_kind():
+    assert {type(one) for one, _ in ALMOST} == {*KINDS}
+
+
+@pytest.mark.parametrize(("one", "other"), ALMOST)
 def test_different_motions_never_read_alike(one, other):
     labels = motion_labels([moved(one), moved(other), moved(Translate("blade", (9.0, 9.0)))])
     assert len(set(labels)) == 3

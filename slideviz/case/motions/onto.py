@@ -119,7 +119,8 @@ class Onto(FromFile):
         return f"lay onto {self.path.name or '(no file yet)'}"
 
     def label(self, form: str, *, exact: bool) -> str:
-        return f"lay onto {super().label(form, exact=exact)}"
+        limit = f", at most {self.limit:{form}} away" if exact and self.limit else ""
+        return f"lay onto {super().label(form, exact=exact)}{limit}"
 
     def problems(self, case: Case, mesh: Mesh, place: int) -> Iterator[str]:
         for marker in case.markers_with("moving"):
