@@ -11,15 +11,18 @@ from hypothesis import strategies as st
 from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.case.motion_text import read_motions, write_motions
-from slideviz.case.motions.box import Ffd
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness, FfdTwist
 from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import KINDS
+from slideviz.case.motions.onto import Onto
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.case.motions.span import SpanMotion
 from slideviz.case.moving_nodes import displacement_of
 from slideviz.case.values import MAX_STEPS
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING, SPAN_KINDS
+from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SIDES, SLIDING, SPAN_KINDS
 
 finite = st.floats(-1e50, 1e50)
 angle = st.floats(-1e9, 1e9)
@@ -49,17 +52,33 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
     factors = st.lists(positive, min_size=1, max_size=3).map(tuple)
     several = st.lists(marker, min_size=2, max_size=4).map(dict.fromkeys).map(tuple)
     marker = marker | several.filter(lambda found: len(found) > 1) | st.just("")
-    vector = st.tuples(finite, finite) | st.tuples(finite, finite, finite)
-    return st.one_of(
-        st.builds(Translate, marker, vector),
-        st.builds(Rotate, marker, angle, point, axis),
-        st.builds(Scale, marker, factors, point),
-        st.builds(Radial, marker, positive, finite, axis, st.tuples(finite, finite, finite)),
-        st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
-        st.builds(Ffd, marker, text, index, st.tuples(finite, finite, finite)),
-        st.builds(FromFile, path, marker),
-        curves(marker),
-    )
+    three = st.tuples(finite, finite, finite)
+    vector = st.tuples(finite, finite) | three
+    side = st.sampled_from(list(SIDES))
+    peak = st.floats(0, 1, exclude_min=True, exclude_max=True)
+    chord = st.lists(finite, min_size=2, max_size=2, unique=True).map(sorted).map(tuple)
+    term = st.lists(st.integers(1, 100), min_size=2, max_size=2).map(sorted).map(tuple)
+    number = st.integers(-1, 99)
+    column = marker, text, st.tuples(number, number), finite
+    kinds = {
+        Translate: st.builds(Translate, marker, vector),
+        Rotate: st.builds(Rotate, marker, angle, point, axis),
+        Scale: st.builds(Scale, marker, factors, point),
+        Radial: st.builds(Radial, marker, positive, finite, axis, three)
+        | st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
+        HicksHenne: st.builds(HicksHenne, marker, finite, peak, side, chord),
+        Cst: st.builds(Cst, marker, finite, term, side, chord),
+        Bump: st.builds(Bump, marker, finite, peak, chord),
+        Ffd: st.builds(Ffd, marker, text, index, three),
+        FfdCamber: st.builds(FfdCamber, *column),
+        FfdThickness: st.builds(FfdThickness, *column),
+        FfdTwist: st.builds(FfdTwist, marker, text, number, angle, three, axis),
+        SpanMotion: curves(marker),
+        FromFile: st.builds(FromFile, path, marker),
+        Onto: st.builds(Onto, path, marker, st.just(0.0) | positive),
+    }
+    assert {*kinds} == {*KINDS}
+    return st.one_of(*kinds.values())
 
 
 @st.composite

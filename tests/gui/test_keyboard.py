@@ -9,8 +9,11 @@ from qtpy.QtGui import QContextMenuEvent, QImage
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
-from slideviz.case.motions.box import Ffd, FfdCamber
+from slideviz.case.motions.airfoil import Bump, Cst, HicksHenne
+from slideviz.case.motions.box import Ffd, FfdCamber, FfdThickness
 from slideviz.case.motions.file import FromFile
+from slideviz.case.motions.kinds import KINDS
+from slideviz.case.motions.onto import Onto
 from slideviz.case.motions.rigid import Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
@@ -160,13 +163,19 @@ FIRST = {
     Rotate: lambda editor: editor.angle,
     Scale: lambda editor: editor.factors.fields[0],
     Radial: lambda editor: editor.percent,
+    HicksHenne: lambda editor: editor.raised,
+    Cst: lambda editor: editor.raised,
+    Bump: lambda editor: editor.raised,
     Ffd: lambda editor: editor.index.fields[0],
     FfdCamber: lambda editor: editor.index.fields[0],
+    FfdThickness: lambda editor: editor.index.fields[0],
     FromFile: lambda editor: editor.path,
+    Onto: lambda editor: editor.path,
 }
 
 
 def test_what_is_typed_after_adding_a_motion_goes_into_its_first_field(opened):
+    assert {*FIRST} == {kind for kind in KINDS if not kind.only_3d}
     for kind, first in FIRST.items():
         opened.add_motion(kind)
         field = first(opened.window.motions.editor)

@@ -1,7 +1,10 @@
 """The motion panel: what its fields show, keep and refuse, for 2D and 3D meshes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
@@ -134,6 +137,10 @@ def test_the_list_tells_the_point_of_a_2d_rotation_and_of_a_box_what_is_missing(
 
 MOVED = {
     Translate: lambda p: p + np.r_[0.02, np.zeros(p.shape[1] - 1)],
+    Rotate: lambda p: (
+        np.c_[(p - p.mean(axis=0))[:, :2] @ [[0, 1], [-1, 0]], p[:, 2:]]
+        + [*p.mean(axis=0)[:2], *[0.0] * (p.shape[1] - 2)]
+    ),
     Scale: lambda p: p.mean(axis=0) + (p - p.mean(axis=0)) * np.r_[1.2, np.ones(p.shape[1] - 1)],
     Radial: lambda p: np.c_[1.1 * p[:, :2], p[:, 2:]],
 }
@@ -145,6 +152,7 @@ def type_first(driver, kind):
     form = editor(driver)
     field, text = {
         Translate: (form.vector.fields[0], "0.02"),
+        Rotate: (form.angle, "90"),
         Scale: (form.factors.fields[0], "1.2"),
         Radial: (form.percent, "10"),
     }[kind]
@@ -558,3 +566,33 @@ def test_a_boundary_is_laid_onto_a_surface_without_blocking_the_window(driver, t
 def test_the_editor_has_a_row_for_each_field_of_each_kind(kind):
     fields = {*kind.__dataclass_fields__}
     assert {ROWS[name].attribute for name in kind.rows} <= fields | {*dir(kind)}
+
+
+def test_arrow_keys_step_every_length_by_the_size_of_the_mesh(blade):
+    extent = blade.session.mesh.extent
+    for name, row in ROWS.items():
+        field = getattr(editor(blade), name)
+        for each in getattr(field, "fields", [field]):
+            assert not row.is_length or each.extent == extent, name
+    put(blade, Onto(Path("none.stl"), "airfoil"))
+    QTest.keyClick(editor(blade).limit, Qt.Key.Key_Up)
+    assert 0.001 * extent < blade.session.case.motions[0].limit <= 0.01 * extent
+
+
+IN_TESTS_OF_THEIR_OWN = {
+    HicksHenne: test_bumps_on_an_airfoil_are_shown_edited_and_kept,
+    Cst: test_bumps_on_an_airfoil_are_shown_edited_and_kept,
+    Bump: test_bumps_on_an_airfoil_are_shown_edited_and_kept,
+    Ffd: test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers,
+    FfdCamber: test_camber_and_thickness_of_a_box_are_shown_edited_and_kept,
+    FfdThickness: test_camber_and_thickness_of_a_box_are_shown_edited_and_kept,
+    FfdTwist: test_twist_of_a_box_is_shown_edited_and_kept,
+    SpanMotion: test_a_curve_over_span_is_typed_checked_and_shown_with_its_ghost,
+    FromFile: test_a_new_table_is_saved_and_used_and_its_rows_are_changed,
+    Onto: test_a_boundary_is_laid_onto_a_surface_without_blocking_the_window,
+}
+"""Tests of kinds that need a box, a curve or a file, or move an airfoil alone."""
+
+
+def test_every_kind_is_typed_in_a_test():
+    assert {*MOVED, *IN_TESTS_OF_THEIR_OWN} == {*KINDS}
