@@ -19,7 +19,7 @@ from slideviz.errors import DeformError, messages_of
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
 from slideviz.rbf.images import misfits
-from slideviz.rbf.problem import Solution
+from slideviz.rbf.problem import StepSolution
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.node_types import typed_nodes
@@ -376,7 +376,7 @@ def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
         prepare(Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),)), mesh)
     )
     for error, note in ((1e-12, True), (1e-3, False)):
-        solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
+        solution = StepSolution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
         (warning,) = messages_of(stepping._dropped_warning(setup, solution, 1, 2, mesh))
         assert (warning.level == "note") == note
         assert f"error there is at most {error:.2g}" in str(warning)
