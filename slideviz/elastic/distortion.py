@@ -206,13 +206,47 @@ class Distortion:
 
 
 def _write_coupling(points: FloatArray, nodes: IntArray, out: FloatArray, rows: slice) -> None:
-    """Write lam of cells (m,) with ``nodes`` (m, n), in ``rows``."""
-    corners = points[nodes[rows]]
-    apart = corners - corners.mean(axis=1, keepdims=True)
-    squares = np.linalg.eigvalsh(np.einsum("mai,maj->mij", apart, apart))
-    thinness = np.sqrt(np.maximum(squares[:, 0], 0.0) / np.maximum(squares[:, -1], 1e-300))
-    t = np.minimum(thinness / THIN, 1.0)
-    out[rows] = COUPLING * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    write_coupling(points, nodes[rows], out[rows])
+
+
+@njit
+def write_coupling(points, nodes, out):  # type: ignore[no-untyped-def]
+    """Write lam of cells (m,) with ``nodes`` (m, n): of their thinness, by their inertia."""
+    n = nodes.shape[1]
+    d = points.shape[1]
+    inertia = np.empty((d, d))
+    centre = np.empty(d)
+    for cell in range(len(nodes)):
+        inertia[:] = 0.0
+        centre[:] = 0.0
+        for k in range(n):
+            for i in range(d):
+                centre[i] += points[nodes[cell, k], i] / n
+        for k in range(n):
+            for i in range(d):
+                for j in range(d):
+                    a = points[nodes[cell, k], i] - centre[i]
+                    inertia[i, j] += a * (points[nodes[cell, k], j] - centre[j])
+        mean = 0.0
+        for i in range(d):
+            mean += inertia[i, i] / d
+        for i in range(d):
+            inertia[i, i] -= mean
+        # The extreme eigenvalues, by the trigonometric solution of the characteristic equation.
+        size = 0.0
+        for i in range(d):
+            for j in range(d):
+                size += inertia[i, j] ** 2
+        size = np.sqrt(size / 6.0) if d == 3 else np.sqrt(0.125 * size)
+        angle = 0.0
+        if d == 3 and size > 0.0:
+            det = dot3(inertia[0], cross3(inertia[1], inertia[2]))
+            angle = np.arccos(min(max(0.5 * det / size**3, -1.0), 1.0)) / 3.0
+        most = mean + 2.0 * size * np.cos(angle)
+        turn = 2.0 * np.pi / 3.0 if d == 3 else np.pi
+        least = mean + 2.0 * size * np.cos(angle + turn)
+        t = min(np.sqrt(max(least, 0.0) / max(most, 1e-300)) / THIN, 1.0)
+        out[cell] = COUPLING * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
 
 
 @njit
@@ -440,12 +474,18 @@ def write_slopes(  # type: ignore[no-untyped-def]
 
 
 @njit
-def write_laplacians(points, nodes, table, weight, out):  # type: ignore[no-untyped-def]
-    """Write the mean over corners of grad N_a . W grad N_b, with W (m, d, d), to out (m, n, n)."""
+def write_couplings(points, nodes, table, numbers, weight, out):  # type: ignore[no-untyped-def]
+    """Write the Laplacians of cells (m,), with W (m, d, d), as couplings (m, e) of their edges.
+
+    At a corner o, u has the gradient sum_a g_a (u_a - u_o), and the mean over corners of g_a . W
+    g_b (u_a - u_o) (u_b - u_o), summed over a and b, is that of couplings times squares of
+    differences along edges. Pairs a, b that no edge joins are left out: in hexahedra whose edges
+    are orthogonal they are zero. ``numbers`` (n, n): the edge of two nodes, or -1.
+    """
     n = nodes.shape[1]
     d = points.shape[1]
     start = np.zeros((3, n, LANES))
-    entries = np.empty((n, n, LANES))
+    entries = np.empty((out.shape[1], LANES))
     scale = np.empty(LANES)
     products = np.empty((3, 3, LANES))
     w = np.zeros((3, 3, LANES))
@@ -472,22 +512,22 @@ def write_laplacians(points, nodes, table, weight, out):  # type: ignore[no-unty
                         z,
                         (w[0, 2, c], w[1, 2, c], w[2, 2, c]),
                     )
-                    for a in range(3):
+                    for a in range(b + 1):
                         products[a, b, c] = dot3(duals[a], one)
-            o = corner[0]
-            for a in range(d):
-                for b in range(d):
-                    i = corner[1 + a]
-                    j = corner[1 + b]
-                    for c in range(LANES):
-                        entries[i, j, c] += products[a, b, c]
-                    for c in range(LANES):
-                        entries[o, j, c] -= products[a, b, c]
-                    for c in range(LANES):
-                        entries[i, o, c] -= products[a, b, c]
-                    for c in range(LANES):
-                        entries[o, o, c] += products[a, b, c]
+            for b in range(d):
+                along = numbers[corner[0], corner[1 + b]]
+                for c in range(LANES):
+                    entries[along, c] += products[b, b, c]
+                for a in range(b):
+                    other = numbers[corner[0], corner[1 + a]]
+                    across = numbers[corner[1 + a], corner[1 + b]]
+                    if across >= 0:
+                        for c in range(LANES):
+                            entries[along, c] += products[a, b, c]
+                        for c in range(LANES):
+                            entries[other, c] += products[a, b, c]
+                        for c in range(LANES):
+                            entries[across, c] -= products[a, b, c]
         for c in range(count):
-            for i in range(n):
-                for j in range(n):
-                    out[first + c, i, j] = entries[i, j, c]
+            for k in range(out.shape[1]):
+                out[first + c, k] = entries[k, c]

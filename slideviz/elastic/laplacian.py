@@ -5,13 +5,15 @@ equivalent to its elasticity (Korn's inequality), does not care how cells are tu
 number where elasticity has d by d. In relaxation it depends on the undeformed mesh and on which
 nodes move together only, so one hierarchy serves all steps, runs and designs of a mesh.
 
-Levels are made by smoothed aggregation (Vanek, Mandel and Brezina 1996). Components that are held
-at different nodes share aggregates and the finest matrix, and have numbers of their own, side by
-side, in all others. Rows are smoothed in parts of fixed size, side by side. What couples a row to
-other parts is added to its diagonal, so that the sweep converges whatever the parts are (Baker,
-Falgout, Kolev and Yang 2011, Multigrid smoothers for ultraparallel computing, section 5), with the
-same bits for any number of threads. Matrices are stored in single precision, and vectors in double:
-the cycle is a symmetric matrix to rounding, as derivatives need it.
+Nodes are coupled along edges alone: what couples others is small or, in skewed cells, is left out
+of the diagonals, too. Levels are made by smoothed aggregation (Vanek, Mandel and Brezina 1996) of
+strong couplings, those across layers first, since the smoother ends only those errors. Components
+that are held at different nodes share aggregates and the finest matrix, and have numbers of their
+own, side by side, in all others. Rows are smoothed in parts of fixed size, side by side. What
+couples a row to other parts is added to its diagonal, so that the sweep converges whatever the
+parts are (Baker, Falgout, Kolev and Yang 2011, Multigrid smoothers for ultraparallel computing,
+section 5), with the same bits for any number of threads. Matrices are stored in single precision,
+and vectors in double: the cycle is a symmetric matrix to rounding, as derivatives need it.
 """
 
 from __future__ import annotations
@@ -27,10 +29,11 @@ from pyamg.aggregation import standard_aggregation
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
-from slideviz.elastic.distortion import write_laplacians
+from slideviz.elastic.distortion import write_couplings
 from slideviz.elastic.stiffness import by_node
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, add3, row3
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, offsets_of
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.solve import enough_threads
 from slideviz.rbf.tape import transform, value
@@ -54,12 +57,27 @@ positive definite."""
 
 CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
+WEAK = 0.25, 0.1
+"""Entries of the finest matrix, and of others, that are weak: below this part of the geometric mean
+of the largest ones of both nodes. These share no aggregates then: in layers, which are columns."""
+
 OMEGA = 4.0 / 3.0  # damping of the Jacobi step that smooths prolongations, by row sums
 
 
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 """indptr, indices and data (k, w) of a sparse matrix; w = 1, or a number for each group of
 components."""
+
+
+def _numbers(edges: Sequence[tuple[int, int]]) -> IntArray:
+    """Return the number (8, 8) of the edge between two nodes of a cell; -1: there is none."""
+    out = np.full((8, 8), -1)
+    for number, (i, j) in enumerate(edges):
+        out[i, j] = out[j, i] = number
+    return out
+
+
+EDGES = {vtk: _numbers(row.edges) for vtk, row in ELEMENTS.items()}
 
 
 class CellPart(Protocol):
@@ -188,10 +206,10 @@ def _hierarchy(
 
     ``free`` (k, w): 1 in the rows of each group that are not held, 0 in others.
     """
-    levels = []
+    levels: list[LaplacianLevel] = []
     modes = free
     while len(modes) > COARSE:
-        up, modes_below = _prolongation(matrix, modes)
+        up, modes_below = _prolongation(_strong(matrix, WEAK[len(levels) > 0]), modes)
         count = len(modes_below)
         down = _rearranged(up, lambda each: each.T.tocsr(), count)
         below = _product(down, _product(matrix, up, count), count)
@@ -225,28 +243,36 @@ def _factor(dense: FloatArray) -> Any:
             ridge *= 100.0
 
 
+def _strong(matrix: Sparse, weak: float) -> Sparse:
+    """Return a matrix without its weak entries, which are added to the diagonal."""
+    indptr = np.zeros_like(matrix[0])
+    indices = np.empty_like(matrix[1])
+    data = np.empty_like(matrix[2])
+    stop = write_strong(matrix, weak, indptr, indices, data)
+    return indptr, indices[:stop], data[:stop]
+
+
 def _prolongation(matrix: Sparse, modes: FloatArray) -> tuple[Sparse, FloatArray]:
     """Return the prolongation to the rows of a matrix, and the modes (l, w) of the coarser level.
 
+    ``matrix``: of strong entries.
     ``modes`` (k, w) of each group are those that it keeps: nearly constant, zero in held rows.
     """
-    free = modes > 0.0
     aggregates = standard_aggregation(_of_group(matrix, 0))[0].tocsr()
     below = np.sqrt(aggregates.T @ modes**2)
     owned = np.flatnonzero(np.diff(aggregates.indptr))
     tentative = np.zeros_like(modes)
     tentative[owned] = modes[owned] / np.maximum(below[aggregates.indices], 1e-300)
     plain = aggregates.indptr, aggregates.indices, tentative[owned]
-    indptr, indices, data = _product(matrix, plain, len(below))
+    up = _product(matrix, plain, len(below))
+    free = modes > 0.0
     size = np.empty_like(modes)
     absolute_sums(matrix, free, size)
-    scale = np.divide(OMEGA, size, out=np.zeros_like(modes), where=free)
-    row = np.repeat(np.arange(len(modes)), np.diff(indptr))
+    scale = np.divide(OMEGA, size, out=np.zeros_like(modes), where=free & (size > 0.0))
     owner = np.full(len(modes), -1)
     owner[owned] = aggregates.indices
-    data *= -scale[row]
-    data += tentative[row] * (indices == owner[row])[:, None]
-    return (indptr, indices, data), below
+    smooth(up, scale, owner, tentative)
+    return up, below
 
 
 def _of_group(matrix: Sparse, group: int) -> csr_array:
@@ -296,42 +322,53 @@ def laplacian(
 
     ``weight`` (m, d, d): what the gradients in each cell are multiplied by; None: the body's.
 
-    Each row has its diagonal, which is less the sum of the others and of those of known nodes:
-    entries are rounded to single precision, but constants still have no energy.
+    Rows have entries for the unknowns with which they share an edge. The diagonal is less the sum
+    of the others and of those of known nodes: entries are rounded to single precision, but
+    constants still have no energy.
     """
-    sizes = np.array([part.nodes.shape for part in body.parts], np.int64).reshape(-1, 2)
-    entries = np.empty(int((sizes[:, 0] * sizes[:, 1] ** 2).sum()), np.float32)
-    first = 0
-    cell = 0
+    cells = np.array([len(part.nodes) for part in body.parts])
+    nodes = np.array([part.nodes.shape[1] for part in body.parts])
+    tables = np.stack([EDGES[part.vtk] for part in body.parts])
+    edges = tables.max(axis=(1, 2)) + 1
+    ends = np.cumsum(cells)
+    stops = np.cumsum(cells * edges)
+    couplings = np.empty(stops[-1], np.float32)
     given = body.weights if weight is None else weight
-    for part in body.parts:
-        m, a = part.nodes.shape
-        own = given[cell : cell + m]
-        cell += m
-        mine = entries[first : first + m * a * a].reshape(m, a, a)
-        first += m * a * a
-        in_parts(partial(_write_part, body.points, part, own, mine), m)
+    for part, table, end, stop in zip(body.parts, tables, ends, stops, strict=True):
+        m = len(part.nodes)
+        e = int(table.max()) + 1
+        out = couplings[stop - m * e : stop].reshape(m, e)
+        in_parts(partial(_write_part, body.points, part, table, given[end - m : end], out), m)
     corners = np.concatenate([place[part.nodes].ravel() for part in body.parts]).astype(np.int32)
+    begins = offsets_of(np.repeat(nodes, cells)).astype(np.int32)
     starts, order = by_node(corners + 1, count + 1)
-    graph = starts[1:], order, corners, sizes
+    cell = np.repeat(np.arange(ends[-1], dtype=np.int32), np.repeat(nodes, cells))
+    graph = starts[1:], cell[order], begins, corners
+    most = 1 + int(np.diff(starts[1:]).max()) * len(tables[0])
+    kinds = ends, edges, stops, tables, most
     indptr = np.zeros(count + 1, np.int32)
     with one_at_a_time(len(corners) * 10):
-        assemble(graph, entries, indptr, np.empty(0, np.int32), np.empty((0, 1)))
+        assemble(graph, kinds, couplings, indptr, np.empty(0, np.int32), np.empty((0, 1)))
         np.cumsum(indptr, out=indptr)
         indices = np.empty(indptr[-1], np.int32)
         data = np.empty((indptr[-1], 1))
-        assemble(graph, entries, indptr, indices, data)
+        assemble(graph, kinds, couplings, indptr, indices, data)
     return indptr, indices, data
 
 
 def _write_part(
-    points: FloatArray, part: CellPart, weight: FloatArray, out: np.ndarray, rows: slice
+    points: FloatArray,
+    part: CellPart,
+    table: IntArray,
+    weight: FloatArray,
+    out: np.ndarray,
+    rows: slice,
 ) -> None:
     own = weight[rows]
     if own.ndim == 1:
         own = own[:, None, None] * np.eye(points.shape[1])
     own = np.ascontiguousarray(own)
-    write_laplacians(points, part.nodes[rows], CORNERS[part.vtk], own, out[rows])
+    write_couplings(points, part.nodes[rows], CORNERS[part.vtk], table, own, out[rows])
 
 
 def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> LaplacianLevel:
@@ -346,68 +383,67 @@ def _single(matrix: Sparse) -> Sparse:
 
 
 @njit(parallel=True)
-def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-def]
+def assemble(graph, kinds, couplings, indptr, indices, data):  # type: ignore[no-untyped-def]
     """Write the rows of the Laplacian, sorted; where ``indices`` is empty, count their entries.
 
-    The number of a row's entries goes to indptr[row + 1]. ``graph``: the corners of each unknown
-    (indptr, order), the unknown of each corner, and the shape (p, 2) of the parts' nodes;
-    ``entries``: the matrices of the elements, in order.
+    The number of a row's entries goes to indptr[row + 1]. ``graph``: the cells of each unknown
+    (indptr, indices), and the unknowns of each cell (indptr, indices), -1 of known nodes.
+    ``kinds``: of each part the cells and the couplings up to its end, its edges, and their numbers
+    by nodes; and the largest number of entries of a row.
     """
-    starts, order, corners, sizes = graph
+    starts, cells, begins, corners = graph
+    ends, edges, stops, tables, most = kinds
     rows = len(indptr) - 1
     chunk = max(PART, rows // CHUNKS + 1)
     for part in prange((rows + chunk - 1) // chunk):
-        place = np.full(rows, -1)
-        stop = np.int64(indptr[part * chunk]) if len(indices) else np.int64(0)
+        found = np.empty(most, np.int32)
+        sums = np.empty(most)
         for row in range(part * chunk, min(rows, (part + 1) * chunk)):
-            base = stop
-            diagonal = 0.0
-            place[row] = base
-            stop = stop + 1
-            if len(indices):
-                indices[base] = row
+            count = 1
+            found[0] = row
+            sums[0] = 0.0
             for k in range(starts[row], starts[row + 1]):
-                corner = np.int64(order[k])
-                first = np.int64(0)
-                ahead = np.int64(0)
+                cell = cells[k]
+                if k > starts[row] and cell == cells[k - 1]:
+                    continue  # with an image of itself
                 p = 0
-                while corner - first >= sizes[p, 0] * sizes[p, 1]:
-                    first += sizes[p, 0] * sizes[p, 1]
-                    ahead += sizes[p, 0] * sizes[p, 1] * sizes[p, 1]
+                while cell >= ends[p]:
                     p += 1
-                a = sizes[p, 1]
-                ahead += (corner - first) * a
-                first = corner - (corner - first) % a
-                for b in range(a):
-                    column = corners[first + b]
-                    entry = np.float64(entries[ahead + b])
-                    if column == row:
-                        continue  # itself, or an image of it in the same element
-                    diagonal -= entry
-                    if column < 0:
+                first = stops[p] - (ends[p] - cell) * edges[p]
+                begin = begins[cell]
+                size = begins[cell + 1] - begin
+                for i in range(size):
+                    if corners[begin + i] != row:
                         continue
-                    if place[column] < base:
-                        place[column] = stop
-                        stop = stop + 1
-                        if len(indices):
-                            indices[place[column]] = column
-                            data[place[column], 0] = 0.0
-                    if len(indices):
-                        data[place[column], 0] += entry
+                    for j in range(size):
+                        column = corners[begin + j]
+                        edge = tables[p, i, j]
+                        if edge < 0 or column == row:
+                            continue
+                        coupling = np.float64(couplings[first + edge])
+                        sums[0] += coupling
+                        if column < 0:
+                            continue
+                        at = 1
+                        while at < count and found[at] != column:
+                            at += 1
+                        if at == count:
+                            found[at] = column
+                            sums[at] = 0.0
+                            count += 1
+                        sums[at] -= coupling
             if len(indices) == 0:
-                indptr[row + 1] = stop - base
+                indptr[row + 1] = count
                 continue
-            data[base, 0] = diagonal
-            for k in range(base + 1, stop):
-                column = indices[k]
-                entry = data[k, 0]
-                at = k
-                while at > base and indices[at - 1] > column:
+            base = indptr[row]
+            for k in range(count):
+                at = base + k
+                while at > base and indices[at - 1] > found[k]:
                     indices[at] = indices[at - 1]
                     data[at, 0] = data[at - 1, 0]
                     at -= 1
-                indices[at] = column
-                data[at, 0] = entry
+                indices[at] = found[k]
+                data[at, 0] = sums[k]
 
 
 @njit(parallel=True)
@@ -440,6 +476,51 @@ def add_rows(one, two, columns, indptr, indices, data):  # type: ignore[no-untyp
                             data[place[column], g] += one[2][k, min(g, top)] * two[2][m, g]
             if len(indices) == 0:
                 indptr[row + 1] = stop - base
+
+
+@njit
+def write_strong(matrix, weak, indptr, indices, data):  # type: ignore[no-untyped-def]
+    """Write a matrix as `_strong` returns it, from the begin of arrays; return their length."""
+    before, columns, entries = matrix
+    sizes = np.zeros(len(columns))
+    own = np.zeros(len(indptr) - 1)
+    for row in range(len(own)):
+        for k in range(before[row], before[row + 1]):
+            for g in range(entries.shape[1]):
+                sizes[k] += abs(entries[k, g])
+            if columns[k] != row:
+                own[row] = max(own[row], sizes[k])
+    stop = 0
+    for row in range(len(own)):
+        middle = stop
+        for k in range(before[row], before[row + 1]):
+            j = columns[k]
+            if j == row:
+                middle = stop
+            if j == row or sizes[k] >= weak * np.sqrt(own[row] * own[j]):
+                indices[stop] = j
+                for g in range(entries.shape[1]):
+                    data[stop, g] = entries[k, g]
+                stop += 1
+        for k in range(before[row], before[row + 1]):
+            j = columns[k]
+            if j != row and not sizes[k] >= weak * np.sqrt(own[row] * own[j]):
+                for g in range(entries.shape[1]):
+                    data[middle, g] += entries[k, g]
+        indptr[row + 1] = stop
+    return stop
+
+
+@njit
+def smooth(up, scale, aggregate, tentative):  # type: ignore[no-untyped-def]
+    """Replace the product of a matrix with a tentative prolongation by the smoothed one."""
+    indptr, indices, data = up
+    for row in range(len(scale)):
+        for k in range(indptr[row], indptr[row + 1]):
+            for g in range(data.shape[1]):
+                data[k, g] *= -scale[row, g]
+                if indices[k] == aggregate[row]:
+                    data[k, g] += tentative[row, g]
 
 
 @njit

@@ -36,11 +36,11 @@ from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
 from slideviz.rbf.tape import Array, multiply, put, recorded, take, value
 
 WINDOW = 3
-NEAR = 0.15
+NEAR = 0.25
 
 SOON = 0.05
 SMALL = 10_000
-RESIDUAL = 1.4e-2
+RESIDUAL = 1.3e-2
 LOOSE = 0.1
 """The residual at which L-BFGS ends: its square is the part of the energy that an iteration takes
 away, the mean over the last `WINDOW`. `SOON`: where derivatives are wanted, for which Newton's
@@ -255,7 +255,9 @@ class _Way:
 
         Return whether none is.
         """
-        memory = Memory(len(self._unknowns.owner) * self.x.shape[1], self._preconditioned, PAIRS)
+        memory = Memory(
+            len(self._unknowns.owner) * self.x.shape[1], self._preconditioned, PAIRS, np.float32
+        )
         least = self._energy.slopes(self.x, 0.0, 1.0)[2]
         folded = np.count_nonzero(least <= 0.0)
         for _ in range(ROUNDS):
@@ -371,7 +373,7 @@ class _Way:
         """Minimise the energy with one ``worst`` (kappa) and one regularisation of folded cells."""
         now, slopes, _ = self._energy.slopes(self.x, worst, epsilon)
         gradient = self._unknowns.collected(slopes)
-        memory.change_function()
+        memory.clear()
         along = self._function(worst, epsilon)
         nothing = AT_REST * self._energy.count
         values = [now]
@@ -530,7 +532,7 @@ class Unknowns:
     problem: Problem
     body: Body
     place: IntArray  # (n,): number of each node's block; -1 for known nodes
-    inside: IntArray  # nodes with unknowns
+    known: IntArray  # nodes without unknowns
     owner: IntArray  # (k,): the node of each block
     others: IntArray  # further nodes with the block of another
     turned: IntArray
@@ -545,6 +547,7 @@ class Unknowns:
     def of(cls, problem: Problem, body: Body, held: IntArray) -> Unknowns:
         """Return the unknowns where nodes ``held`` (m,) stay, all of them free."""
         place, turn = unknowns(problem, body, np.unique(problem.same_as[held]))
+        known = np.flatnonzero(place < 0)
         inside = np.flatnonzero(place >= 0)
         owner = np.zeros(int(place.max(initial=-1)) + 1, np.int64)
         owner[place[inside[::-1]]] = inside[::-1]
@@ -553,7 +556,7 @@ class Unknowns:
         rows = held_rows(problem, body, place)
         none = np.empty(0, np.int64)
         return cls(
-            problem, body, place, inside, owner, others, turned, turn[turned], rows, none, turn[:0]
+            problem, body, place, known, owner, others, turned, turn[turned], rows, none, turn[:0]
         )
 
     def on(self, constraints: Constraints, at: FloatArray) -> Unknowns:
@@ -584,15 +587,17 @@ class Unknowns:
 
     def moved(self, unknown: FloatArray) -> FloatArray:
         """Return the Cartesian displacement (n, d) of unknowns (k, d); zero for known nodes."""
-        out = np.zeros((len(self.place), unknown.shape[1]))
-        out[self.inside] = self.within(unknown)[self.place[self.inside]]
+        out = self.within(unknown)[self.place]
+        out[self.known] = 0.0
         out[self.turned] = np.einsum("nij,nj->ni", self.turn, out[self.turned])
         return out
 
     def collected(self, slopes: FloatArray) -> FloatArray:
         """Return the slopes (k, d) by the unknowns, of slopes (n, d) by the nodes."""
-        own = slopes.copy()
-        own[self.turned] = np.einsum("nji,nj->ni", self.turn, slopes[self.turned])
+        own = slopes
+        if len(self.turned):
+            own = slopes.copy()
+            own[self.turned] = np.einsum("nji,nj->ni", self.turn, slopes[self.turned])
         out = own[self.owner]
         np.add.at(out, self.place[self.others], own[self.others])
         return self.within(out)

@@ -20,6 +20,7 @@ from slideviz.elastic import relaxation
 from slideviz.elastic.distortion import Distortion
 from slideviz.elastic.laplacian import PART, LaplacianCycle, laplacian
 from slideviz.errors import DeformError
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS
 from slideviz.session.opening import guess_case, guess_roles
 from slideviz.solver.prescribed import displaced, support_radius
@@ -179,7 +180,7 @@ def test_the_preconditioner_is_symmetric_positive_and_holds_components():
 
 
 @pytest.mark.parametrize("kind", ["plain", "prism", "pyramid", "tetra"])
-def test_the_laplacian_is_the_sum_over_corners(kind):
+def test_the_laplacian_is_the_sum_over_corners_of_products_along_edges(kind):
     mesh = builders.cube(3, kind)
     body = Distortion.of(mesh.points, mesh.cells)
     place = np.arange(len(mesh.points)) // 2 - 3  # images in and across elements, known nodes
@@ -195,7 +196,12 @@ def test_the_laplacian_is_the_sum_over_corners(kind):
                 slopes = np.zeros((3, len(nodes)))
                 slopes[:, others] = np.linalg.inv(edges)
                 slopes[:, o] = -slopes.sum(axis=1)
-                one = (1.0 + coupling) / len(table) * slopes.T @ slopes
+                apart = np.eye(len(nodes)) - np.eye(len(nodes))[o]
+                one = np.zeros((len(nodes), len(nodes)))
+                for a, b in itertools.product(others, others):
+                    if a == b or {(a, b), (b, a)} & set(ELEMENTS[part.vtk].edges):
+                        one += slopes[:, a] @ slopes[:, b] * np.outer(apart[a], apart[b])
+                one *= (1.0 + coupling) / len(table)
                 np.add.at(dense, np.ix_(at[at >= 0], at[at >= 0]), one[use])
     indptr, indices, data = laplacian(body, place, count)
     assert all(np.all(np.diff(indices[a:b]) > 0) for a, b in itertools.pairwise(indptr))

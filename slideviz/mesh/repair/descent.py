@@ -79,9 +79,11 @@ class Memory:
         count: int,
         precondition: Callable[[FloatArray], FloatArray],
         pairs: int = CORRECTIONS,
+        store: type[np.floating] = np.float64,
     ) -> None:
+        """``pairs``: most of them, kept in numbers of the type ``store``."""
         self._precondition = precondition
-        self._steps, self._changes, self._smoothed = np.empty((3, pairs, count))
+        self._steps, self._changes, self._smoothed = np.empty((3, pairs, count), store)
         self._products, self._factors = np.empty((2, pairs))
         self._order = np.empty(0, np.int64)
         self._scale = 1.0
@@ -94,10 +96,6 @@ class Memory:
         """Forget all pairs."""
         self._order = self._order[:0]
         self._scale = 1.0
-        self._before = None
-
-    def change_function(self) -> None:
-        """Keep the pairs for another function, whose Hessian is much the same."""
         self._before = None
 
     def add(self, step: FloatArray, change: FloatArray, gradient: FloatArray) -> None:
@@ -116,7 +114,7 @@ class Memory:
             self._changes[k] = change.ravel()
             self._smoothed[k] = (smooth - before).ravel()
             self._products[k] = product
-            self._scale = product / dot(self._changes[k], self._smoothed[k])
+            self._scale = product / dot(change.ravel(), (smooth - before).ravel())
 
     def inverse_times(self, gradient: FloatArray) -> FloatArray:
         """Return the inverse Hessian times a gradient (b, d), that of the last pair."""
