@@ -386,6 +386,9 @@ class _Way:
             self.residual = float(np.sqrt(max(left, 0.0) / max(now, nothing)))
             if self.residual <= residual:
                 break
+            if gain > 2.0 * now:  # half of it is expected: more than all the energy
+                direction *= 2.0 * now / gain
+                gain = 2.0 * now
             found = line_search(along, np.zeros_like(direction), now, direction, -gain, np.inf)
             if found is None:
                 break
