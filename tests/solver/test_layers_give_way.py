@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -146,6 +146,8 @@ def test_heights_are_continuous_in_the_motion(columns, core, gap):
     tilt=st.floats(-0.5, 0.5),
     along=st.floats(-0.02, 0.02),
 )
+@example(columns=27, gap=0.05439810717600817, tilt=0.4127555772777217, along=0.004265431030687196)
+@example(columns=22, gap=0.050036682167140537, tilt=0.4584136317779519, along=0.017028583088576753)
 @settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
 def test_gaps_close_in_any_direction(columns, gap, tilt, along):
     """The lower wall comes near the upper one obliquely, and a little along it."""
