@@ -69,7 +69,7 @@ Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 components."""
 
 
-def _numbers(edges: Sequence[tuple[int, int]]) -> IntArray:
+def _numbers(edges: Sequence[Sequence[int]]) -> IntArray:
     """Return the number (8, 8) of the edge between two nodes of a cell; -1: there is none."""
     out = np.full((8, 8), -1)
     for number, (i, j) in enumerate(edges):
