@@ -414,8 +414,7 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
         if row.values is None:
             cells = np.empty(0, np.int64)
             if row.status is not None and not limit.holds(actual):
-                mask = quality.status == row.status
-                cells = np.flatnonzero(mask if quality.copies is None else mask & ~quality.copies)
+                cells = quality.cells_with(row.status)
             return LimitResult(limit, actual, cells)
     assert row.values is not None
     values, ids, boundary, names = row.values(measured, limit.marker)

@@ -30,6 +30,7 @@ from slideviz.mesh.model import (
     Skin,
     checked_reference,
     row_norms,
+    run_begins,
     sealed,
 )
 from slideviz.mesh.orientation import reference_of
@@ -264,7 +265,7 @@ def _of_cells(mesh: Mesh, name: Metric, values: FloatArray) -> MetricValues:
     if mesh.whole_cells is None:
         counted = slice(None) if mesh.halo is None else ~mesh.halo.cells
         return MetricValues(name, values, values, counted)
-    first = np.diff(mesh.whole_cells, prepend=-1) > 0
+    first = run_begins(mesh.whole_cells)
     worst = np.minimum if METRICS[name].best == "high" else np.maximum
     values = sealed(worst.reduceat(values, np.flatnonzero(first))[np.cumsum(first) - 1])
     return MetricValues(name, values, values, first)

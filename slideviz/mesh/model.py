@@ -422,7 +422,7 @@ class Mesh:
         """Return the VTK identifier (c,) of each cell of the file; see `CELL_NAMES`."""
         if self.whole_cells is None:
             return self.cells.types
-        first = np.diff(self.whole_cells, prepend=-1) > 0
+        first = run_begins(self.whole_cells)
         polyhedron = 7 if self.dim == 2 else 42
         several = np.bincount(self.whole_cells) > 1
         return np.where(several, polyhedron, self.cells.types[first]).astype(np.uint8)

@@ -37,6 +37,7 @@ from slideviz.mesh.model import (
     Mesh,
     Signs,
     checked_reference,
+    run_begins,
     sealed,
 )
 from slideviz.mesh.orientation import reference_of
@@ -282,8 +283,12 @@ class Quality:
     @check_types
     def inverted_cells(self, n: int | None = None) -> IntArray:
         """Return the ids, ascending, of the (first ``n``) inverted cells, without the halo's."""
-        mask = self.status == INVERTED
-        return np.flatnonzero(mask if self.copies is None else mask & ~self.copies)[:n]
+        return self.cells_with(INVERTED)[:n]
+
+    def cells_with(self, status: int) -> IntArray:
+        """Return the ids, ascending, of the cells with a ``status``, without the halo's."""
+        mask = self.status == status
+        return np.flatnonzero(mask if self.copies is None else mask & ~self.copies)
 
     @check_types
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
@@ -356,7 +361,7 @@ def _of_whole(parts: Quality, cell: IntArray) -> Quality:
 
     ``cell`` (m,), ascending: the number of the polyhedron that each is in.
     """
-    first = np.diff(cell, prepend=-1) > 0
+    first = run_begins(cell)
     worst = np.lexsort((parts.values, cell))[first][np.cumsum(first) - 1]
     rank = np.array([VALID, UNPROVEN, INVERTED])  # from the best to the worst, and back
     states = rank[np.maximum.reduceat(rank[parts.status], np.flatnonzero(first))]

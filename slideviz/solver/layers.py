@@ -141,10 +141,10 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
         for label in np.unique(part):
             some = np.flatnonzero(chosen)[part == label]
             extent = np.ptp(points[np.unique(boundary.facets[some])], axis=0).max()
-            flat = some[height[some] > 0.0]
-            fading = np.maximum(2.0 * length[some] - 6.0 * height[some], height[some])
-            fading[height[some] == 0.0] = np.inf
-            usual = np.median(fading[np.isfinite(fading)]) if len(flat) else np.inf
+            high = height[some]
+            flat = high > 0.0
+            fading = np.where(flat, np.maximum(2.0 * length[some] - 6.0 * high, high), np.inf)
+            usual = np.median(fading[flat]) if flat.any() else np.inf
             thickness = _thickness(boundary.facets[some], fading, min(SIZE * extent, usual))
             if case.layer_thickness:
                 thickness[:] = min(case.layer_thickness, mesh.extent)
@@ -154,7 +154,7 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
                     boundary.facets[some],
                     sides[some],
                     thickness,
-                    _first_heights(columns, rise, some, height[flat]),
+                    _first_heights(columns, rise, some, high[flat]),
                     role == "moving",
                 )
             )

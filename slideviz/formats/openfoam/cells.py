@@ -27,6 +27,7 @@ from slideviz.mesh.model import (
     ranges,
     row_dots,
     row_norms,
+    run_begins,
     sealed,
 )
 from slideviz.mesh.orientation import corner_sums
@@ -323,7 +324,7 @@ def _tops(centres: FloatArray, corners: FloatArray, rank: IntArray) -> FloatArra
     normals = normals[some]
     places = corners[some, 0]
     rank = np.searchsorted(hidden, rank[some])
-    first = np.flatnonzero(np.diff(rank, prepend=-1))
+    first = np.flatnonzero(run_begins(rank))
     tops = centres[hidden]
     reach = np.zeros((len(tops), 1))
     least = np.full(len(tops), np.inf)
