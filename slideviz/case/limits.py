@@ -103,9 +103,11 @@ def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
 
 
 def _margins(measured: MeasuredMesh, _: str) -> Values:
-    assert measured.mesh is not None
+    mesh = measured.mesh
+    assert mesh is not None
     assert measured.reference is not None
-    return Values(cell_margins(measured.mesh, measured.reference))
+    margins = cell_margins(mesh, measured.reference)
+    return Values(margins, mesh.first_parts(np.arange(len(margins))))
 
 
 def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:

@@ -14,6 +14,7 @@ from slideviz.cli import run
 from slideviz.export.titles import mark_words
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.polyhedra import outlines
+from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces, is_closed
 from slideviz.scene.actors import CELL, POINT, part_shape
 from slideviz.sections.cut import Cutter
@@ -210,6 +211,21 @@ def test_reports_have_numbers_and_types_of_the_files_cells(folded, hexagons, tmp
     assert [int(row["cell"]) for row in rows] == list(range(18))
     assert {int(row["cell"]) for row in rows if row["status"] == "inverted"} == cells
     capsys.readouterr()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_limit_on_the_margin_counts_every_part(hexagons, seed):
+    random = np.random.default_rng(seed)
+    points = hexagons.points + random.uniform(-0.05, 0.05, hexagons.points.shape)
+    moved = hexagons.with_points(points)
+    margins = cell_margins(moved, hexagons)
+    first = np.flatnonzero(np.diff(hexagons.whole_cells, prepend=-1))
+    least = np.minimum.reduceat(margins, first)
+    limit = float(np.median(least))
+    [found] = sv.quality(moved, hexagons, limits=f"margin > {limit!r}").limits
+    assert found.actual == margins.min() < margins[first].min()
+    assert {*found.cells} == {*first[least <= limit]}
+    assert len({*found.cells}) == len(found.cells)
 
 
 def test_messages_have_numbers_of_the_files_cells(folded, hexagons, tmp_path, capsys):
