@@ -177,6 +177,7 @@ def test_each_change_that_can_be_undone_has_words():
         "replace_section": "section",
         "scale_motions": "scaled motion",
         "set_case": "settings",
+        "set_keys": "settings",
         "set_role": "role",
         "set_view": "view",
         "show_boundaries": "hidden boundaries",
