@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 from slideviz.errors import CaseError, not_one_of
-from slideviz.terms import AXES, RATED, Quantity, Texts, WholeNumbers, field_of
+from slideviz.terms import AXES, RATED, Quantity, Range, Texts, WholeNumbers, field_of
 
 if TYPE_CHECKING:
     from slideviz.case.limits import Limit
@@ -106,7 +106,7 @@ def pair_of_names(text: str) -> tuple[str, str]:
     return first, second
 
 
-def limits(text: str) -> tuple[float, float]:
+def limits(text: str) -> Range:
     """Return the two numbers of a text like ``0.2,0.9``."""
     low, high = _numbers(text, (2,), "lowest,highest, e.g. 0.2,0.9")
     return low, high

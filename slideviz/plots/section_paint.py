@@ -25,12 +25,13 @@ from slideviz.terms import (
     ColorBy,
     Metric,
     Quantity,
+    Range,
     field_of,
     quantity_of,
 )
 
 
-def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
+def clipped(values: FloatArray, limits: Range) -> FloatArray:
     """Return values (k,) clipped to limits; NaN and inf stay (inverted, at no wall)."""
     return np.where(np.isinf(values), values, np.clip(values, *limits))
 
@@ -43,7 +44,7 @@ class Paint:
     values: FloatArray  # (m,): its value in every cell
     inverted: np.ndarray
     """(m,): whether each cell is inverted, and drawn in the color of inverted cells."""
-    limits: tuple[float, float]  # (float, float): the values at the ends of the color map
+    limits: Range  # (float, float): the values at the ends of the color map
     color_map: str = COLOR_MAP  # a color map of matplotlib
 
     def within(self, low: float, high: float) -> Paint:

@@ -38,6 +38,7 @@ from slideviz.terms import (
     SIZE_SKEW,
     WALL_VALUES,
     ColorBy,
+    Range,
     quantity_of,
 )
 
@@ -250,7 +251,6 @@ def _line(section: Section) -> Section:
 
 LEAST_SPREAD = 0.05  # least range of qualities that the axis shows
 MOST_COMPARED = 4  # most runs that are compared with the shown one, so that lines can be told apart
-Range = tuple[float, float]
 
 
 def histogram_limits(session: Session, full_range: bool) -> Range:
@@ -279,7 +279,7 @@ def histogram_limits(session: Session, full_range: bool) -> Range:
     return rounded_out(0.0 if full_range else low, high)
 
 
-def whole_range(what: ColorBy) -> tuple[float, float]:
+def whole_range(what: ColorBy) -> Range:
     """Return the ends of all possible values of a quantity that are of interest."""
     if what == "displacement" or what in WALL_VALUES:
         return 0.0, np.inf
@@ -381,7 +381,7 @@ BINS = 25
 def distribution(
     frame: StepFrame,
     what: ColorBy,
-    limits: tuple[float, float] = (0.0, 1.0),
+    limits: Range = (0.0, 1.0),
     reference: Mesh | Quality | None = None,
 ) -> Distribution:
     """Return the distribution of a frame's values ``what`` in `BINS` equal intervals of limits.
@@ -398,9 +398,7 @@ def distribution(
 
 
 @weak_cache
-def spread(
-    frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None
-) -> tuple[float, float] | None:
+def spread(frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None) -> Range | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
     totals = frame.quality.of_mesh
     if totals is not None:
