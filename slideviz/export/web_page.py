@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, row_norms
 from slideviz.scene.legend import has_inverted
 from slideviz.scene.scene import Scene
 from slideviz.session.state import Session
@@ -83,7 +83,7 @@ def web_page(scene: Scene, session: Session, title: str) -> str:
         scale = camera.distance * np.tan(np.radians(camera.view_angle / 2.0))
     drawn = [group for group in groups.values() if group.places]
     places = [each for group in drawn for each in group.places]
-    farthest = max((np.linalg.norm(each - focus, axis=1).max() for each in places), default=scale)
+    farthest = max((row_norms(each - focus).max() for each in places), default=scale)
     data = {
         "groups": [group.data(focus, scale) for group in drawn],
         "turn": np.concatenate([np.cross(up, back), up, back]).tolist(),

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.errors import SlidevizError, not_one_of, point_words
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 
 TINY = 0.05  # size of the moved boundaries, relative to the mesh's, below which a detail is shown
 MARGIN = 2.5  # width of a detail relative to that of the moved boundaries
@@ -100,7 +100,7 @@ def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
 
 def lengths(mesh: Mesh, base: Mesh) -> FloatArray:
     """Return the length of the displacement of each node, (n,)."""
-    return np.linalg.norm(mesh.points - base.points, axis=1)
+    return row_norms(mesh.points - base.points)
 
 
 def _inner_bodies(base: Mesh, length: FloatArray) -> list[IntArray]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.color_scheme import LIGHT, ColorScheme
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, DrawnBoundary
@@ -275,11 +275,11 @@ class Scene:
         if not len(nodes):
             return None
         pixels = pick.to_display(self.plotter, padded(mesh.points[nodes]))
-        away = np.linalg.norm(pixels - (x, y), axis=1)
+        away = row_norms(pixels - (x, y))
         if found is None:
             near = int(away.argmin())
         else:  # not one behind it
-            near = int(np.linalg.norm(mesh.points[nodes] - found[1], axis=1).argmin())
+            near = int(row_norms(mesh.points[nodes] - found[1]).argmin())
         if away[near] <= pick.REACH * self.stage.pixel_scale:
             return Pick((int(nodes[near]),))
         return None if found is None else Pick.between(mesh, nodes, found[1])

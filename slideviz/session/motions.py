@@ -29,7 +29,7 @@ from slideviz.case.motions.onto import is_laid
 from slideviz.case.moving_nodes import displacements, moved_together, placed_displacements
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.ffd.box import CORNERS, Box, CoordinateSystem, Index
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_norm, row_norms
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.zones import marker_zones
 from slideviz.session.state import Session
@@ -81,7 +81,7 @@ class TableRows:
             first, *others = error.messages
             first = replace(first, place=(f"Line {first.line}",) if first.line else ())
             raise CaseError(f"{first} ({len(others)} more)" if others else first) from error
-        moved = np.linalg.norm(read.vectors, axis=1)
+        moved = row_norms(read.vectors)
         return (
             f"{np.count_nonzero(moved):,} of {len(self.nodes):,} nodes of {self.of} move, "
             f"by at most {moved.max():.4g}"
@@ -320,7 +320,7 @@ def largest_prescribed(case: Case, mesh: Mesh) -> float:
         vectors = displacements(case, mesh).vectors if is_laid(case, mesh) else np.empty((0, 3))
     except (OSError, SlidevizError):
         return 0.0
-    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+    return largest_norm(vectors)
 
 
 def support_key(case: Case, mesh: Mesh) -> tuple[object, ...]:
@@ -373,7 +373,7 @@ def support_words(session: Session) -> str:
     shape = "circle" if mesh.dim == 2 else "sphere"
     middles = boxes.mean(axis=1)
     low, high = mesh.bounds
-    farthest = np.linalg.norm(np.maximum(high - middles, middles - low), axis=1)
+    farthest = row_norms(np.maximum(high - middles, middles - low))
     if radius > farthest.max():
         return f"Support radius{of}: {radius:.4g}, a {shape} larger than the whole mesh"
     return f"Support radius{of}: {radius:.4g}, a {shape} around what moves; F shows all"

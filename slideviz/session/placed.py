@@ -20,7 +20,7 @@ from slideviz.case.motions.box import Ffd
 from slideviz.case.motions.motion import Motion, MotionStart, Target, applies_to, named
 from slideviz.case.motions.rigid import ByFormula, Radial, Rotate, Scale, Translate, rotated
 from slideviz.ffd.box import CoordinateSystem, points_at
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, Mesh, row_norms
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.around_axis import AboutAxis
 from slideviz.sections.model import Section
@@ -534,7 +534,7 @@ def _control(session: Session, index: int, motion: Ffd) -> PlacedControl | None:
     axes, names = _axes(session, origin)
     if system.kind != "CARTESIAN":
         ways = system.pushed(np.tile(q, (3, 1)), np.eye(3))
-        axes = ways / np.linalg.norm(ways, axis=1)[:, None]
+        axes = ways / row_norms(ways)[:, None]
         names = "rta"
         if mesh.dim == 2:
             return None

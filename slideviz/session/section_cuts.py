@@ -17,7 +17,7 @@ import numpy as np
 
 from slideviz.argument_types import record
 from slideviz.case.section_shapes import SECTION_SHAPES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Skin, row_norms
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.surfaces import padded
@@ -60,7 +60,7 @@ class Groups:
         low = np.concatenate(lows)
         high = np.concatenate(highs)
         scale = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
-        return cls((low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0, scale)
+        return cls((low + high) / 2.0, row_norms(high - low) / 2.0, scale)
 
     def met_by(self, section: Section) -> IntArray:
         """Return the numbers (k,) of the groups that a section may cut."""

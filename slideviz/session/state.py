@@ -18,7 +18,7 @@ from slideviz.case.model import Case
 from slideviz.errors import MeshError, Message
 from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.metrics import is_known, metric
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Skin, row_norms
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import Walls, walls
@@ -185,7 +185,7 @@ class Preview:
 
     def off(self, last: StepFrame, undeformed: Mesh) -> tuple[float, float]:
         """Return ``Run.preview_off`` for the last step of the run of the same case."""
-        apart = np.linalg.norm(self.frame.mesh.points - last.mesh.points, axis=1)
+        apart = row_norms(self.frame.mesh.points - last.mesh.points)
         largest = last.largest_displacement(undeformed) or 1.0
         return float(apart.max()) / largest, self.frame.quality.min - last.quality.min
 

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, row_norms
 from slideviz.scene.handle import (
     EDGE_PX,
     REACH_PX,
@@ -97,7 +97,7 @@ class HandleMouse(QObject):
         within = np.all((pixels >= EDGE_PX) & (pixels <= end), axis=1)
         if within[0] or not within.any():
             return found
-        far = np.linalg.norm(pixels - (EDGE_PX + end) / 2.0, axis=1)
+        far = row_norms(pixels - (EDGE_PX + end) / 2.0)
         return found.anchored(int(np.argmin(np.where(within, far, np.inf))))
 
     def put(self) -> None:
