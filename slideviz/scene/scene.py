@@ -265,21 +265,17 @@ class Scene:
             return None
         mesh = self.session.frame.mesh
         found = self._pick_place(x, y)
-        shown = [
-            one.surface.nodes for name, one in self.drawn.items()
-            if name not in self.session.view.hidden
-        ]  # fmt: skip
-        nodes = np.concatenate([np.empty(0, np.int64), *shown])
-        if found is not None:
+        if found is None:
+            nodes = mesh.nodes_of(self.drawn.keys() - self.session.view.hidden)
+            if not len(nodes):
+                return None
+        else:
             nodes = nodes_of(mesh, found[0])
-        if not len(nodes):
-            return None
         pixels = pick.to_display(self.plotter, padded(mesh.points[nodes]))
         away = row_norms(pixels - (x, y))
-        if found is None:
-            near = int(away.argmin())
-        else:  # not one behind it
-            near = int(row_norms(mesh.points[nodes] - found[1]).argmin())
+        # Of a cell not a node behind the one that is seen.
+        far = away if found is None else row_norms(mesh.points[nodes] - found[1])
+        near = int(far.argmin())
         if away[near] <= pick.REACH * self.stage.pixel_scale:
             return Pick((int(nodes[near]),))
         return None if found is None else Pick.between(mesh, nodes, found[1])
