@@ -189,7 +189,7 @@ def test_each_change_that_can_be_undone_has_words():
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
     passing = {"selected", "frame", "marked_cell", "marked_in", "beside", "swapped", "ranges"}
-    passing |= {"color_by", "motion_index"}
+    passing |= {"color_by", "motion_index", "picks"}
     other_changes = {"section_index", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
