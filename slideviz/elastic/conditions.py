@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.elastic.stiffness import Conditions, ShapeBlock, Stiffness
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -16,7 +17,7 @@ from slideviz.rbf.problem import Problem
 from slideviz.rbf.tape import value
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Body:
     """The mesh as an elastic body, the same over all steps."""
 
@@ -96,7 +97,7 @@ def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
     return frame.turns(periods)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeldRows:
     """Directions in which unknowns may not move, as rows: normals of sliding nodes, then axis."""
 

@@ -16,11 +16,11 @@ round some work on what the one before left. A cell in a plane has a third edge 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.elastic.stiffness import by_node
 from slideviz.mesh.jacobians import (
     CORNERS,
@@ -48,7 +48,7 @@ LEAST = 1e-3  # part of a cell's largest curvature that others have at least
 FLAT = 1e-12  # Jacobian of an undeformed corner over the product of its edges; flatter are left out
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Part:
     """The cells of one type."""
 
@@ -58,7 +58,7 @@ class Part:
     coupling: FloatArray  # (m,): lam
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Distortion:
     """The distortion energy of a mesh, compared with its undeformed points."""
 

@@ -19,7 +19,6 @@ and vectors in double: the cycle is a symmetric matrix to rounding, as derivativ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
@@ -29,6 +28,7 @@ from pyamg.aggregation import standard_aggregation
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
+from slideviz.argument_types import record
 from slideviz.elastic.distortion import write_couplings
 from slideviz.elastic.stiffness import by_node
 from slideviz.mesh.elements import ELEMENTS
@@ -108,7 +108,7 @@ class ElasticBody(Protocol):
         """Return what the gradients in each cell are multiplied by, (m,), in the parts' order."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LaplacianLevel:
     """A level of the hierarchy."""
 
@@ -122,7 +122,7 @@ class LaplacianLevel:
     down: Sparse  # `up`, `down`: prolongation from the next coarser level, and restriction to it
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LaplacianCycle:
     """One V-cycle for the Laplacian of each component: a symmetric, positive definite map."""
 

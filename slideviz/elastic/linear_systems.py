@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Thread
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ from scipy.linalg import eigvalsh_tridiagonal
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 
+from slideviz.argument_types import record
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
@@ -44,7 +45,7 @@ MAKING = 0.3  # the part of the progress at which the hierarchy is made
 Made = TypeVar("Made")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LinearSolution:
     """What the solver found."""
 

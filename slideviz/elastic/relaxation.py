@@ -23,6 +23,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.argument_types import record
 from slideviz.elastic.conditions import Body, HeldRows, held_rows, projections, unknowns
 from slideviz.elastic.distortion import WORST, Distortion
 from slideviz.elastic.laplacian import LaplacianCycle, held_components
@@ -99,7 +100,7 @@ Projection = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
 the displacements (m, d) with which they are on their boundary."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Walls:
     """The boundaries on which nodes slide."""
 
@@ -107,7 +108,7 @@ class Walls:
     project: Projection
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FlatWalls:
     """Planes and lines, one for each sliding node: a `Projection`."""
 
@@ -120,7 +121,7 @@ class FlatWalls:
         return self.anchor + np.einsum("mij,mj->mi", self.matrix, away) - coords[nodes]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Prepared:
     """What is kept of a mesh: its energy, and its last preconditioner."""
 
@@ -134,7 +135,7 @@ class _Prepared:
 _MADE: WeakKeyDictionary[Mesh, _Prepared] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Relaxation:
     """The relaxation of deformed meshes."""
 
@@ -524,7 +525,7 @@ def _slid(problem: Problem, displacement: Array, tie: Callable[[Array], Array]) 
     return tie(put(displacement, sliding, on))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Unknowns:
     """Maps between unknowns (k, d) and vectors of nodes (n, d).
 

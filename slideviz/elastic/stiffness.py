@@ -20,13 +20,14 @@ unknowns, only g_i. The matrix is symmetric with blocks d by d, as the solver ta
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 from scipy.spatial import KDTree
 
+from slideviz.argument_types import record
 from slideviz.errors import DeformError
 from slideviz.mesh.jacobians import cross3, dot3, row3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array, sealed
@@ -53,7 +54,7 @@ _ORDER = {5: 1, 9: 2, 10: 1, 12: 2}
 """Degree of the polynomials that the integration rule integrates exactly."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ReferenceShape:
     """A reference element."""
 
@@ -128,7 +129,7 @@ def _pyramid() -> ReferenceShape:
     return ReferenceShape(gradients, np.full(len(places), 2.0 / 15.0))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ShapeBlock:
     """The elements of a mesh that have one shape."""
 
@@ -152,7 +153,7 @@ CHUNK = 20_000  # elements between two calls of tick: some tens of milliseconds
 POISSON = 0.3  # Poisson's ratio of a case that names none, and of relaxation
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Stiffness:
     """How stiff the cells of a body are."""
 
@@ -195,7 +196,7 @@ MODULI: dict[StiffnessType, Callable[[FloatArray, list[ShapeBlock], Stiffness], 
 """Young's modulus (c,) of each cell, by kind of stiffness, from positions (n, d) and elements."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Conditions:
     """Boundary conditions of all nodes, u_i = T_i z_k + g_i."""
 
@@ -208,7 +209,7 @@ class Conditions:
     free: FloatArray  # (k, d, d): P_k of each block of unknowns
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ElasticMesh:
     """A mesh as an elastic body, at given positions."""
 
