@@ -1,8 +1,8 @@
 """The types of arguments, checked by their annotations where a program calls slideviz.
 
 ``check_types`` is a decorator for functions, ``check_fields`` the ``__post_init__`` of dataclasses.
-A check takes microseconds: neither belongs into inner loops. ``record`` is the decorator of values
-with arrays.
+A check takes microseconds: neither belongs into inner loops. ``frozen`` is the decorator of values,
+``record`` that of values with arrays.
 """
 
 from __future__ import annotations
@@ -125,6 +125,12 @@ def check_fields(value: Any) -> None:
         known = field.metadata
         if known and chosen not in (*known, field.default):
             raise CaseError(f"{name}: {not_one_of(chosen, known)}")
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def frozen(kind: type[Result]) -> type[Result]:
+    """Return a class as a frozen dataclass whose values are equal where their fields are."""
+    return dataclass(frozen=True)(kind)
 
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))

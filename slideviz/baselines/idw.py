@@ -12,12 +12,10 @@ surfaces, each displaced by the nodes known before, and projected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import prange
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.mesh.model import NO_NODES, FloatArray, IntArray
 from slideviz.rbf.compiled import fast, squared_distance
 from slideviz.rbf.constraint_rows import merge
@@ -32,7 +30,7 @@ TINY = 1e-24
 that no other node counts."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Weights:
     """Settings of inverse distance weighting."""
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.lines import listed, read_text
 from slideviz.case.words import COMMENT_SIGNS, number
 from slideviz.errors import CaseError, Message, Remark, raise_all, shown
@@ -29,7 +29,7 @@ _SEPARATORS = str.maketrans(",;", "  ")
 PART = 4000  # lines that are turned into numbers at a time, so that other threads get a turn
 
 
-@dataclass(frozen=True)
+@frozen
 class Columns:
     """The columns of a file with a line for each node, such as displacements or coordinates."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
 
 from slideviz import terms
-from slideviz.argument_types import CheckedFields
+from slideviz.argument_types import CheckedFields, frozen
 from slideviz.case.limits import Limit, read_limits
 from slideviz.case.motions.motion import Motion
 from slideviz.errors import CaseError, Remark, not_one_of
@@ -18,7 +18,7 @@ from slideviz.rbf.reduction import AUTO, Reduction
 _ROLES = 'a role for each marker, e.g. {"blade": "moving"}'
 
 
-@dataclass(frozen=True)
+@frozen
 class CaseFields(CheckedFields):
     """The fields of `slideviz.case.model.Case`, each of the right type."""
 

@@ -10,7 +10,7 @@ AUTO_TOLERANCE of `slideviz.solver.setup`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from slideviz import terms
+from slideviz.argument_types import frozen
 from slideviz.case.fields import CaseFields
 from slideviz.case.limits import LIMITS
 from slideviz.case.motion_text import MOTIONS
@@ -87,7 +88,7 @@ VIEW = "View"
 GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY, VIEW)
 
 
-@dataclass(frozen=True)
+@frozen
 class Key:
     """A key of the case file."""
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from slideviz.argument_types import CheckedFields, check_types, record
+from slideviz.argument_types import CheckedFields, check_types, frozen, record
 from slideviz.case.values import Kind
 from slideviz.case.words import first_of, name_text, number
 from slideviz.errors import CaseError, Message, Remark, nearest, not_one_of, raise_all, shown
@@ -68,7 +68,7 @@ class Values(NamedTuple):
     names: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitNumber:
     """A number that can be limited: of the whole mesh (``total``), of each cell, or both."""
 
@@ -187,7 +187,7 @@ NUMBERS: Mapping[str, LimitNumber] = {
 boundary after @ or at all with layers, and all metrics."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Limit(CheckedFields):
     """A limit on a number of a deformed mesh, such as ``Limit("min", ">", 0.3)``.
 

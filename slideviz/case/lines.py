@@ -6,9 +6,9 @@ import codecs
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
+from slideviz.argument_types import frozen
 from slideviz.case.words import COMMENT_SIGNS, without_comment
 from slideviz.errors import CaseError, Message, shown
 from slideviz.system.file_checks import require_length
@@ -26,7 +26,7 @@ LARGEST = {
 """Most bytes of a file, by its kind: larger ones are not read. Most kinds have a line a node."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Entry:
     """A key in upper case, its value without comments, and its line (from 1)."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from slideviz import terms
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, frozen
 from slideviz.case.cfg import read_case, set_key, write_case
 from slideviz.case.check import key_problems
 from slideviz.case.fields import CaseFields
@@ -25,7 +25,7 @@ NEW: dict[str, Any] = {"rims": "slide", "relax": "auto", "layers": "auto", "repa
 """Settings of new cases where those of a file without their keys are others, for its results."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Case(CaseFields):
     """A deformation case, the content of a ``.cfg`` file.
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from slideviz.argument_types import frozen
 from slideviz.case.words import (
     Word,
     Words,
@@ -39,7 +40,7 @@ _SU2_PAIR = 2
 _SU2_GROUP = 11
 
 
-@dataclass(frozen=True)
+@frozen
 class Kind:
     """A kind of value of a key."""
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
+from slideviz.argument_types import frozen
 from slideviz.errors import CaseError, Message, shown
 from slideviz.mesh.check import LARGEST
 
@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_.:/@+-]+\Z")
 
 
-@dataclass(frozen=True)
+@frozen
 class Word:
     """A word of a value; one in quotes is never taken as a sign, a number or ``NONE``."""
 

@@ -17,13 +17,13 @@ with the Hessian H and the maps T from unknowns to nodes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.elastic.conditions import Body, HeldRows, held_rows, projections, unknowns
 from slideviz.elastic.distortion import WORST, Distortion
 from slideviz.elastic.laplacian import LaplacianCycle, held_components
@@ -59,7 +59,7 @@ SEEN = 1e-6
 differ by more than rounding, so that the step is searched."""
 
 
-@dataclass(frozen=True)
+@frozen
 class End:
     """Where Newton's method ends."""
 

@@ -11,7 +11,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import IO
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import GifImagePlugin, Image
 
+from slideviz.argument_types import frozen
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import png_bytes
 from slideviz.system.atomic import atomic_write, require_writable
@@ -39,7 +39,7 @@ MAX_FPS = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
 _NUMBER = re.compile(r"(%(?:0\d)?d)")  # the place of the number in the name of numbered pictures
 
 
-@dataclass(frozen=True)
+@frozen
 class EncoderSettings:
     """The settings that a writer has to know before the first image."""
 

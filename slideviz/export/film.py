@@ -9,11 +9,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from slideviz.argument_types import frozen
 from slideviz.errors import SlidevizError
 from slideviz.export.encode import MAX_FPS, EncoderSettings, Pixels, film_kind, targets, writer
 from slideviz.export.offscreen import LETTERS, check_drawable
@@ -41,7 +42,7 @@ SECONDS = 3.0
 """Default images per second; and the duration in seconds below which there are fewer per second."""
 
 
-@dataclass(frozen=True)
+@frozen
 class FilmOptions:
     """The size, speed and images in between of a film."""
 
@@ -118,7 +119,7 @@ def check_film(
         raise SlidevizError(f"{file}: no permission to write there; choose another folder")
 
 
-@dataclass(frozen=True)
+@frozen
 class FilmProgress:
     """The progress of a film: number of images written, and of all images."""
 
@@ -179,7 +180,7 @@ def _positions(steps: int, between: int) -> Iterator[float]:
 _NARROWEST = 160  # least width in pixels for the mesh in each of two pictures side by side
 
 
-@dataclass(frozen=True)
+@frozen
 class FilmFrame:
     """A frame of a film, with the texts of its place in the run.
 

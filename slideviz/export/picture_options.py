@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
+from slideviz.argument_types import frozen
 from slideviz.export.offscreen import CAPTION_AT, LETTERS, SMALLEST, font_scale
 from slideviz.export.titles import (
     LETTER_WIDTH,
@@ -32,7 +33,7 @@ TITLE_ROOM = 40.0
 GAP = 12.0  # distance in pixels between two pictures side by side, at normal letter size
 
 
-@dataclass(frozen=True)
+@frozen
 class PictureOptions:
     """Size, background, legend, title and camera of a picture of a view."""
 

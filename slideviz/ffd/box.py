@@ -10,13 +10,13 @@ of the box's coordinate system (`CoordinateSystem`), which mostly are x, y, z.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 from slideviz.terms import FfdSystem
@@ -30,7 +30,7 @@ POLAR_CORNERS = np.array([1, 2, 2, 1, 0, 3, 3, 0])
 POLAR_SIDES = np.array([-1, -1, 1, 1, -1, -1, 1, 1])  # side of the plane on which each of them is
 
 
-@dataclass(frozen=True)
+@frozen
 class CoordinateSystem:
     """A coordinate system q with its axis along x through ``origin``.
 

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CARTESIAN, Box, Embedding
 from slideviz.ffd.kinds import Move, Shift, Twist
@@ -156,7 +156,7 @@ def uvw_step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
     return np.asarray(step)
 
 
-@dataclass(frozen=True)
+@frozen
 class Limits:
     """What keeps boxes from being deformed too much."""
 
@@ -197,7 +197,7 @@ class BoxDeformation:
     values: FloatArray  # (v,): the design
     relax: float  # OPT_RELAX_FACTOR
     count: int  # m, the number of nodes
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
     nodes: FloatArray = field(init=False)  # (m, 3): the displacement
     change: dict[str, FloatArray] = field(init=False)
     """dict of str to (I, J, K, 3): change of the control points of each box, in its coordinates

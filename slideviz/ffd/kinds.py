@@ -7,11 +7,10 @@ box's coordinates q: x, y, z in Cartesian ones.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.ffd.box import Box, points_at
 from slideviz.mesh.model import FloatArray
 
@@ -146,7 +145,7 @@ Planes = tuple[frozenset[int], frozenset[int], frozenset[int]]
 NONE: Planes = (frozenset(), frozenset(), frozenset())
 
 
-@dataclass(frozen=True)
+@frozen
 class Request:
     """What an FFD variable asks of its box."""
 

@@ -13,7 +13,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from slideviz.argument_types import record
 from slideviz.errors import MeshError
 from slideviz.formats.openfoam_paths import ending_of
 from slideviz.formats.source import unreadable
@@ -43,7 +42,7 @@ class WriteOptions:
     """Called between blocks of a file; what it raises stops the writing."""
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class ZoneContent:
     """The content of a zone to write, with functions that return parts of its large arrays.
 

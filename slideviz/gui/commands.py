@@ -8,7 +8,6 @@ from `slideviz.terms.SHOWN`, those that add a section from
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import starmap
 from operator import attrgetter
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMenu
 
+from slideviz.argument_types import frozen
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 from slideviz.gui.widgets.build import wrapped
 from slideviz.gui.widgets.theme import NAMES, set_icon
@@ -76,7 +76,7 @@ WAIT = "Wait for the running job, or cancel it."
 NO_FILE = "Save the case first (Ctrl+Shift+S): a command names its file."
 
 
-@dataclass(frozen=True)
+@frozen
 class Command:
     """A command of the window (an action or a toggle): function, texts, keys, icon, conditions."""
 
@@ -163,7 +163,7 @@ class Command:
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class Menu:
     """A menu: its commands, submenus and separators (None)."""
 
@@ -189,7 +189,7 @@ class Menu:
                 yield entry
 
 
-@dataclass(frozen=True)
+@frozen
 class CommandState:
     """The state of the window on which the commands' conditions depend."""
 

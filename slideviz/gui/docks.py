@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 from qtpy.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, QSettings, Qt, QTimer
@@ -18,6 +17,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.argument_types import frozen
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.designs import DesignsPanel
@@ -176,7 +176,7 @@ def available_area(window: QWidget) -> QRect:
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class DockRow:
     """A row of the table of docks: name, title, area, and the function that makes its panel.
 

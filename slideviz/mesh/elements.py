@@ -8,17 +8,17 @@ order (thesis Eq. 2.39 to 2.42 and Table 2.3). A triangle and a tetrahedron need
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.system.tables import table_beside
 
 Nodes = Sequence[Sequence[int]]
 """Local nodes of the sides, edges or corners of an element type."""
 
 
-@dataclass(frozen=True)
+@frozen
 class ElementType:
     """One element type."""
 

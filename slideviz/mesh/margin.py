@@ -14,12 +14,13 @@ coordinates and determinants is subtracted (`ROUNDING`).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import floor
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.errors import point_words
 from slideviz.mesh.elements import CELL_NAMES
 from slideviz.mesh.jacobians import (
@@ -105,7 +106,7 @@ def margins(
     return found
 
 
-@dataclass(frozen=True)
+@frozen
 class SafeFraction:
     """How far a motion may go until the first cell is no longer proved valid."""
 

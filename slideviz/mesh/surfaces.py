@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, offsets_of, row_norms
 from slideviz.mesh.polyhedra import whole_polygons
@@ -110,7 +110,7 @@ _BESIDE = 1e-6
 """Least distance of an inner boundary from the box around all, as a part of its longest side."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Enclosing:
     """Whether boundaries enclose a volume (`is_closed`), and names of inner ones (`enclosed`)."""
 

@@ -8,13 +8,12 @@ a unit, 0 to 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.mesh.model import FloatArray, IntArray, run_begins
 from slideviz.plots.style import PRINT, Style, add_dots, add_legend, style_axes
 
@@ -46,7 +45,7 @@ class GreedyRun:
     series: int = 0  # series number (see `slideviz.plots.style.Style.series`)
 
 
-@dataclass(frozen=True)
+@frozen
 class Outcome:
     """The outcome of one run."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.color_scheme import PAPER
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -178,7 +178,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 _LONGEST = 36  # most letters of the name that a title begins with
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionStyle:
     """The size and the parts of a picture of a section."""
 

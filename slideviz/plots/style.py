@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from slideviz.argument_types import frozen
 from slideviz.color_scheme import INVERTED_COLOR, PAPER, ColorScheme
 from slideviz.plots.figure_io import SMALLEST
 from slideviz.terms import PALETTE
@@ -38,7 +38,7 @@ _DASHES: tuple[Any, ...] = (
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # the markers of series
 
 
-@dataclass(frozen=True)
+@frozen
 class Series:
     """The look of a series: color, marker and dash."""
 
@@ -47,7 +47,7 @@ class Series:
     dash: Any  # a line style of matplotlib
 
 
-@dataclass(frozen=True)
+@frozen
 class Style:
     """Colors, letters and lines of a plot."""
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
@@ -34,7 +34,7 @@ def no_tick(fraction: float) -> None:
     """Do nothing: a progress callback that reports nothing."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Basis:
     """A radial function: kernel, support radius and rule of distance."""
 

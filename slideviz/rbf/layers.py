@@ -24,13 +24,12 @@ the map of the directions of the facets at the wall node (lines in 2D, normals a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import point_words
 from slideviz.mesh.model import (
     BoolArray,
@@ -461,7 +460,7 @@ def wall_nodes(
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class GaveWay:
     """A wall whose layers gave way."""
 
@@ -480,7 +479,7 @@ class GaveWay:
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class KeptLayers:
     """The layer zone of a run, for its report."""
 

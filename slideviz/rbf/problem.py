@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.mesh.model import NO_NODES, BoolArray, FloatArray, IntArray, mask_of, places_in
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
@@ -47,7 +47,7 @@ class PhaseTimer:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
 
 
-@dataclass(frozen=True)
+@frozen
 class Cycle:
     """One cycle of the selection: its number, its level, and what it found."""
 
@@ -189,7 +189,7 @@ class CarriedError:
         return put(errors, outside, nothing) if len(outside) else errors
 
 
-@dataclass(frozen=True)
+@frozen
 class Relaxed:
     """How a step was relaxed (`slideviz.elastic.relaxation`)."""
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
-from slideviz.argument_types import CheckedFields
+from slideviz.argument_types import CheckedFields, frozen
 from slideviz.terms import LEVEL_CRITERIA, SELECTIONS, LevelCriterion, Selection
 
 GAMMA = 25.0
@@ -12,7 +12,7 @@ GAMMA = 25.0
 with data reduction and without."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Reduction(CheckedFields):
     """Settings of the greedy selection of control nodes (thesis sections 2.5 and 5.3)."""
 

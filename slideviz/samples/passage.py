@@ -15,13 +15,11 @@ ratio |b| / |a|, makes cells thin at the wall.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import Triple
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, row_dots
@@ -34,7 +32,7 @@ Both are lengths; `_spread` adds strength x arctan(arc length / distance) to the
 """
 
 
-@dataclass(frozen=True)
+@frozen
 class BladeSection:
     """The shape of a blade and of the channel around it; its axial chord is 1, from x = 0."""
 
@@ -91,7 +89,7 @@ def _spread(curve: FloatArray, edges: int) -> FloatArray:
     return np.column_stack([np.interp(at, arc, curve[:, 0]), np.interp(at, arc, curve[:, 1])])
 
 
-@dataclass(frozen=True)
+@frozen
 class Shares:
     """Relative numbers of cells, and how the O-grid is turned in its hole; `counts` scales them."""
 
@@ -112,7 +110,7 @@ PASSAGE_SHARES = Shares()
 """The shares of the sample ``passage``, with which its cells are nearly orthogonal."""
 
 
-@dataclass(frozen=True)
+@frozen
 class GridCounts:
     """Numbers of cells of the channel and of the O-grid around the blade."""
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.cfg import case_of_text, write_case
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
@@ -40,7 +39,7 @@ Made = tuple[Mesh | Structured, Case, Displacements | None]
 SampleMaker = Callable[[str, int, str, bool], Made]
 
 
-@dataclass(frozen=True)
+@frozen
 class SampleKind:
     """A kind of sample, a row of ``SAMPLES``."""
 

@@ -7,7 +7,6 @@ chapter 4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import frozen
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motions.file import FromFile
@@ -154,7 +154,7 @@ def _polar_shift(points: FloatArray) -> FloatArray:
     return np.column_stack([*moved, np.full((len(x), points.shape[1] - 2), 0.2)])
 
 
-@dataclass(frozen=True)
+@frozen
 class HollowGrid:
     """Numbers of the places of a grid, m in each direction, without those in a box.
 
@@ -198,7 +198,7 @@ class HollowGrid:
         return first if self._length else first[:0]
 
 
-@dataclass(frozen=True)
+@frozen
 class Layout:
     """A `Structured` grid of n x n (x n) cells, without those of a block."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import SlidevizError, not_one_of, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, row_norms
 
@@ -15,7 +14,7 @@ TINY = 0.05  # size of the moved boundaries, relative to the mesh's, below which
 MARGIN = 2.5  # width of a detail relative to that of the moved boundaries
 
 
-@dataclass(frozen=True)
+@frozen
 class Detail:
     """A part of the mesh to show."""
 

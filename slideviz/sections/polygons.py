@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.mesh.model import BoolArray, FloatArray, IntArray, Mesh, offsets_of, ranges
 from slideviz.mesh.polyhedra import whole_polygons
 from slideviz.mesh.topology import single_edges
@@ -17,7 +17,7 @@ ONLY_INVERTED = (-1.0, -0.5)
 """The threshold for inverted cells alone: a range from below 0, which no value is in."""
 
 
-@dataclass(frozen=True)
+@frozen
 class CellsInRange:
     """The cells of a mesh within a threshold; instances with the same cells are equal."""
 

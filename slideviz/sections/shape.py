@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from slideviz.argument_types import check_fields
+from slideviz.argument_types import check_fields, frozen
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms, Size
 from slideviz.errors import CaseError, point_words
 from slideviz.mesh.axis_frame import axis_basis
@@ -118,7 +118,7 @@ ON_SECTION = 1e-9
 layer of nodes lies in it up to rounding, one layer of cells is cut, and not some of each side."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Section:
     """A plane, cylinder or other surface that cuts a mesh.
 

@@ -8,12 +8,13 @@ are in `slideviz.sections.shape` and `slideviz.sections.around_axis.AboutAxis`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.spans import WALLS_KEY, span_between, span_ends
@@ -32,7 +33,7 @@ _SPANS = np.linspace(0.0, 1.0, 33)  # at which zones are joined to each other
 _ROUNDS = 8  # rounds of Ridders' method, each of which about doubles the number of right digits
 
 
-@dataclass(frozen=True)
+@frozen
 class SpanChannel:
     """The walls of a zone, and the span between them."""
 
@@ -58,7 +59,7 @@ class SpanChannel:
         return np.maximum(np.maximum(-span, span - 1.0), 0.0) + np.maximum(ends[0][2], ends[1][2])
 
 
-@dataclass(frozen=True)
+@frozen
 class SpanWalls:
     """The walls of all zones of a machine: at each place the span is that of the zone there.
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.keys import FILES, KEYS, MOTION, VIEW
 from slideviz.case.limits import MET
 from slideviz.case.model import Case
@@ -34,7 +35,7 @@ _NAMED = 5  # most designs that are named of those that failed for the same reas
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@frozen
 class DesignTable:
     """A table of designs and their results."""
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.check import check_case
 from slideviz.case.limits import (
     NUMBERS,
@@ -223,7 +223,7 @@ Report = Callable[[object], None]
 Stopped = Callable[[], bool]
 
 
-@dataclass(frozen=True)
+@frozen
 class JobProgress:
     """Progress of a job: words, and the fraction done, 0 to 1, or None where it is unknown."""
 

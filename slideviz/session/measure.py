@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import ROUNDING, point_words
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh, row_norms
 from slideviz.mesh.periodic import Pair
@@ -25,7 +24,7 @@ HINT = (
 MOST = 3  # most points; the next one begins again
 
 
-@dataclass(frozen=True)
+@frozen
 class Pick:
     """A picked point: a node, or a place between nodes."""
 

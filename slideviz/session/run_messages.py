@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.check import check_case
 from slideviz.case.keys import KEYS
 from slideviz.case.limits import outcome
@@ -196,7 +196,7 @@ Settings = tuple[tuple[str, str], ...]
 """Keys of a case, and other values of them that a message advises."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Requirement:
     """A requirement of a run that is not met."""
 
@@ -207,7 +207,7 @@ class Requirement:
     settings: Settings = ()  # each of which would meet it
 
 
-@dataclass(frozen=True)
+@frozen
 class Notice:
     """A message in the strip over the view, with what its buttons do."""
 

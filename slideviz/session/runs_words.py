@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
+from slideviz.argument_types import frozen
 from slideviz.case.keys import BY_WEIGHT, METHOD, PERIODICITY, QUALITY, REDUCTION, Key
 from slideviz.case.limits import outcome
 from slideviz.case.model import Case
@@ -188,7 +188,7 @@ def _misfit(run: Run) -> float | None:
     return max((value for value in misfits if value is not None), default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class Column:
     """A column of the table: title, function from a run to its value, its format and unit."""
 

@@ -13,7 +13,7 @@ import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import field, is_dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
 from types import NoneType, UnionType
@@ -23,7 +23,7 @@ from zipfile import ZIP_STORED, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import annotations_of, origin_of
+from slideviz.argument_types import annotations_of, frozen, origin_of
 from slideviz.case.cfg import case_of_text, case_text
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, SlidevizError, printable
@@ -52,7 +52,7 @@ _VIEW = (
 """The fields of a view that a case file lacks, or has only where they differ from a default."""
 
 
-@dataclass(frozen=True)
+@frozen
 class StoredSession:
     """What a session file has besides the case with its view."""
 
@@ -147,7 +147,7 @@ def write_session(
             archive.write(file, name)
 
 
-@dataclass(frozen=True)
+@frozen
 class _Writer:
     archive: ZipFile
     path: Path  # of the session file
@@ -293,7 +293,7 @@ def _archive(path: Path) -> Iterator[ZipFile]:
         ) from problem
 
 
-@dataclass(frozen=True)
+@frozen
 class _Reader:
     archive: ZipFile
     path: Path

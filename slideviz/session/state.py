@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.check import effective
 from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
@@ -308,7 +308,7 @@ def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[
         found[i] = total / (end - begin)
 
 
-@dataclass(frozen=True)
+@frozen
 class ViewState:
     """The view of a session: colors, threshold, sections, step, things drawn."""
 
@@ -383,7 +383,7 @@ PanelPlace = Literal["open", "boundaries", "motion", "method", "curves", "worst"
 dialog that opens a file."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Guess:
     """A guessed role, and its reason in words: the boundary's name, or a match."""
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import field, fields, is_dataclass, replace
 from typing import Any
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.model import Case
 from slideviz.session.changes import (
     motion_words,
@@ -45,7 +45,7 @@ def notify(
         raise errors[0]
 
 
-@dataclass(frozen=True)
+@frozen
 class UndoState:
     """The state that undo restores: case, guesses, style of the view, removed runs."""
 
@@ -127,7 +127,7 @@ def _changed_places(before: object, now: object, place: Place = ()) -> Iterator[
         yield place
 
 
-@dataclass(frozen=True)
+@frozen
 class UndoEntry:
     """A change that can be undone."""
 

@@ -8,11 +8,10 @@ with cells of a height of 1e-6 between the two.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.check import motion_doubts
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
@@ -249,7 +248,7 @@ def _of_fixed(case: Case) -> tuple[str, str]:
     return ", which is fixed", f"let that boundary slide{slides}, or move it less"
 
 
-@dataclass(frozen=True)
+@frozen
 class _OffWall:
     """The node that is farthest from a wall."""
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.model import Case
 from slideviz.case.moving_nodes import by_zone, displacements
 from slideviz.case.spans import periodic_pairs
@@ -23,7 +23,7 @@ SLIDE_RIMS = "RIMS= SLIDE"  # in the remedy of messages that nodes left a wall
 MOST_NAMES = 2  # most boundaries that a remedy names; of more it has the number
 
 
-@dataclass(frozen=True)
+@frozen
 class Remedy:
     """A remedy in the words of the case file (``keys``) and in those of the window."""
 

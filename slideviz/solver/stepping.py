@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.model import Case
 from slideviz.case.motions.box import moved_boxes
 from slideviz.case.words import wrong_by
@@ -56,7 +56,7 @@ ENDED = 0.1  # the residual above which relaxation did not come to its end
 ALIKE = 1.1  # a shorter step may go farther than the straight paths of a longer one by this factor
 
 
-@dataclass(frozen=True)
+@frozen
 class _Planned:
     """A step that is still to be made."""
 
@@ -71,7 +71,7 @@ class _Planned:
         return [*first.halved(begin, times - 1), _Planned(self.end, first.halvings)]
 
 
-@dataclass(frozen=True)
+@frozen
 class _Finding:
     """Warnings and numbers of one step of a run, without its arrays."""
 

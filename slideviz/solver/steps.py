@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
 from dataclasses import field as made_by
+from dataclasses import fields, replace
 from functools import cached_property
 from itertools import chain
 from math import isfinite, nan
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import Remark, SlidevizError
 from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.margin import chain as chained_safety
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.walls import Walls
 
 
-@dataclass(frozen=True)
+@frozen
 class Progress:
     """How far a run is."""
 
@@ -71,7 +71,7 @@ def step_timer(
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class Trial:
     """A trial of STEPS= auto: a number of steps, and the quality it gave."""
 

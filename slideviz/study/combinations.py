@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from slideviz import terms
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.check import check_case
 from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case
@@ -38,7 +38,7 @@ from slideviz.terms import SLIDING, PeriodicMode
 Value = str | int | float
 
 
-@dataclass(frozen=True)
+@frozen
 class StudyColumn:
     """A column of the table."""
 
@@ -149,7 +149,7 @@ AUTO = 0  # number of steps that means STEPS= auto: the solver chooses it
 STEPS = (1, 5, 20)  # numbers of steps that are compared by default
 
 
-@dataclass(frozen=True)
+@frozen
 class Combination:
     """A method, a periodic mode and a number of steps."""
 

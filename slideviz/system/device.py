@@ -7,7 +7,6 @@ NumPy, so that the same functions work on both: they take `Arrays`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, partial
 from importlib.util import find_spec
 from typing import Any, Literal
@@ -15,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from slideviz.argument_types import frozen
 from slideviz.errors import DeformError, Message
 from slideviz.terms import Device
 
@@ -24,7 +24,7 @@ Place = Literal["cpu", "gpu"]
 """Where arrays are."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Arrays:
     """An array module, with the two functions whose names differ."""
 

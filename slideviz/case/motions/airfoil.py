@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from slideviz import terms
+from slideviz.argument_types import frozen
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
@@ -201,7 +202,7 @@ class _WithPeak(OnAirfoil):
         return hicks_henne(t, self.peak)
 
 
-@dataclass(frozen=True)
+@frozen
 class HicksHenne(_WithPeak, OneSided):
     """Raise one side of an airfoil outwards by a bump (Hicks and Henne 1978).
 
@@ -241,7 +242,7 @@ class HicksHenne(_WithPeak, OneSided):
         return side
 
 
-@dataclass(frozen=True)
+@frozen
 class Cst(OneSided):
     """Add ``height`` times a class and shape function to y of one side of an airfoil (Kulfan 2008).
 
@@ -282,7 +283,7 @@ class Cst(OneSided):
         return f"{super().design_name()}.{self.term[0]}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Bump(_WithPeak):
     """Raise all sides of an airfoil towards +y by a bump; otherwise as `HicksHenne`."""
 

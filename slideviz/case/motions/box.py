@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Motion,
@@ -253,7 +254,7 @@ class BoxMotion(Motion):
         return ".".join([super().design_name(), self.box, *map(str, self.place_in_box)])
 
 
-@dataclass(frozen=True)
+@frozen
 class Ffd(BoxMotion):
     """Move control points of a box for free-form deformation, and with them the nodes inside.
 
@@ -372,7 +373,7 @@ class _Column(BoxMotion):
             yield f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}"
 
 
-@dataclass(frozen=True)
+@frozen
 class FfdCamber(_Column):
     """Shift a column of control points of a box as one, and with it the nodes inside.
 
@@ -392,7 +393,7 @@ class FfdCamber(_Column):
     what = "camber"
 
 
-@dataclass(frozen=True)
+@frozen
 class FfdThickness(_Column):
     """Stretch a column of control points of a box, and with it the nodes inside.
 
@@ -419,7 +420,7 @@ class FfdThickness(_Column):
         return super().control_change(box, q, dim) * np.expand_dims(sides, others)
 
 
-@dataclass(frozen=True)
+@frozen
 class FfdTwist(BoxMotion):
     """Rotate a plane j of control points of a box in 3D, and with it the nodes inside.
 

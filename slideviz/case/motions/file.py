@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.displacement import (
     Displacements,
     NodesOn,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _READ = WeakCache()
 
 
-@dataclass(frozen=True)
+@frozen
 class FromFile(Motion):
     """Displace nodes as a file lists: node index, then the Cartesian displacement.
 

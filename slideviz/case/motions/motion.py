@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
-from slideviz.argument_types import CheckedFields
+from slideviz.argument_types import CheckedFields, frozen
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.words import Words, name_text
 from slideviz.errors import ROUNDING, CaseError, Doubt, Message
@@ -57,7 +57,7 @@ def nodes_moved(motion: Motion, on: NodesOn) -> IntArray:
     return np.unique(np.concatenate([np.empty(0, np.int64), *moved]))
 
 
-@dataclass(frozen=True)
+@frozen
 class MotionStart:
     """What a motion begins with that the user adds."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.displacement import Displacements, NodesOn
 from slideviz.case.motions.file import FromFile, read_path
 from slideviz.case.motions.motion import Motion, Target, applies_to, number_texts
@@ -62,7 +62,7 @@ class Remaining(Message):
     """What the report of a run has: boundaries, file, distances."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Onto(FromFile):
     """Lay a marker onto the surface in a file: an STL or VTU surface, or a boundary of a mesh.
 

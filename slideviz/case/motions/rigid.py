@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.displacement import Displacements
 from slideviz.case.motions.motion import (
     Motion,
@@ -54,7 +55,7 @@ class ByFormula(Motion):
         return self.shift(points)
 
 
-@dataclass(frozen=True)
+@frozen
 class Translate(ByFormula):
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
@@ -119,7 +120,7 @@ class _AboutPoint(ByFormula):
         return self.point == "centroid"
 
 
-@dataclass(frozen=True)
+@frozen
 class Rotate(_AboutPoint):
     """Rotate a marker by ``angle_deg`` about an axis through ``point`` (right-handed; any length).
 
@@ -198,7 +199,7 @@ class Rotate(_AboutPoint):
         return replace(self, angle_deg=part * self.angle_deg)
 
 
-@dataclass(frozen=True)
+@frozen
 class Scale(_AboutPoint):
     """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
 
@@ -270,7 +271,7 @@ class Scale(_AboutPoint):
         return arm * (np.array(self.factors, np.float64) - 1.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Radial(_AboutPoint):
     """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
 

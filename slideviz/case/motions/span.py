@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.displacement import Displacements, NodesOn, PlacedDisplacements
 from slideviz.case.motions.motion import (
     Amount,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 _SECTIONS = WeakCache()
 
 
-@dataclass(frozen=True)
+@frozen
 class SpanMotion(Motion):
     """Change the sections of a blade, each at its span, by a curve over the span.
 

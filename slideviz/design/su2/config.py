@@ -8,7 +8,7 @@ parts between semicolons, and passes over what follows the last one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import chain
@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from slideviz.argument_types import frozen
 from slideviz.case.check import unknown_markers
 from slideviz.case.keys import KEYS, MOTION, Key
 from slideviz.case.lines import (
@@ -48,7 +49,7 @@ MISSPELT = 0.7
 """Similarity (``difflib``, 0 to 1) from which a key may be one that is missing, misspelt."""
 
 
-@dataclass(frozen=True)
+@frozen
 class VariableKind:
     """A kind of design variable."""
 
@@ -74,7 +75,7 @@ EXCLUSIVE = ("naca", "parabolic")
 """Groups of which SU2 takes one variable only: it stops, and waits for a key."""
 
 
-@dataclass(frozen=True)
+@frozen
 class DesignVariable:
     """A design variable."""
 
@@ -492,7 +493,7 @@ ZONE_KEYS = {"CONFIG_LIST", "MULTIZONE", "SOLVER"}
 """Keys that are read where the first of them is there."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Su2Config:
     """A configuration of SU2: the part about a deformation."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise, starmap
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.case.displacement import Columns, in_zones, parse_rows
 from slideviz.case.keys import ffd_contradictions
 from slideviz.case.lines import read_text
@@ -235,7 +235,7 @@ def _as_motion(
     return None
 
 
-@dataclass(frozen=True)
+@frozen
 class Formula:
     """Displacement by a variable, as a formula of its value times OPT_RELAX_FACTOR."""
 

@@ -30,7 +30,7 @@ from concurrent.futures import (
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from hashlib import blake2b
 from multiprocessing import get_context, parent_process, resource_tracker
@@ -45,7 +45,7 @@ from numba import get_num_threads, set_num_threads
 from threadpoolctl import ThreadpoolController
 
 from slideviz import __version__
-from slideviz.argument_types import check_types
+from slideviz.argument_types import check_types, frozen
 from slideviz.case.limits import check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.case.motions.box import box_motions
@@ -82,7 +82,7 @@ _one_at_a_time = Lock()
 """Held during a task: Numba ends the process if loops of two threads run at once."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Packed:
     """A mesh as bytes, and a name that is unique to them."""
 
@@ -90,7 +90,7 @@ class Packed:
     content: bytes
 
 
-@dataclass(frozen=True)
+@frozen
 class Task:
     """A design as it is sent to a worker."""
 
@@ -104,7 +104,7 @@ class Task:
     streamed: bool = False  # whether the mesh goes from file to file; no worker needs it then
 
 
-@dataclass(frozen=True)
+@frozen
 class TaskResult:
     """The result of a task, and the name of the worker; no row where the worker lacks the mesh."""
 

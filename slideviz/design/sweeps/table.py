@@ -21,7 +21,7 @@ import pickle
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from hashlib import blake2b
 from itertools import chain
 from math import isclose, isfinite, nan
@@ -32,6 +32,7 @@ from typing import Annotated, Any
 from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
 from slideviz import __version__
+from slideviz.argument_types import frozen
 from slideviz.case.cfg import set_key
 from slideviz.case.check import effective
 from slideviz.case.keys import FILES, KEYS, VIEW
@@ -65,7 +66,7 @@ _WHOLE_MOTION = ("MOTION", "DEFORMATION_FILENAME")
 _LISTED = 24
 
 
-@dataclass(frozen=True)
+@frozen
 class NumberPlace:
     """The place of a number: index of the motion, its field, and component of the field."""
 
@@ -263,7 +264,7 @@ def _text(value: Any) -> str:
     return format(value, ".17g") if isinstance(value, float) and value.is_integer() else str(value)
 
 
-@dataclass(frozen=True)
+@frozen
 class DesignRow:
     """The result of a design, or the reason why there is none."""
 
@@ -305,7 +306,7 @@ def failures(rows: Iterable[DesignRow]) -> dict[str, list[int]]:
     return grouped((row.problem, row.design) for row in rows if row.problem)
 
 
-@dataclass(frozen=True)
+@frozen
 class Design:
     """A row of the table: its number (from 1), its values by column, and its case."""
 
@@ -314,7 +315,7 @@ class Design:
     case: Case
 
 
-@dataclass(frozen=True)
+@frozen
 class Designs:
     """The designs of a table; ``columns`` has the place of a number, or a key, for each column."""
 

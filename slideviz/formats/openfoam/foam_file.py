@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
@@ -17,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import MeshError, path_error, shown
 from slideviz.formats.source import unreadable
 from slideviz.mesh.model import IntArray, offsets_of
@@ -39,7 +38,7 @@ _COMMENT = re.compile(_REMARK, re.DOTALL)
 _BARE = bytes.maketrans(b"()", b"  ")
 
 
-@dataclass(frozen=True)
+@frozen
 class Patch:
     """An entry of the file ``boundary``: the faces ``start`` to ``start + count``."""
 

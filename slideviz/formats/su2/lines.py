@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 
 import numpy as np
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2 import KEYWORD
@@ -35,7 +34,7 @@ def is_ffd(text: bytes) -> bool:
     return text.lstrip()[:14].upper().startswith((b"FFD_", b"BSPLINE_ORDER_"))
 
 
-@dataclass(frozen=True)
+@frozen
 class KeywordBlock:
     """A section: key (in capitals) and value, its keyword line, and the next one ``stop``.
 
@@ -50,7 +49,7 @@ class KeywordBlock:
     spelt: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Bounds:
     """The lines ``begin:end``, without ``IZONE``, of zone ``number`` (from 1) of ``zones``."""
 
@@ -190,7 +189,7 @@ _BLANKS = bytes(range(33))  # bytes before the first word of a line: blanks and 
 _LINE_BYTES = 256  # bytes that are searched for the end of a line at first
 
 
-@dataclass(frozen=True)
+@frozen
 class Piece:
     """A piece of the file with consecutive rows of one section."""
 

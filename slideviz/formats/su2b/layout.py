@@ -13,7 +13,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import BinaryIO, Literal
@@ -21,6 +20,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from slideviz.argument_types import frozen
 from slideviz.errors import MeshError, Message, printable
 from slideviz.formats.su2.lines import chosen_zones
 
@@ -34,7 +34,7 @@ MAGIC = {
 """Width of counts and byte order ("<" or ">"), by the first four bytes of a file."""
 
 
-@dataclass(frozen=True)
+@frozen
 class ElementTable:
     """Where the elements of a zone or marker are in the file."""
 
@@ -45,7 +45,7 @@ class ElementTable:
     numbered: bool  # whether each element ends with its index
 
 
-@dataclass(frozen=True)
+@frozen
 class MarkerPlace:
     """A marker: its name, the ``NAME_BYTES`` bytes of the name in the file, its elements."""
 
@@ -54,7 +54,7 @@ class MarkerPlace:
     elements: ElementTable
 
 
-@dataclass(frozen=True)
+@frozen
 class ZonePlace:
     """Where a zone is in the file."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from threading import Lock
 
@@ -17,7 +17,7 @@ from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QLabel, QStackedWidget, QWidget
 
-from slideviz.argument_types import record
+from slideviz.argument_types import frozen, record
 from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.threads import start_thread
@@ -38,7 +38,7 @@ Draw = Callable[[Figure, Style], None]
 """A function that fills a figure in a style; it is called in another thread: without widgets."""
 
 
-@dataclass(frozen=True)
+@frozen
 class PlotFormat:
     """The size of a plot in pixels, its device pixel ratio, and its style."""
 
@@ -48,7 +48,7 @@ class PlotFormat:
     style: Style
 
 
-@dataclass(frozen=True)
+@frozen
 class AxesPlace:
     """The bounds of the axes in the figure, valid while ``key`` is the same.
 
