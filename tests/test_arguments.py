@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.argument_types import CheckedFields, annotations_of, record
+from slideviz.argument_types import CheckedFields, annotations_of, frozen, record
 from slideviz.case.motions.kinds import KINDS
 from slideviz.design.sweeps.table import read_designs
 from slideviz.errors import ArgumentError, MeshError
@@ -179,5 +179,18 @@ def test_a_record_is_frozen_and_equal_only_to_itself():
     assert pair == pair != Pair(1)
     assert {pair: 3}[pair] == 3
     assert repr(replace(pair, one=3)).endswith("Pair(one=3, two=2)")
+    with pytest.raises(FrozenInstanceError):
+        pair.one = 2
+
+
+def test_a_frozen_value_is_equal_where_its_fields_are():
+    @frozen
+    class Pair:
+        one: int
+        two: int = 2
+
+    pair = Pair(1)
+    assert pair == Pair(1) != replace(pair, one=3)
+    assert {pair: 3}[Pair(1)] == 3
     with pytest.raises(FrozenInstanceError):
         pair.one = 2

@@ -77,8 +77,7 @@ def save_section(
 
 
 def _shown(session: Session, name: str, section: Section) -> SectionInRun:
-    frame = session.frame
-    assert frame is not None
+    frame = session.shown_frame
     around = matrices(session, period_of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
     cutter = Cutter(frame.mesh)

@@ -51,8 +51,7 @@ def write_html_report(path: Path, renderer: OffscreenRenderer) -> None:
     Raises SlidevizError if the file cannot be written.
     """
     session = renderer.session
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     case = shown_case(session)
     runs = [run for run in session.runs if run.frames]
     shown = [run for run in runs if run.number == session.shown]

@@ -80,8 +80,7 @@ class OffscreenRenderer:
         Or, for the zoom ``view``, with the view of the session's case. Raises SlidevizError if the
         detail has not as many coordinates as the mesh, or is outside the mesh.
         """
-        base = session.mesh
-        assert base is not None
+        base = session.opened_mesh
         if zoom == "view":
             place = session.case.view.get("VIEW_CAMERA")
             return cls(with_case_view(session), find_surfaces(base), place=place)
@@ -333,9 +332,8 @@ def picture(
     the size cannot be drawn, or the file cannot be written.
     """
     check_picture(Path(file))
-    assert session.frame is not None
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
-        words = caption(Path(session.frame.mesh.name).name, session.frame.quality)
+        words = caption(Path(session.shown_frame.mesh.name).name, session.shown_frame.quality)
         words += DETAIL if renderer.shows_detail else ""
         options = PictureOptions(size, title=True, heading=words)
         if zoom == "view":

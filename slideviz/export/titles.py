@@ -251,7 +251,6 @@ def draw_marked_cell(axes: Any, session: Session, pixel_pt: float) -> None:
 
 def _corners(session: Session) -> FloatArray:
     """Return the points (k, d) of the marked cell's nodes."""
-    assert session.frame is not None
     assert session.view.marked_cell is not None
-    mesh = session.frame.mesh
+    mesh = session.shown_frame.mesh
     return mesh.points[nodes_of(mesh, session.view.marked_cell)]

@@ -139,10 +139,8 @@ class _Paint:
 
 def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: float) -> None:
     """Draw cells, sections and boundaries; a pixel at normal size is ``pixel_pt`` points wide."""
-    frame = session.frame
+    frame = session.shown_frame
     view = session.view
-    assert frame is not None
-    assert session.mesh is not None
     mesh = frame.mesh
     cutter = Cutter(frame.mesh)
     edge = _EDGE * pixel_pt * options.edges
@@ -178,7 +176,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
         }
         axes.add_collection(LineCollection(section.in_plane.trace(box), **line), autolim=False)
     if "undeformed" in view.drawn:
-        parts = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
+        parts = [part for name in mesh.marker_names for part in _lines(session.opened_mesh, name)]
         style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * pixel_pt}
         axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
@@ -212,8 +210,7 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     letters = _LETTERS * scale * 72.0 / figure.dpi
     clear = options.background == "transparent"
     if session.view.color_by == "role":
-        assert session.mesh is not None
-        used = {session.role(name) for name in session.mesh.marker_names}
+        used = {session.role(name) for name in session.opened_mesh.marker_names}
         roles = [
             Patch(color=term.color, label=term.label)
             for role, term in ROLES.items()

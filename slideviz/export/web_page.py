@@ -153,8 +153,7 @@ def _legend(scene: Scene, session: Session) -> str:
     """Return the legend: the roles in use, or the bar of colors with its numbers."""
     what = session.view.color_by
     if what == "role":
-        assert session.mesh is not None
-        used = {session.role(name) for name in session.mesh.marker_names}
+        used = {session.role(name) for name in session.opened_mesh.marker_names}
         keys = [(ROLES[role].color, ROLES[role].label) for role in ROLES if role in used]
         return "".join(_key(*key) for key in keys)
     low, high = session.color_range

@@ -245,25 +245,24 @@ class Files(QObject):
         step = f"_step{session.view.frame}"
         if whole:
             step = f"_step{len(run.frames)}of{run.planned}" if stopped else "_deformed"
-        assert session.mesh is not None
-        default = self.folder() / f"{self.stem()}{step}{usual_ending(session.mesh)}"
-        filters = questions.mesh_filters(session.mesh)
+        default = self.folder() / f"{self.stem()}{step}{usual_ending(session.opened_mesh)}"
+        filters = questions.mesh_filters(session.opened_mesh)
         title = f"Save mesh: {run.progress_words}" if stopped else "Save mesh"
         path = questions.ask_save(self.window, title, default, filters)
         if path is None:
             return
-        overwrite = is_source(path, session.mesh)
+        overwrite = is_source(path, session.opened_mesh)
         if overwrite and not questions.ask_overwrite_input(self.window, path):
             return
         self.settings.setValue("folder", str(path.parent))
-        torn = torn_interfaces(session.mesh, frame.mesh.points)
+        torn = torn_interfaces(session.opened_mesh, frame.mesh.points)
         said = (stopped, *(f"{each[0].upper()}{each[1:]}." for each in torn))
         self.saving = True
         self.after_save = then
         self.window.running.start_job(
             f"Saving {path.name}",
             lambda saved: self._mesh_saved(saved, whole, said),
-            partial(jobs.save_mesh, base=session.mesh),
+            partial(jobs.save_mesh, base=session.opened_mesh),
             path,
             frame,
             overwrite,
@@ -286,12 +285,11 @@ class Files(QObject):
     def ask_output(self) -> Path | None:
         """Ask for the deformed mesh's file, not that of a mesh that stays in its file; or None."""
         session = self.window.store.session
-        assert session.mesh is not None
         default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"
         path = questions.ask_save(
             self.window, "Deformed mesh", default, questions.mesh_filter(FORMATS[".su2b"])
         )
-        if path is None or not is_source(path, session.mesh):
+        if path is None or not is_source(path, session.opened_mesh):
             return path
         self.window.banner.show_error(
             SlidevizError(

@@ -123,8 +123,7 @@ def _profile(
     label = "undeformed" if run is None else run.label
 
     def made() -> Profile:
-        mesh = session.mesh
-        assert mesh is not None
+        mesh = session.opened_mesh
         # In layers of the undeformed mesh, so that layers of cells stay together.
         values = frame.quality.values
         if coordinate == "span":
@@ -160,9 +159,8 @@ def usual_coordinate(session: Session) -> Coordinate:
 
 def walls_in(session: Session) -> SpanWalls:
     """Return hub and shroud of a session; CaseError or MeshError if there are none."""
-    mesh = session.mesh
+    mesh = session.opened_mesh
     case = session.case
-    assert mesh is not None
     return find_walls(mesh, case, find_periods(mesh, case, session.pairs))
 
 
@@ -174,9 +172,8 @@ def draw_meridional_view(session: Session, figure: Figure, style: Style) -> None
 
     Raises CaseError or MeshError if there is no hub and shroud.
     """
-    mesh = session.mesh
+    mesh = session.opened_mesh
     walls = walls_in(session)
-    assert mesh is not None
     draw_meridional(figure, meridional_bins(mesh, walls), shown_paint(session), style)
 
 
@@ -225,9 +222,8 @@ class SectionCurveMaker:
         return tuple(row for row in curves if row is not None)
 
     def _row(self, session: Session, cuts: Cuts, line: Section) -> CurveRow | None:
-        frame = session.frame
+        frame = session.shown_frame
         run = session.run_shown
-        assert frame is not None
         lines = cuts.of(frame.mesh, line)
         if not len(lines):
             return None
@@ -239,8 +235,7 @@ class SectionCurveMaker:
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
     """Return a sentence on the cut cells: number, minimum and mean quality, inverted cells."""
-    frame = session.frame
-    assert frame is not None
+    frame = session.shown_frame
     lines = cuts.of(frame.mesh, _line(section))
     return shown_paint(session).sentence(lines.cell_ids) if len(lines) else "it cuts no cell"
 

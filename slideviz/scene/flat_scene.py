@@ -75,14 +75,13 @@ class FlatScene:
     def update(self, session: Session, section: Section) -> None:
         """Draw another state of the session, or another section."""
         session = with_drawable_colors(session)
-        assert session.frame is not None
         self.session = session
         self.section = section
         self.stage.set_colors(session)
         by_value = session.view.color_by != "role"
-        cut = self.cuts.of(session.frame.mesh, section)
+        cut = self.cuts.of(session.shown_frame.mesh, section)
         only = self.stage.in_threshold(session)
-        frame = cut_frame(session.frame, section)
+        frame = cut_frame(session.shown_frame, section)
         key = (cut, only, section, frame if by_value else None)
         if key != self._made_of:
             self._made_of = key
@@ -100,20 +99,19 @@ class FlatScene:
         self, cut: Polygons, only: CellsInRange | None, section: Section, session: Session
     ) -> None:
         """Lay the polygons flat and draw those within the threshold."""
-        assert session.frame is not None
         ahead = self._ahead(section, session)
         flat = section.flatten(cut, ahead, ahead) if len(cut) else cut
         # Where the section lies stays, whatever cells of it are shown.
         self._all = flat
         if only is not None and section.whole_cells and len(cut):
-            part = self.cuts.of(session.frame.mesh, section, only=only)
+            part = self.cuts.of(session.shown_frame.mesh, section, only=only)
             near = section.middle_angle(cut, ahead)
             flat = section.flatten(part, near, ahead) if len(part) else part
         elif only is not None:
             flat = only.among(flat)
         if not section.whole_cells and len(flat):
             # All is in one plane, where folded cells overlap others: they are drawn last.
-            status = cut_frame(session.frame, section).quality.status
+            status = cut_frame(session.shown_frame, section).quality.status
             flat = flat.with_last(status[flat.cells] == INVERTED)
             flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
         self.polygons = flat
@@ -126,8 +124,7 @@ class FlatScene:
         """
         key = (session.mesh, section.kind, section.origin, section.direction)
         if key != self._level[0]:
-            assert session.mesh is not None
-            points = session.mesh.points[self.cuts.cutter(session.mesh).used]
+            points = session.opened_mesh.points[self.cuts.cutter(session.opened_mesh).used]
             self._level = key, section.ahead(points)
         return self._level[1]
 
@@ -178,9 +175,8 @@ class FlatScene:
         every = len(self._all.cell_ids)
         if only is not None and not len(cells):
             return f"none of {every:,} cells cut is shown: {only.words}"
-        assert self.session.frame is not None
         assert self.section is not None
-        paint = shown_paint(self.session, cut_frame(self.session.frame, self.section))
+        paint = shown_paint(self.session, cut_frame(self.session.shown_frame, self.section))
         more = "; line: undeformed" if self._undeformed_of else ""
         return paint.sentence(cells, *(() if only is None else (every, only.words))) + more
 

@@ -62,8 +62,7 @@ class BoxLayer(KeyedLayer):
         return session.mesh, box_motions(case), box_definition(case), chosen, style
 
     def draw(self, session: Session) -> None:
-        mesh = session.mesh
-        assert mesh is not None
+        mesh = session.opened_mesh
         boxes, moved = lattices(session.case, mesh)
         lift = 4.0 * self.stage.lift(mesh)
         every = {
@@ -279,8 +278,7 @@ class GhostLayer(Layer):
     def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> Band:
         """Return the actor and the data set of a name, made by ``make`` at the first call."""
         if key not in self._bands:
-            mesh = self._session.mesh
-            assert mesh is not None
+            mesh = self._session.opened_mesh
             shape = make(mesh.points, 3 * self.stage.lift(mesh))
             lit = mesh.dim == 3 and not key.endswith((RIM, WIRE))
             actor = self.stage.add(shape, key, lighting=lit, pickable=False)
@@ -303,8 +301,7 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
     After a run the boundary is where its ghost is, except for the tolerance of the data reduction;
     both would flicker there.
     """
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     at = mesh.points[surface.nodes]
     displacement = float(np.abs(points - at).max())
     still = STILL * float(np.ptp(at, axis=0).max())
@@ -363,14 +360,13 @@ class SupportLayer(KeyedLayer):
         return (*support_key(support_case(session), session.mesh), *style)
 
     def draw(self, session: Session) -> None:
-        assert session.mesh is not None
-        radius, boxes = support_of(support_case(session), session.mesh)
+        radius, boxes = support_of(support_case(session), session.opened_mesh)
         if not radius:
             return
         points = circles(np.mean(boxes, axis=1), radius)
         lines = np.arange(len(points)).reshape(-1, PIECES + 1)
         shape = pv.PolyData(
-            lifted(points, 4.0 * self.stage.lift(session.mesh)),
+            lifted(points, 4.0 * self.stage.lift(session.opened_mesh)),
             lines=np.insert(lines, 0, PIECES + 1, axis=1).ravel(),
         )
         # The seam in the background's color keeps the circle apart from the cells.

@@ -382,11 +382,10 @@ class TriadLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         plotter = self.stage.plotter
-        assert session.mesh is not None
         if self._axes is None:
             self._axes = self._make()
         # Of a 2D mesh, z points at the camera: its letter would lie on the others' origin.
-        self._axes.SetZAxisLabelText("" if session.mesh.dim == 2 else "z")
+        self._axes.SetZAxisLabelText("" if session.opened_mesh.dim == 2 else "z")
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()
             set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)

@@ -100,9 +100,9 @@ class PointLayer(Layer):
         actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
 
     def _at(self, session: Session, nodes: IntArray) -> Any:
-        assert session.mesh is not None
-        assert session.frame is not None
-        return lifted(session.frame.mesh.points[nodes], 4.0 * self.stage.lift(session.mesh))
+        return lifted(
+            session.shown_frame.mesh.points[nodes], 4.0 * self.stage.lift(session.opened_mesh)
+        )
 
 
 OUTLINE = "mark:outline"  # names of the actors
@@ -126,9 +126,8 @@ class MarkLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         cell = session.view.marked_cell
-        assert session.frame is not None
         assert cell is not None
-        containing, at = session.frame.place_of(cell)
+        containing, at = session.shown_frame.place_of(cell)
         mesh = containing.mesh
         lift = 3.0 * self.stage.lift(mesh)
         corners = mesh.points[nodes_of(mesh, at)]
@@ -182,8 +181,7 @@ class InvertedLayer(KeyedLayer):
     def draw(self, session: Session) -> None:
         self.stage.ring_words = ()
         if _wanted(session):
-            assert session.frame is not None
-            self._draw(session.frame, session.limit_chosen, self._cut)
+            self._draw(session.shown_frame, session.limit_chosen, self._cut)
 
     def _cut_cells(self, session: Session) -> list[IntArray]:
         """Return, per section of a 3D mesh in memory, the cells (k,) of its polygons."""
@@ -256,11 +254,10 @@ class MeasureLayer(KeyedLayer):
         """Draw them in front of everything, in the colors of letters and background."""
         found = measure(session)
         assert found is not None
-        assert session.frame is not None
         assert session.view.picks is not None
         stage = self.stage
         rim, line, dots, label = self.names
-        points = lifted(found.points, 5.0 * stage.lift(session.frame.mesh))
+        points = lifted(found.points, 5.0 * stage.lift(session.shown_frame.mesh))
         ends = np.arange(len(points) - 1)
         lines = facet_connectivity(np.column_stack([ends, ends + 1]))
         through = pv.PolyData(points, lines=lines)
@@ -299,9 +296,8 @@ class RepairLayer(KeyedLayer):
 
     def draw(self, session: Session) -> None:
         """Draw the cells and the nodes."""
-        assert session.frame is not None
-        assert session.frame.step is not None
-        done = session.frame.step.repaired
+        assert session.shown_frame.step is not None
+        done = session.shown_frame.step.repaired
         assert done is not None
         if not len(done.nodes):
             return

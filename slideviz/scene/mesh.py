@@ -62,8 +62,7 @@ class CellLayer(Layer):
         self._veil: tuple[Any, Any] | None = None
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        mesh = session.mesh
-        assert mesh is not None
+        mesh = session.opened_mesh
         if mesh.dim == 2:
             every = np.arange(len(mesh.cells))
             cells = mesh.cells.offsets, mesh.cells.connectivity, every
@@ -149,11 +148,10 @@ class BoundaryLayer(Layer):
         self._enclosed: frozenset[str] = frozenset()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        assert session.mesh is not None
-        self._lift = self.stage.lift(session.mesh)
+        self._lift = self.stage.lift(session.opened_mesh)
         for surface in surfaces:
-            self.drawn[surface.name] = self._add(surface, session.mesh.points)
-        enclosing = enclosing_of(session.mesh, surfaces)
+            self.drawn[surface.name] = self._add(surface, session.opened_mesh.points)
+        enclosing = enclosing_of(session.opened_mesh, surfaces)
         self._closed = enclosing.closed
         self._enclosed = enclosing.inner
 
@@ -336,9 +334,8 @@ class ThresholdLayer(Layer):
             actor.prop.show_edges = False
 
     def _draw(self, session: Session) -> None:
-        frame = session.frame
+        frame = session.shown_frame
         threshold = session.view.threshold
-        assert frame is not None
         assert threshold is not None
         mesh = frame.mesh
         values = self.stage.values(session)
@@ -404,16 +401,17 @@ class CoarseLayer(Layer):
 
     def _draw(self) -> None:
         session = self._session
-        assert session.frame is not None
         if not self.drawn:
             self.drawn = {name: self._add(surface) for name, surface in self.surfaces.items()}
-        made_of = session.frame, session.view.color_by, session.color_range
+        made_of = session.shown_frame, session.view.color_by, session.color_range
         again = made_of != self._made_of
         self._made_of = made_of
         for name, boundary in self.drawn.items():
             full = self._boundaries.drawn[name].actor
             if again:
-                actors.place(boundary.shape, session.frame.mesh.points[boundary.surface.nodes])
+                actors.place(
+                    boundary.shape, session.shown_frame.mesh.points[boundary.surface.nodes]
+                )
             if again and session.view.color_by != "role":
                 boundary.shape.cell_data[VALUES] = self.stage.values_of(
                     session, boundary.surface.owner
@@ -430,8 +428,7 @@ class CoarseLayer(Layer):
             prop.show_edges = False
 
     def _add(self, surface: Surface) -> DrawnBoundary:
-        assert self._session.mesh is not None
-        shape: Any = actors.surface_shape(surface, self._session.mesh.points)
+        shape: Any = actors.surface_shape(surface, self._session.opened_mesh.points)
         return DrawnBoundary(
             surface, shape, self.stage.add(shape, f"coarse:{surface.name}", pickable=False)
         )

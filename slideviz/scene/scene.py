@@ -197,8 +197,7 @@ class Scene:
 
         ``meshes`` are the states of the mesh that a film shows, for example.
         """
-        mesh = self.session.mesh
-        assert mesh is not None
+        mesh = self.session.opened_mesh
         self.camera.turn(view.towards, view.up, True)
         if view.detail is None:
             self.camera.fit(self.clouds(meshes))

@@ -119,8 +119,7 @@ class SectionLayer(Layer):
             self._draw_lines(new, neighbours)
 
     def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
-        assert session.frame is not None
-        mesh = session.frame.mesh
+        mesh = session.shown_frame.mesh
         sections = dict(shown_sections(session))
         key = (mesh, sections, tuple(neighbours), self.stage.scheme)
         if key == self._lines_of:
@@ -164,9 +163,8 @@ class SectionLayer(Layer):
     ) -> None:
         section, number, matrix = wanted
         kind = name[: name.index(":") + 1]
-        frame = session.frame
+        frame = session.shown_frame
         by_value = session.view.color_by != "role" and kind != RIM
-        assert frame is not None
         # The matrix is part of the key, as another case may have another period.
         only = self.stage.in_threshold(session)
         cut = cut_frame(frame, section)

@@ -174,9 +174,8 @@ class Stage:
 
         As `StepFrame.shown_values` has them: see `drawn` for their colors.
         """
-        frame = session.frame
+        frame = session.shown_frame
         what = session.view.color_by
-        assert frame is not None
         key = (frame, what, session.reference)
         if self._values is None or self._values[0] != key:
             self._values = key, frame.shown_values(what, session.reference)
@@ -205,8 +204,7 @@ class Stage:
 
     def value_of(self, session: Session, cell: int) -> float:
         """Return the value of one cell, which may be a worst cell of a mesh in its file."""
-        assert session.frame is not None
-        frame, at = session.frame.place_of(cell)
+        frame, at = session.shown_frame.place_of(cell)
         what = session.view.color_by
         return float(frame.shown_values(what, session.reference, np.array([at]))[0])
 

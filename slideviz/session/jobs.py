@@ -302,8 +302,7 @@ def open_file(
     if ending != ENDING:
         return opened
     session = opened.session
-    assert session.mesh is not None
-    mesh = session.mesh  # with the reference of the case
+    mesh = session.opened_mesh  # with the reference of the case
     content = read_session(path, session.first, moved)
     runs = [_restored(run, mesh, report, stopped) for run in content.runs]
     remark = ""

@@ -258,8 +258,7 @@ def with_box(
     is straight; None: as they are.
     """
     case = session.case
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     motion: Any = case.motions[index]
     boxes = dict(case.ffd_boxes)
     shapes = dict(zip(boxes, case.ffd_degrees, strict=False))
@@ -362,9 +361,8 @@ def support_case(session: Session) -> Case:
 
 def support_words(session: Session) -> str:
     """Return the message on the support radius that is drawn, on an open mesh: length, place."""
-    mesh = session.mesh
+    mesh = session.opened_mesh
     case = support_case(session)
-    assert mesh is not None
     radius, boxes = support_of(case, mesh)
     if not radius:
         return "There is no support radius to draw: nothing moves by radial functions"

@@ -93,8 +93,7 @@ class Placed(ABC):
     @property
     def dim(self) -> int:
         """Return the dimension of the mesh."""
-        assert self.session.mesh is not None
-        return self.session.mesh.dim
+        return self.session.opened_mesh.dim
 
     def allows(self, act: Act, axis: int) -> bool:
         """Return whether one can act along or about an axis: in 2D it stays in the plane."""
@@ -171,8 +170,7 @@ class Placed(ABC):
 def _axes(session: Session, origin: FloatArray) -> tuple[FloatArray, str]:
     """Return the axes (k, 3) of something at a point (3,), and their keys."""
     machine = machine_axis(session)
-    assert session.mesh is not None
-    if machine is None or session.mesh.dim == 2:
+    if machine is None or session.opened_mesh.dim == 2:
         return np.eye(3), "xyz"
     along = np.array(machine[0]) / np.linalg.norm(machine[0])
     arm = origin - machine[1]
@@ -478,8 +476,7 @@ def placed(session: Session, ghosts: Mapping[str, FloatArray], cuts: Cuts) -> Pl
 
 
 def _section(session: Session, section: Section, cuts: Cuts) -> PlacedSection | None:
-    assert session.frame is not None
-    mesh = session.frame.mesh
+    mesh = session.shown_frame.mesh
     if not section.shown or not can_cut(mesh, section):
         return None
     points = points_near(section, mesh, cuts)
@@ -500,8 +497,7 @@ def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
 
 
 def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | None:
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     by_motion = session.view.handle == "motion"
     index = session.motion_index if by_motion else None
     motion = None if index is None else session.case.motions[index]
@@ -522,8 +518,7 @@ def _boundary(session: Session, ghosts: Mapping[str, FloatArray]) -> Placed | No
 
 
 def _control(session: Session, index: int, motion: Ffd) -> PlacedControl | None:
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     boxes, moved = lattices(session.case, mesh)
     box = moved.get(motion.box) or boxes.get(motion.box)
     if box is None or box.problem(motion.index):

@@ -157,10 +157,9 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
     a centre in the middle of the moving boundaries. A section of constant span cuts nothing where
     there are no hub and shroud.
     """
-    mesh = session.mesh
+    mesh = session.opened_mesh
     case = session.case
     size = SECTION_SHAPES[kind].size
-    assert mesh is not None
     pair = machine_pair(session) if pair is None else pair  # None, too, of zones that differ
     if pair is not None and pair.kind == "rotational":
         axis = pair.axis
@@ -183,8 +182,7 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
 
 def _middle_of_moving(session: Session) -> FloatArray:
     """Return the centre (3,) of the bounding box of the moving boundaries, or else of the mesh."""
-    mesh = session.mesh
-    assert mesh is not None
+    mesh = session.opened_mesh
     names = [name for name in mesh.marker_names if session.role(name) == "moving"]
     points = padded(mesh.points[mesh.nodes_of(names) if names else mesh.cells.nodes])
     return (points.min(axis=0) + points.max(axis=0)) / 2.0

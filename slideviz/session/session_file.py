@@ -91,9 +91,8 @@ def stored_session(
     session: Session, designs: DesignTable, designs_case: Case | None, runs: Sequence[Run] = ()
 ) -> StoredSession:
     """Return what a session file is to have, with some of the session's runs."""
-    assert session.mesh is not None
     return StoredSession(
-        mesh=digest(session.mesh),
+        mesh=digest(session.opened_mesh),
         mesh_file=session.case.mesh_file or Path(),
         source=session.case.source,
         guesses=session.guesses,

@@ -484,6 +484,18 @@ class Session:
         return frames[min(self.view.frame, len(frames) - 1)] if frames else None
 
     @property
+    def opened_mesh(self) -> Mesh:
+        """Return the undeformed mesh, where a mesh is known to be open."""
+        assert self.mesh is not None
+        return self.mesh
+
+    @property
+    def shown_frame(self) -> StepFrame:
+        """Return the frame that is shown, where a mesh is known to be open."""
+        assert self.frame is not None
+        return self.frame
+
+    @property
     def frame_beside(self) -> StepFrame | None:
         """Return the frame of the other view, or None."""
         other = second_view(self)

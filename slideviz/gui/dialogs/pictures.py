@@ -735,9 +735,8 @@ class WheelDialog(PreviewDialog):
         return chosen
 
     def changed(self) -> None:
-        mesh = self._session.mesh
+        mesh = self._session.opened_mesh
         count = self.count
-        assert mesh is not None
         many = self._around if count == "all" else [count] * len(self._around)
         cells = sum(k * len(zone.cells) for k, zone in zip(many, zones_of(mesh), strict=True))
         self.words.setText(f"{cells:,} cells; nodes are merged where passages meet.")

@@ -380,8 +380,7 @@ class MotionPanel(Panel):
     def _ask_table(self, marker: Target, path: Path) -> Path | None:
         session = self.session
         case = session.case
-        mesh = session.mesh
-        assert mesh is not None
+        mesh = session.opened_mesh
         beside = case.source or session.path
         folder = beside.parent if beside is not None else self.services.files.folder()
         names = named(marker)

@@ -430,11 +430,10 @@ class SectionsPanel(Panel):
     # What is wanted --------------------------------------------------------------------
     def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.session
-        assert session.mesh is not None
         section = first_section(kind, session, period_of(session))
         self.change(changes.add_section, section)
         try:
-            with_walls(section, session.mesh, session.case, session.pairs)
+            with_walls(section, session.opened_mesh, session.case, session.pairs)
         except SlidevizError as error:  # no hub and shroud: they can be chosen below the list now
             self.services.banner.show_message(with_field_labels(str(error)))
 

@@ -494,9 +494,8 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
 
     ``every``: list the Jacobian at every corner, not only their range.
     """
-    assert session.frame is not None
-    info = cell_info(session.frame, cell)
-    least = ROUNDING * session.frame.mesh.extent
+    info = cell_info(session.shown_frame, cell)
+    least = ROUNDING * session.shown_frame.mesh.extent
     position = np.where(np.abs(info.position) > least, info.position, 0.0)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
@@ -510,7 +509,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     ]
     if around is not None:
         lines.append(_place_text(position, None))
-    near = nearest_boundary(session.frame.mesh, info.position)
+    near = nearest_boundary(session.shown_frame.mesh, info.position)
     if near is not None:
         lines.append(f"{near[1]:.4g} from {escape(near[0])}, the nearest boundary")
     ends = f"{info.jacobians.min():.3g} to {info.jacobians.max():.3g}"
