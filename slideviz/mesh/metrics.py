@@ -209,8 +209,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     if METRICS[name].where == "cells":
         return _of_cells(mesh, name, values)
     place = ("cells", name, turned)
-    best = METRICS[name].best
-    of_cells = _cached(mesh, place, lambda: {place: _worst_of_nodes(mesh, values, best)})
+    of_cells = _cached(mesh, place, lambda: {place: _worst_of_nodes(mesh, name, values)})
     used = ~np.isnan(values)
     if mesh.halo is not None:
         used[mesh.halo.outer] = False
@@ -234,17 +233,18 @@ def _cached(mesh: Mesh, key: object, compute: Callable[[], dict[object, FloatArr
     return made[key] if found is None else found
 
 
-def _worst_of_nodes(mesh: Mesh, values: FloatArray, best: str) -> FloatArray:
-    """Return the worst value (m,) of the nodes of each cell, of ``values`` (n,)."""
+def _worst_of_nodes(mesh: Mesh, name: Metric, values: FloatArray) -> FloatArray:
+    """Return the worst value (m,) of the nodes of each cell, of ``values`` (n,) of a metric."""
     found = np.empty(len(mesh.cells))
     cells = mesh.cells
+    least = METRICS[name].best == "high"
     in_parts(
         lambda part: _take_worst(
-            cells.connectivity, cells.offsets, values, best == "high", part.start, found[part]
+            cells.connectivity, cells.offsets, values, least, part.start, found[part]
         ),
         len(cells),
     )
-    return found
+    return _of_cells(mesh, name, found).values
 
 
 @njit

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.export.titles import mark_words
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.polyhedra import outlines
 from slideviz.mesh.quality_derivative import cell_margins
@@ -24,6 +25,7 @@ from slideviz.session.inspect import cell_at, cell_centers, cell_info, worst_cel
 from slideviz.session.jobs import save_quality
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
+from slideviz.terms import METRICS
 from tests.builders import grid
 from tests.polymesh_files import extruded, honeycomb, merged, sides_of, write_mesh, write_polymesh
 
@@ -226,6 +228,19 @@ def test_a_limit_on_the_margin_counts_every_part(hexagons, seed):
     assert found.actual == margins.min() < margins[first].min()
     assert {*found.cells} == {*first[least <= limit]}
     assert len({*found.cells}) == len(found.cells)
+
+
+@pytest.mark.parametrize("name", [name for name, row in METRICS.items() if row.where == "nodes"])
+def test_a_polyhedron_has_the_worst_value_of_all_its_nodes(hexagons, name):
+    random = np.random.default_rng(1)
+    points = hexagons.points + random.uniform(-0.05, 0.05, hexagons.points.shape)
+    found = metric(hexagons.with_points(points), name)
+    worst = min if METRICS[name].best == "high" else max
+    parts = np.split(hexagons.cells.connectivity, hexagons.cells.offsets[1:-1])
+    for number in range(18):
+        mine = np.flatnonzero(hexagons.whole_cells == number)
+        nodes = np.concatenate([parts[part] for part in mine])
+        assert {*found.of_cells[mine]} == {worst(found.values[nodes])}
 
 
 def test_messages_have_numbers_of_the_files_cells(folded, hexagons, tmp_path, capsys):
