@@ -23,14 +23,14 @@ FLAT = (0.5, 0.5, 3.0, 0.5, 0.5, 0.0, 0.0, 1.0, 0.0, 0.7123456789, 1.5)
 
 
 def opened(path):
-    return jobs.open_file(path, None, lambda _: None, lambda: False).session
+    return jobs.open_file(path, None, jobs.Job()).session
 
 
 def with_run(session, **settings):
     """The session after a run with other settings, shown at its last step."""
     session = changes.start_run(changes.set_case(session, **settings))
     found = []
-    jobs.compute(session.case, session.mesh, found.append, lambda: False)
+    jobs.compute(session.case, session.mesh, jobs.Job(found.append))
     frames = [one for one in found if isinstance(one, StepFrame)]
     return changes.end_run(changes.add_frames(session, frames), "done")
 

@@ -29,7 +29,7 @@ PAGE = (Path(__file__).parents[1] / "SECURITY.md").read_text("utf-8")
 
 
 def opened(path):
-    return jobs.open_file(path, None, lambda _: None, lambda: False)
+    return jobs.open_file(path, None, jobs.Job())
 
 
 @pytest.fixture
@@ -47,7 +47,12 @@ def session(here):
     camera = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5)
     table = (DesignTable(), found.case)
     return jobs.save_session(
-        Path("a.slideviz"), found, table, camera, [Path("mesh.su2")], lambda _: None, lambda: False
+        Path("a.slideviz"),
+        found,
+        table,
+        camera,
+        [Path("mesh.su2")],
+        jobs.Job(),
     )
 
 

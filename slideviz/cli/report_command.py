@@ -19,9 +19,9 @@ def main(arguments: Namespace) -> int:
     arguments.output = arguments.output or Path(f"{arguments.case.stem}_report.html")
     case, mesh = read_inputs(arguments)
     found = list[object]()
-    hooks = found.append, lambda: False
-    session = changes.start_run(jobs.prepare(mesh, case.mesh_file, case, *hooks).session)
-    jobs.compute(session.case, mesh, *hooks)
+    job = jobs.Job(found.append)
+    session = changes.start_run(jobs.prepare(mesh, case.mesh_file, case, job).session)
+    jobs.compute(session.case, mesh, job)
     frames = [one for one in found if isinstance(one, StepFrame)]
     session = changes.end_run(changes.add_frames(session, frames), "done")
     session = changes.set_view(session, color_by="size-skew")

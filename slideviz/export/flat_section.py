@@ -27,7 +27,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import CellsInRange
 from slideviz.sections.span import ConstantSpan, between_walls, find_walls
-from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
+from slideviz.session.jobs import Job
 from slideviz.session.panes import shown_views
 from slideviz.session.passages import find_periods, matrices, period_of, show_passages
 from slideviz.session.runs_words import run_words
@@ -40,8 +40,7 @@ def save_section(
     session: Session,
     section: Section,
     paper: SectionStyle,
-    report: Report,
-    stopped: Stopped,
+    job: Job,
 ) -> Path:
     """Write the picture of a section as the view shows it: step, colors, neighbouring passages.
 
@@ -57,7 +56,7 @@ def save_section(
             f"{session.frame.mesh.name} stays in its file; `slideviz section` draws its sections"
         )
     require_picture_name(path)
-    report(JobProgress(f"Cutting for {path.name}"))
+    job.progress(f"Cutting for {path.name}")
     views = shown_views(session)
     shown = [_shown(*one, section) for one in zip(views, pair_names(views), strict=True)]
     only = _choice(views[0], section)
@@ -66,8 +65,8 @@ def save_section(
             f"{section.describe()}: it cuts no cell that is shown ({only.words}), so there is "
             "nothing to draw; show all cells, or a wider range of them"
         )
-    raise_if_cancelled(stopped)
-    report(JobProgress(f"Drawing {path.name}"))
+    job.going_on()
+    job.progress(f"Drawing {path.name}")
     name = shown_name(session.path) if session.path is not None else ""
     style = replace(paper, trimmed=True, edges="edges" in session.view.drawn, name=name)
     if len(shown) == 1:

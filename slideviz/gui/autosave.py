@@ -187,8 +187,7 @@ class Autosave(BackgroundJob):
         camera: Camera | None,
         designs: DesignTable,
         of: Case | None,
-        _report: object,
-        _stopped: object,
+        _job: object,
     ) -> None:
         private_folder(self.path.parent)
         if self._lock is None:

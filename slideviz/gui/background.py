@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from qtpy.QtCore import QObject, Signal
@@ -20,7 +19,7 @@ from slideviz.gui.running import Running
 from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs
-from slideviz.session.jobs import JobProgress, Report, Stopped, check_frame, raise_if_cancelled
+from slideviz.session.jobs import Job, check_frame
 from slideviz.session.panes import shown_views
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
 from slideviz.session.state import CheckedLimits, Preview, Session, StepFrame
@@ -302,10 +301,8 @@ class SectionReader(BackgroundJob):
         self._timer.start()
 
 
-def _read_section(
-    frame: StepFrame, section: Section, report: Report, stopped: Stopped
-) -> StepFrame:
+def _read_section(frame: StepFrame, section: Section, job: Job) -> StepFrame:
     def progress(part: float) -> None:
-        report(JobProgress(f"{READING}: {part:.0%}"))
+        job.progress(f"{READING}: {part:.0%}")
 
-    return read_slab(frame, section, progress, partial(raise_if_cancelled, stopped))
+    return read_slab(frame, section, progress, job.going_on)

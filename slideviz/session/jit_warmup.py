@@ -17,7 +17,7 @@ from slideviz.mesh.walls import walls
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.plane import Plane
-from slideviz.session.jobs import Stopped, raise_if_cancelled
+from slideviz.session.jobs import Job
 from slideviz.session.state import cell_displacement
 from slideviz.solver.deform import deform
 from slideviz.system.jit_cache import compilation_watched
@@ -35,19 +35,19 @@ _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
 """Samples and settings that together use every compiled loop."""
 
 
-def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
+def warm_up(compiling: Callable[[], None], job: Job) -> None:
     """Write, read, cut and deform samples of few cells in memory, to compile all loops.
 
     ``compiling``: called when a loop is compiled; never when all come from the cache on disk.
-    ``stopped`` returns whether to stop; compilation itself cannot be interrupted.
+    ``job`` may be stopped; compilation itself cannot be interrupted.
     """
     # An error here is one in the user's run too, where it gets a message.
     with contextlib.suppress(Cancelled, SlidevizError), compilation_watched(compiling):
         _write_and_read()
         _look()
         for name, settings in _RUNS:
-            raise_if_cancelled(stopped)
-            _deform(name, settings, stopped)
+            job.going_on()
+            _deform(name, settings, job)
 
 
 def _write_and_read() -> None:
@@ -66,7 +66,7 @@ def _look() -> None:
     walls(mesh)
 
 
-def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
+def _deform(name: str, settings: Mapping[str, Any], job: Job) -> None:
     made = sample(name, size=_size(settings))
     mesh = made.mesh
     (block,) = made.case.markers_with("moving")
@@ -74,7 +74,7 @@ def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
     case: Case = made.case.change(
         motions=(motion,), steps=1, periodic="moving", reduction=None, **settings
     )
-    for _ in deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped), certify=True):
+    for _ in deform(case, mesh, progress=job.going_on, certify=True):
         pass
 
 

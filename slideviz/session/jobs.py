@@ -1,8 +1,8 @@
 """The long jobs of the window as plain functions: open, compute, check, save.
 
-A job is a function with two arguments for the thread that runs it: it calls ``report(item)``, from
-any thread, with progress and results, and raises `slideviz.errors.Cancelled` soon after
-``stopped()`` returns True. Nothing here draws.
+The last argument of a long job is its `Job`: it calls ``job.report(item)``, from any thread, with
+progress and results, and raises `slideviz.errors.Cancelled` soon after ``job.stopped()`` returns
+True. Nothing here draws.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -80,10 +79,46 @@ if TYPE_CHECKING:
     from slideviz.solver.steps import Progress, Step
 
 
+@frozen
+class JobProgress:
+    """Progress of a job: words, and the fraction done, 0 to 1, or None where it is unknown."""
+
+    text: str
+    fraction: float | None = None
+
+
+@frozen
+class Job:
+    """What a job has of those who wait for it; by default nobody listens, and nobody stops it."""
+
+    report: Callable[[object], None] = lambda _: None
+    """Takes `JobProgress` and results, from any thread."""
+    stopped: Callable[[], bool] = lambda: False
+    """Returns whether it is to stop."""
+
+    def progress(self, text: str, fraction: float | None = None) -> None:
+        """Report progress."""
+        self.report(JobProgress(text, fraction))
+
+    def going_on(self, *_: object) -> None:
+        """Raise Cancelled if the job is to stop, whatever the progress is."""
+        if self.stopped():
+            raise Cancelled("stopped on request")
+
+    def tick(self, text: str) -> Callable[[float], None]:
+        """Return a function that reports the fraction done, or raises Cancelled as `going_on`."""
+
+        def tick(done: float) -> None:
+            self.going_on()
+            self.progress(text, done)
+
+        return tick
+
+
 _ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
 
 
-def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped) -> Path:
+def save_quality(path: Path, frame: StepFrame, job: Job) -> Path:
     """Write a CSV file with number, type, qualities, status and middle of every cell.
 
     Raises SlidevizError if the file cannot be written.
@@ -94,7 +129,7 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
     middles = cells.means(mesh.points)
     measured = found.size, found.skew, found.values, found.status, middles
     columns = [mesh.file_types, *(column[found.file_rows] for column in measured)]
-    tick = _tick(f"Writing {path.name}", report, stopped)
+    tick = job.tick(f"Writing {path.name}")
 
     def rows() -> Iterator[Sequence[object]]:
         yield "cell", "type", "size", "skew", "size_skew", "status", *"xyz"[: mesh.dim]
@@ -125,8 +160,7 @@ def step_paths(path: Path, count: int) -> list[Path]:
 def save_steps(
     path: Path,
     frames: Sequence[StepFrame],
-    report: Report,
-    stopped: Stopped,
+    job: Job,
     first: StepFrame | None = None,
 ) -> list[Path]:
     """Write the mesh of every step, whole files only, and return their paths.
@@ -138,7 +172,7 @@ def save_steps(
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:
-        tick = _tick(f"Writing {path.name}", report, stopped)
+        tick = job.tick(f"Writing {path.name}")
         every = (*filter(None, [first]), *frames)
         start = every[0].mesh
         with format_for(path).function("series")(path, start) as series:
@@ -148,8 +182,8 @@ def save_steps(
                 series.add(frame.mesh.points, cell_values(frame), moved)
         return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
-        _tick(f"Writing {target.name}", report, stopped)(k / len(frames))
-        save_mesh(target, frame, False, lambda _: None, stopped)
+        job.tick(f"Writing {target.name}")(k / len(frames))
+        save_mesh(target, frame, False, Job(stopped=job.stopped))
     return paths
 
 
@@ -160,9 +194,7 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     return session.mesh, case.motions, around, case.sliding, case.rims, case.feature_angle_deg
 
 
-def find_intersection(
-    case: Case, mesh: Mesh, _report: Report, stopped: Stopped
-) -> tuple[str, Message | None]:
+def find_intersection(case: Case, mesh: Mesh, job: Job) -> tuple[str, Message | None]:
     """Return two messages on motions: on boundaries that cross each other, mostly.
 
     The first keeps a run from starting: a moved boundary crosses another one, or a displacement
@@ -172,7 +204,7 @@ def find_intersection(
     files = [path for motion in case.motions for path in motion.files]
     prepare_spans(case, mesh)
     try:
-        ready = case.motions and not check_case(case, mesh) and not stopped()
+        ready = case.motions and not check_case(case, mesh) and not job.stopped()
         if not ready or not all(path.is_file() for path in files):
             return "", None
         found, folded = check_motions(case, mesh)
@@ -219,18 +251,6 @@ def forget_intersection(session: Session, key: tuple[object, ...]) -> Session:
     return replace(session, intersection="", folding=None)
 
 
-Report = Callable[[object], None]
-Stopped = Callable[[], bool]
-
-
-@frozen
-class JobProgress:
-    """Progress of a job: words, and the fraction done, 0 to 1, or None where it is unknown."""
-
-    text: str
-    fraction: float | None = None
-
-
 @record
 class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
@@ -262,8 +282,7 @@ def require_openable(path: Path) -> None:
 def open_file(
     path: Path,
     zone: int | None,
-    report: Report,
-    stopped: Stopped,
+    job: Job,
     mesh_file: Path | None = None,
     unpacked: Path | None = None,
     case: Case | None = None,
@@ -279,7 +298,7 @@ def open_file(
     ending = path.suffix.lower()
     moved = dict[Path, Path]()
     if ending in (".cfg", ENDING):
-        report(JobProgress(f"Reading {shown_name(path)}"))
+        job.progress(f"Reading {shown_name(path)}")
     if ending == ENDING:
         case, moved = read_case_of(path, unpacked or path.parent, mesh_file)
     elif ending == ".png":
@@ -291,29 +310,29 @@ def open_file(
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
         mesh_path = case.mesh_file
         zone = case.zone if zone is None else zone
-    report(JobProgress(f"Reading {shown_name(mesh_path)}"))
-    reading = _tick(f"Reading {shown_name(mesh_path)}", report, stopped)
+    job.progress(f"Reading {shown_name(mesh_path)}")
+    reading = job.tick(f"Reading {shown_name(mesh_path)}")
     kind = case.mesh_format if case is not None else None
     if kind != "su2" and is_large(mesh_path, zone):
         mesh = read_boundary(mesh_path, zone, reading)
     else:
         mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
-    opened = prepare(mesh, mesh_path, case, report, stopped)
+    opened = prepare(mesh, mesh_path, case, job)
     if ending != ENDING:
         return opened
     session = opened.session
     mesh = session.opened_mesh  # with the reference of the case
     content = read_session(path, session.first, moved)
-    runs = [_restored(run, mesh, report, stopped) for run in content.runs]
+    runs = [_restored(run, mesh, job) for run in content.runs]
     remark = ""
     if content.shown is not None and content.mesh != digest(mesh):
         remark = f"{mesh_path} has changed since the session was saved, so its runs are left out."
     return replace(opened, session=content.put_into(session, runs), content=content, remark=remark)
 
 
-def _restored(run: Run, mesh: Mesh, report: Report, stopped: Stopped) -> Run:
+def _restored(run: Run, mesh: Mesh, job: Job) -> Run:
     """Return a run of a session file, with the quality of its steps."""
-    tick = _tick(f"Run {run.number}: {PHASES['quality'].label}", report, stopped)
+    tick = job.tick(f"Run {run.number}: {PHASES['quality'].label}")
     frames = []
     for k, one in enumerate(run.frames):
         tick(k / len(run.frames))
@@ -332,45 +351,40 @@ def save_session(
     designs: tuple[DesignTable, Case | None],
     camera: Camera | None,
     copied: Sequence[Path],
-    report: Report,
-    stopped: Stopped,
+    job: Job,
 ) -> Path:
     """Write a session file with copies of some files (`session_file`), and return its path.
 
     ``designs``: their table, and the case of its results.
     """
-    report(JobProgress(f"Writing {path.name}"))
+    job.progress(f"Writing {path.name}")
     runs = () if session.lacks_cells else session.runs
     content = stored_session(session, *designs, runs)
-    going_on = partial(raise_if_cancelled, stopped)
-    write_session(path, session, content, camera, copied, going_on)
+    write_session(path, session, content, camera, copied, job.going_on)
     return path
 
 
-def prepare(
-    mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
-) -> Opened:
+def prepare(mesh: Mesh, path: Path | None, case: Case | None, job: Job) -> Opened:
     """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
     if case is not None:
         mesh = referenced(case, mesh)
         case = with_marker_names(case, mesh)
-    going_on = partial(raise_if_cancelled, stopped)
-    going_on()
-    report(JobProgress("Finding the boundaries"))
+    job.going_on()
+    job.progress("Finding the boundaries")
     surfaces = find_surfaces(mesh)
-    going_on()
-    report(JobProgress("Looking for periodic boundaries"))
-    pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
-    report(JobProgress("Measuring the cells"))
+    job.going_on()
+    job.progress("Looking for periodic boundaries")
+    pairs = find_pairs(mesh, going_on=job.going_on) if mesh.markers else ()
+    job.progress("Measuring the cells")
     metric = case.quality_metric if case is not None else "knupp"
     if not isinstance(mesh, Skin):
-        measured = quality(mesh, mesh.reference, metric, going_on)
+        measured = quality(mesh, mesh.reference, metric, job.going_on)
         periodic = {name for pair in pairs for name in (pair.first, pair.second)}
         names = [name for name in mesh.marker_names if name not in periodic]
         first = StepFrame(mesh, measured, walls=_walls(mesh, mesh, names))
     else:
-        first = first_frame(mesh, metric, _tick("Measuring the cells", report, stopped))
-    going_on()
+        first = first_frame(mesh, metric, job.tick("Measuring the cells"))
+    job.going_on()
     _precompute(first)
     session = open_mesh(first, path, pairs, case)
     enclosing_of(mesh, surfaces)
@@ -399,18 +413,16 @@ def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
         return None
 
 
-def make_live_fields(
-    case: Case, mesh: Mesh, _report: Report, stopped: Stopped
-) -> LiveFields | None:
+def make_live_fields(case: Case, mesh: Mesh, job: Job) -> LiveFields | None:
     """Return the live fields of a case; None where there can be none."""
     try:
-        return LiveFields.of(case, mesh, lambda _: raise_if_cancelled(stopped))
+        return LiveFields.of(case, mesh, job.going_on)
     except (CaseError, DeformError, MeshError):
         return None
 
 
 def make_preview(
-    fields: LiveFields, case: Case, run: Run | None, _report: Report, stopped: Stopped
+    fields: LiveFields, case: Case, run: Run | None, job: Job
 ) -> tuple[LiveFields, Preview | None]:
     """Return the preview of a case, and its fields, which begin at ``run`` if that is given.
 
@@ -423,77 +435,72 @@ def make_preview(
         points = fields.moved(case)
         if points is not None:
             now = mesh.with_points(points)
-            going_on = partial(raise_if_cancelled, stopped)
-            frame = StepFrame(now, quality(now, mesh, case.quality_metric, going_on))
+            frame = StepFrame(now, quality(now, mesh, case.quality_metric, job.going_on))
             _precompute(frame)
             return fields, Preview(case, frame, step_safety(mesh, now, mesh))
     return fields, None
 
 
-def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
+def compute(case: Case, mesh: Mesh, job: Job) -> None:
     """Deform the mesh; report every step as a `StepFrame`, and the progress as `JobProgress`."""
     furthest = 0.0
 
     def progress(now: Progress) -> None:
         nonlocal furthest
-        raise_if_cancelled(stopped)
+        job.going_on()
         # Sliding has its phases more than once in a step; a bar must not run back.
         furthest = max(furthest, overall(now))
         phase = PHASES[now.phase].label + now.of_zone
         if case.steps:
-            report(JobProgress(f"Step {now.step} of {now.total}: {phase}", furthest))
+            job.progress(f"Step {now.step} of {now.total}: {phase}", furthest)
         elif now.phase == "classify":
-            report(JobProgress(f"Automatic steps: {phase}"))
+            job.progress(f"Automatic steps: {phase}")
         else:
             # It is unknown how many numbers of steps will be tried, and so is the fraction.
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
-            report(JobProgress(f"Trying {tried}: step {now.step}, {phase}"))
+            job.progress(f"Trying {tried}: step {now.step}, {phase}")
 
     unfinished = True
 
     def going_on() -> None:
         # The last step is not dropped, even if the job is asked to stop.
         if unfinished:
-            raise_if_cancelled(stopped)
+            job.going_on()
 
     for step in deform(case, mesh, progress=progress, certify=True):
         unfinished = step.index < step.total
-        report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
+        job.progress(f"Step {step.index} of {step.total}: quality", step.index / step.total)
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        report(_frame_of(step, measured, case, mesh, () if unfinished else case.limits))
+        job.report(_frame_of(step, measured, case, mesh, () if unfinished else case.limits))
         going_on()
 
 
-def compute_designs(
-    cases: Mapping[int, Case], mesh: Mesh, report: Report, stopped: Stopped
-) -> None:
+def compute_designs(cases: Mapping[int, Case], mesh: Mesh, job: Job) -> None:
     """Deform the mesh for designs, by number; report the last step of each as a `StepFrame`.
 
     They are numbered like the steps of one run.
     """
     total = len(cases)
     for k, (number, case) in enumerate(cases.items(), start=1):
-        report(JobProgress(f"Design {number}, {k} of {total}", (k - 1) / total))
+        job.progress(f"Design {number}, {k} of {total}", (k - 1) / total)
         try:
-            *_, step = deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped))
+            *_, step = deform(case, mesh, progress=job.going_on)
         except (CaseError, DeformError) as problem:
             raise SlidevizError(*problem.within(f"design {number}")) from problem
         step = replace(step, index=k, total=total)
         measured = quality(step.mesh, mesh, case.quality_metric)
         frame = _frame_of(step, measured, case, mesh, case.limits)
-        report(replace(frame, label=f"design {number} of {total}"))
+        job.report(replace(frame, label=f"design {number} of {total}"))
 
 
-def repair(
-    case: Case, mesh: Mesh, frames: Sequence[StepFrame], report: Report, stopped: Stopped
-) -> None:
+def repair(case: Case, mesh: Mesh, frames: Sequence[StepFrame], job: Job) -> None:
     """Mend the last of some frames; report all of them, that one mended.
 
     ``mesh`` is the undeformed mesh; with its frame alone, that is mended, and all moving boundaries
     stay.
     """
     *earlier, last = frames
-    tick = _tick(f"Repair: {PHASES['repair'].label}", report, stopped)
+    tick = job.tick(f"Repair: {PHASES['repair'].label}")
     step = mended_frame(case, mesh, last.step, lambda now: tick(now.fraction))
     if step.safe is not None:  # the last straight way now ends at the mended mesh
         before = mesh
@@ -504,9 +511,9 @@ def repair(
         safe = step_safety(before, step.mesh, mesh, (done, step.part), step.index)
         step = replace(step, safe=safe)
     for frame in earlier:
-        report(frame)
+        job.report(frame)
     measured = quality(step.mesh, None if last.step is None else mesh, case.quality_metric)
-    report(_frame_of(step, measured, case, mesh, case.limits))
+    job.report(_frame_of(step, measured, case, mesh, case.limits))
 
 
 def _frame_of(
@@ -522,9 +529,7 @@ def _frame_of(
     return frame
 
 
-def compute_streamed(
-    case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
-) -> None:
+def compute_streamed(case: Case, first: StepFrame, output: Path, job: Job) -> None:
     """Deform a mesh from file to file; report the progress, and the last step as a `StepFrame`.
 
     ``first`` is the undeformed frame, of the boundary. Raises Cancelled if it was stopped; a file
@@ -535,7 +540,7 @@ def compute_streamed(
 
     def progress(now: Progress) -> None:
         phase = PHASES[now.phase].label + now.of_zone
-        _tick(f"From file to file: {phase}", report, stopped)(overall(now))
+        job.tick(f"From file to file: {phase}")(overall(now))
 
     skin = first.mesh
     done = stream(case.change(mesh_file=skin.source), output, report=progress, worst=WORST)
@@ -543,7 +548,7 @@ def compute_streamed(
     now = skin.with_points(step.mesh.points)
     frame = frame_of(now, skin, output, done.quality.totals, case.quality_metric)
     limits = check_limits(case.limits, MeasuredMesh(frame.quality))
-    report(replace(frame, step=replace(step, mesh=now, safe=done.safe), limits=limits))
+    job.report(replace(frame, step=replace(step, mesh=now, safe=done.safe), limits=limits))
 
 
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
@@ -560,8 +565,7 @@ def save_mesh(
     path: Path,
     frame: StepFrame,
     overwrite: bool,
-    report: Report,
-    stopped: Stopped,
+    job: Job,
     base: Mesh | None = None,
 ) -> Path:
     """Write the mesh of a frame, with its quality where the format has values of cells.
@@ -569,9 +573,9 @@ def save_mesh(
     With the undeformed mesh ``base``, the displacement is written, too. Raises Cancelled if it was
     stopped; what was at ``path`` is as before.
     """
-    report(JobProgress(f"Writing {path.name}"))
+    job.progress(f"Writing {path.name}")
     data = cell_values(frame) if holds_quality(path) else None
-    write(path, frame.mesh, overwrite, data, base, lambda: raise_if_cancelled(stopped))
+    write(path, frame.mesh, overwrite, data, base, job.going_on)
     return path
 
 
@@ -582,14 +586,13 @@ def save_wheel(
     frame: StepFrame,
     passages: int | Literal["all"],
     numbered: bool,
-    report: Report,
-    stopped: Stopped,
+    job: Job,
 ) -> WheelQuality:
     """Write the wheel of the mesh of a frame, and return its quality; ``mesh`` is undeformed.
 
     Other parameters and errors as of `slideviz.design.deformed_wheel.wheel`.
     """
-    tick = _tick(f"Writing {path.name}", report, stopped)
+    tick = job.tick(f"Writing {path.name}")
     moved = [frame.mesh.points]
     return write_wheel(
         path, [case], mesh, moved, passages, numbered, lambda now: tick(now.fraction)
@@ -602,47 +605,27 @@ def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
     return {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
 
 
-def raise_if_cancelled(stopped: Stopped) -> None:
-    """Raise Cancelled if ``stopped()`` returns True: the job was asked to stop."""
-    if stopped():
-        raise Cancelled("stopped on request")
-
-
-def _tick(text: str, report: Report, stopped: Stopped) -> Callable[[float], None]:
-    """Return a tick that reports the fraction done, or raises Cancelled if it is to stop."""
-
-    def tick(done: float) -> None:
-        raise_if_cancelled(stopped)
-        report(JobProgress(text, done))
-
-    return tick
-
-
 SIZES = {"stator": 20_000}
 """Sizes with which large samples are opened where none is given, to open quickly."""
 
 
-def open_sample(
-    name: str, folder: Path, report: Report, stopped: Stopped, size: int | None = None
-) -> Opened:
+def open_sample(name: str, folder: Path, job: Job, size: int | None = None) -> Opened:
     """Return a sample case, written into a folder of its own and ready to be shown.
 
     ``size`` as of ``slideviz.samples.table.sample``; without one, not larger than ``SIZES``. Raises
     SlidevizError if there is no such sample, or it cannot be written.
     """
-    report(JobProgress(f"Making the sample {name}"))
+    job.progress(f"Making the sample {name}")
     with suppress(OSError):  # writing says why
         private_folder(folder)
     place = folder / (name if size is None else f"{name}-{size}")
     written = write_sample(name, place, size or SIZES.get(name), overwrite=True)
-    raise_if_cancelled(stopped)
+    job.going_on()
     case = next(path for path in written if path.suffix == ".cfg")
-    return open_file(case, None, report, stopped)
+    return open_file(case, None, job)
 
 
-def check_frame(
-    frame: StepFrame, undeformed: Mesh, case: Case, _report: Report, _stopped: Stopped
-) -> CheckedLimits:
+def check_frame(frame: StepFrame, undeformed: Mesh, case: Case, _job: Job) -> CheckedLimits:
     """Return the limits of a case, checked on a frame."""
     if frame.extra is None:
         try:
@@ -661,9 +644,7 @@ def check_frame(
     return CheckedLimits(frame, case.limits, check_limits(known, measured), problem)
 
 
-def run_designs(
-    case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
-) -> None:
+def run_designs(case: Case, mesh: Mesh, table: DesignTable, job: Job) -> None:
     """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
 
     Raises SlidevizError if the table has mistakes, or no process can be started.
@@ -671,11 +652,11 @@ def run_designs(
     total = len(table.rows)
     left = [at for at in range(1, total + 1) if at not in table.results]
     wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
-    report(JobProgress(f"Starting with {counted(len(left), 'design')}"))
+    job.progress(f"Starting with {counted(len(left), 'design')}")
     begin = time.monotonic()
-    rows = sweep(case, wanted, mesh=mesh, going_on=lambda: raise_if_cancelled(stopped))
+    rows = sweep(case, wanted, mesh=mesh, going_on=job.going_on)
     for done, row in enumerate(rows, start=1):
-        report(replace(row, design=left[row.design - 1]))
+        job.report(replace(row, design=left[row.design - 1]))
         seconds = (time.monotonic() - begin) / done * (len(left) - done)
         words = f"{total - len(left) + done} of {total}, {seconds:.0f} s left"
-        report(JobProgress(words, done / len(left)))
+        job.progress(words, done / len(left))

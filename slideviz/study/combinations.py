@@ -27,6 +27,7 @@ from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
 from slideviz.session.jit_warmup import warm_up
+from slideviz.session.jobs import Job
 from slideviz.solver.deform import deform
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import Setup, make_setup
@@ -231,7 +232,7 @@ class _Shared:
 
 def warm(methods: Iterable[str]) -> None:
     """Load and compile what the methods need once, by small runs, so that no run's time has it."""
-    warm_up(lambda: None, lambda: False)
+    warm_up(lambda: None, Job())
     made = sample("square", 4, "motion")
     (block,) = made.case.markers_with("moving")
     case = made.case.change(motions=(Translate(block, (1e-3, 0.0)),))

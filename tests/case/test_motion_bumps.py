@@ -11,7 +11,7 @@ from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.moving_nodes import displacements
 from slideviz.design.sweeps.table import applied, columns_of, numbers_of
 from slideviz.errors import CaseError
-from slideviz.session.jobs import find_intersection
+from slideviz.session.jobs import Job, find_intersection
 from slideviz.solver.prepare import prepare
 from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, cube
@@ -91,7 +91,7 @@ def test_a_chord_that_does_not_fit_is_told_before_a_run_and_after(kind, chord, t
     words += " with 0, 1 if all of it is meant: (airfoil, "
     messages = make_setup(prepare(moved, mesh)).warnings
     assert any(words in str(text) for text in messages) == told
-    _, said = find_intersection(moved, mesh, lambda _: None, lambda: False)
+    _, said = find_intersection(moved, mesh, Job())
     assert (words in str(said)) == told
 
 

@@ -28,6 +28,7 @@ from slideviz.scene.sections import plain_color
 from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
 from slideviz.session import changes, section_cuts
+from slideviz.session.jobs import Job
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
 from slideviz.session.section_cuts import CACHE_SIZE, Cuts
@@ -614,7 +615,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     section = Section("cylinder", radius=0.27)
     told = []
     one, three = tmp_path / "one.svg", tmp_path / "three.svg"
-    going = (SectionStyle((1600, 1000)), told.append, lambda: False)
+    going = (SectionStyle((1600, 1000)), Job(told.append))
     assert save_section(three, session, section, *going) == three
     save_section(one, changes.set_view(session, passages=0), section, *going)
     assert three.stat().st_size > 2 * one.stat().st_size
@@ -624,7 +625,9 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     with pytest.raises(CaseError, match="a section is drawn as"):
         save_section(tmp_path / "one.bmp", session, section, *going)
     with pytest.raises(Cancelled):
-        save_section(one, session, section, SectionStyle((1600, 1000)), told.append, lambda: True)
+        save_section(
+            one, session, section, SectionStyle((1600, 1000)), Job(told.append, lambda: True)
+        )
 
 
 def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_it_is_of(
@@ -649,7 +652,7 @@ def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_
     )
     file = tmp_path / "a.png"
     paper = SectionStyle.of_cm(8.5, 6.4)
-    save_section(file, session, section, paper, lambda _: None, lambda: False)
+    save_section(file, session, section, paper, Job())
     figure = drawn[0]
     said = figure.get_suptitle().split("\n")
     assert "run 2, direct sliding, step 2, plane z = 0.52" in said
@@ -675,7 +678,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
     monkeypatch.setattr(
         section_picture, "draw_section", lambda *v: drawn.append(real(*v)) or drawn[-1]
     )
-    going = (SectionStyle((1600, 1000)), lambda _: None, lambda: False)
+    going = (SectionStyle((1600, 1000)), Job())
     save_section(tmp_path / "a.png", some, MIDDLE, *going)
     figure = drawn[0]
     cut = shapes_cells(session, MIDDLE)

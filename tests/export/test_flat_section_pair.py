@@ -14,6 +14,7 @@ from slideviz.plots import section_picture
 from slideviz.plots.section_picture import SectionStyle, arrangement
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.jobs import Job
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from tests.builders import cube, passage, square
@@ -47,7 +48,7 @@ def save(tmp_path, monkeypatch):
 
     def run(session, section=LEVEL, paper=PAPERS[1]):
         file = tmp_path / "a.png"
-        save_section(file, session, section, paper, lambda _: None, lambda: False)
+        save_section(file, session, section, paper, Job())
         with Image.open(file) as image:
             assert image.size[0] == paper.size[0]
         return drawn[-1]

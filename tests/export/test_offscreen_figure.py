@@ -428,7 +428,7 @@ def test_the_table_tells_inverted_cells_and_every_type(square, tmp_path):
     bad = square.with_points(points)
     said = []
     frame = StepFrame(bad, quality(bad, square))
-    path = jobs.save_quality(tmp_path / "q.csv", frame, said.append, lambda: False)
+    path = jobs.save_quality(tmp_path / "q.csv", frame, jobs.Job(said.append))
     lines = path.read_text().splitlines()
     assert len(lines) == 1 + len(bad.cells)
     assert sum(",inverted," in line for line in lines) == frame.quality.inverted > 0

@@ -268,7 +268,7 @@ def sample_folder(tmp_path_factory):
 def computed(sample_folder):
     """The case of the passage, opened, and what returns the steps of a case: read only."""
     path = sample_folder / "passage" / "passage.cfg"
-    opened = jobs.open_file(path, None, lambda _: None, lambda: False)
+    opened = jobs.open_file(path, None, jobs.Job())
     mesh = opened.session.mesh
     mesh.points.flags.writeable = False
 
@@ -278,7 +278,7 @@ def computed(sample_folder):
         if (key := repr(case)) in known:
             return known[key]
         found = []
-        jobs.compute(case, mesh, found.append, lambda: False)
+        jobs.compute(case, mesh, jobs.Job(found.append))
         known[key] = [one for one in found if isinstance(one, StepFrame)]
         for step in known[key]:
             step.mesh.points.flags.writeable = False

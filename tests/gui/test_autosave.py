@@ -71,7 +71,7 @@ def case_in(path):
 @pytest.fixture
 def crashed(qtbot, folder, case_file):
     """The file of a session that did not end properly: with other settings, and a view."""
-    session = jobs.open_file(case_file, None, lambda _: None, lambda: False).session
+    session = jobs.open_file(case_file, None, jobs.Job()).session
     store = Store()
     keeper = Autosave(store, folder, lambda: None, lambda: (DesignTable(), None))
     store.put(changes.set_view(changes.set_case(session, steps=7), color_by="skew"))

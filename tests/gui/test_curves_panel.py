@@ -91,7 +91,7 @@ def safe(full, qtbot):
     moves = {"roles": {"BLOCK": "moving"}, "motions": (Translate("BLOCK", (0.0, 0.2)),)}
     session = changes.set_case(session, **moves, steps=1, relax="no")
     found = []
-    jobs.compute(session.case, session.mesh, found.append, lambda: False)
+    jobs.compute(session.case, session.mesh, jobs.Job(found.append))
     frames = [one for one in found if isinstance(one, StepFrame)]
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     full.store.put(session)

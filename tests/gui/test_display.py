@@ -158,7 +158,7 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
 
 
 def test_neighbours_of_zones_with_a_period_each(driver, tmp_path):
-    opened = jobs.prepare(stage(), tmp_path / "stage.su2", None, lambda _: None, lambda: False)
+    opened = jobs.prepare(stage(), tmp_path / "stage.su2", None, jobs.Job())
     driver.window.show_opened(opened)
     box = panel(driver)
     assert box.passages.isEnabled()

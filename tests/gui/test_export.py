@@ -539,7 +539,7 @@ def test_a_cancelled_table_leaves_no_file(computed, tmp_path):
 
     with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_quality(
-            tmp_path / "q.csv", computed[0].session.first, lambda _: None, lambda: True
+            tmp_path / "q.csv", computed[0].session.first, jobs.Job(stopped=lambda: True)
         )
     assert not list(tmp_path.glob("q*"))
 
@@ -558,7 +558,7 @@ def test_the_shown_step_is_saved_as_a_wheel_with_a_picture(driver, answers, tmp_
     mesh, roles = passage((2, 6, 6), 40.0), {"blade": "moving", "per1": "periodic"}
     case = Case(roles=roles | {"per2": "periodic"}, periodic_type="rotational")
     path = tmp_path / "ring.su2"
-    driver.window.show_opened(jobs.prepare(mesh, path, case, lambda _: None, lambda: False))
+    driver.window.show_opened(jobs.prepare(mesh, path, case, jobs.Job()))
     act, shown = driver.window.actions_table.by_name["save_wheel"], []
 
     def look(dialog):
@@ -594,7 +594,7 @@ def test_a_stage_has_wheels_gaps_and_spans_of_its_zones(driver, answers, tmp_pat
     names = [f"{zone}:{side}" for zone in (1, 2) for side in ("per1", "per2")]
     roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
     case, path = Case(roles=roles, periodic_type="rotational"), tmp_path / "stage.su2"
-    window.show_opened(jobs.prepare(mesh, path, case, lambda _: None, lambda: False))
+    window.show_opened(jobs.prepare(mesh, path, case, jobs.Job()))
     words = []
 
     def look(dialog):
@@ -647,7 +647,7 @@ def test_cancelled_steps_keep_whole_files(steps, tmp_path):
 
     said = []
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.save_steps(tmp_path / "s.su2", steps, said.append, lambda: len(said) > 0)
+        jobs.save_steps(tmp_path / "s.su2", steps, jobs.Job(said.append, lambda: len(said) > 0))
     assert [path.name for path in tmp_path.glob("s_*")] in ([], ["s_1.su2"])
 
 
@@ -706,7 +706,7 @@ def test_saved_quality_is_in_the_vtu(computed, steps, tmp_path):
     import pyvista as pv
 
     frame = steps[-1]
-    jobs.save_mesh(tmp_path / "q.vtu", frame, False, lambda _: None, lambda: False)
+    jobs.save_mesh(tmp_path / "q.vtu", frame, False, jobs.Job())
     found = pv.read(tmp_path / "q.vtu").cell_data["size_skew"]
     values = quality(frame.mesh, computed[0].session.mesh).values
     assert np.allclose(found[: len(values)], values)

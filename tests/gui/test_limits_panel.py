@@ -9,7 +9,7 @@ from qtpy.QtTest import QTest
 from slideviz.case.limits import read_limits
 from slideviz.gui.panels.limits import LimitsPanel
 from slideviz.session import changes
-from slideviz.session.jobs import check_frame
+from slideviz.session.jobs import Job, check_frame
 from tests.session.test_walls_table import sheared_session
 from tests.windows import services
 
@@ -37,7 +37,7 @@ def show(panel, limits="", **roles):
     panel.store.change(lambda _: sheared_session(roles))
     panel.store.change(changes.set_case, limits=read_limits(limits))
     session = panel.store.session
-    checked = check_frame(session.frame, session.mesh, session.case, lambda _: None, lambda: False)
+    checked = check_frame(session.frame, session.mesh, session.case, Job())
     panel.store.change(replace, checked=checked)
 
 

@@ -218,7 +218,7 @@ def test_motions_over_span_of_each_zone_have_its_walls(driver, tmp_path):
     roles = dict.fromkeys(names, "periodic") | {"1:blade": "moving", "2:blade": "moving"}
     twist = SpanMotion("1:blade", "twist", (0.0, 1.0), (0.0, 3.0))
     case = Case(roles=roles, motions=(twist,), periodic_type="rotational")
-    opened = jobs.prepare(stage(), tmp_path / "s.su2", case, lambda _: None, lambda: False)
+    opened = jobs.prepare(stage(), tmp_path / "s.su2", case, jobs.Job())
     window = driver.window
     window.resize(1280, 800)
     window.show_opened(opened)

@@ -10,18 +10,18 @@ from slideviz.formats.table import usual_ending
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.questions import ask_open  # the driver answers the others
 from slideviz.samples.table import write_sample
-from slideviz.session.jobs import open_file, save_mesh
+from slideviz.session.jobs import Job, open_file, save_mesh
 
 
 def test_a_binary_mesh_is_opened_and_saved(tmp_path):
     write_sample("square", tmp_path, 8, file_format="su2b")
-    session = open_file(tmp_path / "square.cfg", None, lambda _: None, lambda: False).session
+    session = open_file(tmp_path / "square.cfg", None, Job()).session
     mesh = session.mesh
     assert usual_ending(mesh) == ".su2b"
     assert usual_ending(sv.Mesh(mesh.points, mesh.cells)) == ".su2"
     filters = questions.mesh_filters(mesh)
     assert "SU2 binary (keeps all markers) (*.su2b)" in filters
-    saved = save_mesh(tmp_path / "saved.su2b", session.frame, False, lambda _: None, lambda: False)
+    saved = save_mesh(tmp_path / "saved.su2b", session.frame, False, Job())
     assert saved.read_bytes() == (tmp_path / "mesh.su2b").read_bytes()
     assert np.array_equal(sv.read(saved).points, mesh.points)
 

@@ -253,7 +253,7 @@ def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     gc.unfreeze()
     order.clear()
     runner = JobRunner()
-    runner.start(lambda report, stopped: order.append("job"))
+    runner.start(lambda job: order.append("job"))
     qtbot.waitUntil(lambda: not runner.busy)
     plot_canvas.draw_in_thread(
         lambda *_: order.append("plot"),

@@ -96,11 +96,11 @@ class Counter:
 
 def test_every_part_of_opening_asks_whether_to_stop(case_file):
     never = Counter(10**9)
-    jobs.open_file(case_file, None, lambda _: None, never)
+    jobs.open_file(case_file, None, jobs.Job(stopped=never))
     assert never.asked > 10
     for stop_at in range(1, never.asked + 1):
         with pytest.raises(Cancelled, match="stopped on request"):
-            jobs.open_file(case_file, None, lambda _: None, Counter(stop_at))
+            jobs.open_file(case_file, None, jobs.Job(stopped=Counter(stop_at)))
 
 
 def test_pairs_and_quality_can_be_stopped_inside(case_file):
@@ -118,9 +118,9 @@ def test_pairs_and_quality_can_be_stopped_inside(case_file):
 def test_a_stopped_save_leaves_the_old_file(case_file, tmp_path):
     target = tmp_path / "out.su2"
     target.write_text("old")
-    opened = jobs.open_file(case_file, None, lambda _: None, lambda: False)
+    opened = jobs.open_file(case_file, None, jobs.Job())
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.save_mesh(target, opened.session.first, False, lambda _: None, lambda: True)
+        jobs.save_mesh(target, opened.session.first, False, jobs.Job(stopped=lambda: True))
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
 
@@ -150,7 +150,7 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
     monkeypatch.setattr(worker, "CLOSING_S", 0.05)
     driver.open(case_file)
     go = threading.Event()
-    driver.window.running.start_job("Deaf", lambda _: None, lambda report, stopped: go.wait(100))
+    driver.window.running.start_job("Deaf", lambda _: None, lambda job: go.wait(100))
     try:
         assert driver.window.close()
         assert driver.window.left_behind

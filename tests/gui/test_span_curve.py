@@ -136,7 +136,7 @@ def editor(driver, tmp_path):
     roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
     case = Case(roles=roles, periodic_type="rotational")
     made = passage((4, 6, 8), 30.0), tmp_path / "ring.su2", case
-    driver.window.show_opened(jobs.prepare(*made, lambda _: None, lambda: False))
+    driver.window.show_opened(jobs.prepare(*made, jobs.Job()))
     driver.add_motion(SpanMotion)
     return driver.window.motions.editor
 

@@ -65,7 +65,7 @@ def test_large_samples_open_small_and_the_size_in_their_words_is_what_opens(
     )
     for name, words in window.files.samples.items():
         with pytest.raises(StopIteration):  # as nothing was written
-            jobs.open_sample(name, tmp_path, lambda _: None, lambda: False)
+            jobs.open_sample(name, tmp_path, jobs.Job())
         size = made[-1][1] or SAMPLES[name].size
         assert words.endswith(f"({size})")
         assert words in window.start.sample_buttons[name].toolTip()
@@ -91,7 +91,7 @@ def test_open_begins_in_the_folder_of_the_mesh(driver, sample_folder, answers, s
 
 def test_a_sample_can_be_cancelled_while_it_is_made(small):
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.open_sample("passage", small, lambda _: None, lambda: True)
+        jobs.open_sample("passage", small, jobs.Job(stopped=lambda: True))
 
 
 def test_the_page_says_what_is_being_opened(driver, small):

@@ -45,7 +45,9 @@ def test_cancelled_steps_leave_no_file(ran, tmp_path):
     said = []
     with pytest.raises(Cancelled, match="stopped on request"):
         jobs.save_steps(
-            tmp_path / "s.vtkhdf", ran.session.frames[1:], said.append, lambda: len(said) > 0
+            tmp_path / "s.vtkhdf",
+            ran.session.frames[1:],
+            jobs.Job(said.append, lambda: len(said) > 0),
         )
     assert not list(tmp_path.glob("*.vtkhdf"))
     assert not list(tmp_path.glob(".slideviz-*"))

@@ -22,8 +22,8 @@ def work(monkeypatch):
     class Work:
         compile, end, stopped = Event(), Event(), None
 
-        def __call__(self, compiling, stopped):
-            self.stopped, self.thread = stopped, current_thread()
+        def __call__(self, compiling, job):
+            self.stopped, self.thread = job.stopped, current_thread()
             assert self.compile.wait(100)
             compiling()
             compiling()

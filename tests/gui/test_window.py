@@ -359,7 +359,7 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
     opened.window.store.change(changes.set_case, motions=())
     asked = []
 
-    def listening(case, mesh, report, stopped):
+    def listening(case, mesh, job):
         asked.append(case.motions[0].vector[1])
         return "", ""
 

@@ -4,7 +4,6 @@ import pytest
 
 from slideviz.errors import Cancelled, DeformError
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.session.jobs import JobProgress
 
 
 @pytest.fixture
@@ -35,7 +34,7 @@ def finish(qtbot, runner):
 
 def test_a_job_ends_with_finished_in_the_windows_thread(runner, qtbot):
     ears = Ears(runner)
-    runner.start(lambda a, b, report, stopped: a + b, 2, 3)
+    runner.start(lambda a, b, job: a + b, 2, 3)
     finish(qtbot, runner)
     assert ears.ends == [("finished", 5)]
     assert ears.threads == {threading.main_thread()}
@@ -46,12 +45,12 @@ def test_every_kept_item_is_delivered_before_the_end_and_only_the_newest_news(ru
     runner.yielded.connect(lambda items: order.append(len(items)))
     runner.finished.connect(lambda _: order.append("end"))
 
-    def job(report, stopped):
+    def work(job):
         for i in range(500):
-            report(JobProgress(str(i), i / 500))
-            report(i)
+            job.progress(str(i), i / 500)
+            job.report(i)
 
-    runner.start(job)
+    runner.start(work)
     finish(qtbot, runner)
     assert ears.kept == list(range(500))
     assert ears.doing[-1].text == "499"
@@ -62,13 +61,13 @@ def test_every_kept_item_is_delivered_before_the_end_and_only_the_newest_news(ru
 def test_cancel_ends_a_job_with_cancelled_only(runner, qtbot):
     ears, started = Ears(runner), threading.Event()
 
-    def job(report, stopped):
+    def work(job):
         started.set()
-        while not stopped():
+        while not job.stopped():
             pass
         raise Cancelled("stopped")
 
-    runner.start(job)
+    runner.start(work)
     assert started.wait(100)
     runner.cancel()
     finish(qtbot, runner)
@@ -79,20 +78,20 @@ def test_cancel_ends_a_job_with_cancelled_only(runner, qtbot):
 def test_whatever_goes_wrong_is_told_once(runner, qtbot, error):
     ears = Ears(runner)
 
-    def job(report, stopped):
+    def work(job):
         raise error
 
-    runner.start(job)
+    runner.start(work)
     finish(qtbot, runner)
     assert ears.ends == [("failed", error)]
 
 
 def test_the_next_job_is_not_cancelled_by_the_last_one(runner, qtbot):
     ears = Ears(runner)
-    runner.start(lambda report, stopped: 1)
+    runner.start(lambda job: 1)
     runner.cancel()
     finish(qtbot, runner)
-    runner.start(lambda report, stopped: stopped())
+    runner.start(lambda job: job.stopped())
     finish(qtbot, runner)
     assert ears.ends[-1] == ("finished", False)
 
@@ -101,12 +100,12 @@ def test_closing_stops_the_job_and_waits_for_it(qtbot):
     runner, ended = JobRunner(), threading.Event()
     ears = Ears(runner)
 
-    def job(report, stopped):
-        while not stopped():
+    def work(job):
+        while not job.stopped():
             pass
         ended.set()
 
-    runner.start(job)
+    runner.start(work)
     runner.close()
     assert ended.is_set()
     qtbot.wait(30)

@@ -22,7 +22,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.inspect import cell_at, cell_centers, cell_info, worst_cells
-from slideviz.session.jobs import save_quality
+from slideviz.session.jobs import Job, save_quality
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import METRICS
@@ -302,7 +302,7 @@ def test_the_window_names_cells_of_the_file(folded, hexagons, tmp_path):
     assert (info.jacobians < 0).any()
     session = changes.mark_cell(session, cell)
     assert mark_words(session) == f"cell {info.cell}: inverted"
-    save_quality(tmp_path / "w.csv", frame, lambda _: None, lambda: False)
+    save_quality(tmp_path / "w.csv", frame, Job())
     rows = list(csv.DictReader((tmp_path / "w.csv").read_text().splitlines()))
     assert len(rows) == 18
     assert {int(row["cell"]) for row in rows if row["status"] == "inverted"} == cells

@@ -16,12 +16,6 @@ from slideviz.session.run_messages import preview_words
 from slideviz.session.state import StepFrame, second_view
 from tests import builders
 
-NEVER = bool
-
-
-def silent(_):
-    pass
-
 
 def opened(**settings):
     mesh = builders.square(8)
@@ -34,18 +28,18 @@ def turned(session, angle):
 
 
 def fields_of(session):
-    return jobs.make_live_fields(session.case, session.mesh, silent, NEVER)
+    return jobs.make_live_fields(session.case, session.mesh, jobs.Job())
 
 
 def previewed(session, fields, run=None):
-    fields, preview = jobs.make_preview(fields, session.case, run, silent, NEVER)
+    fields, preview = jobs.make_preview(fields, session.case, run, jobs.Job())
     return fields, changes.show_preview(session, preview)
 
 
 def ran(session, **values):
     session = changes.start_run(session, **values)
     frames = []
-    jobs.compute(session.case, session.mesh, frames.append, NEVER)
+    jobs.compute(session.case, session.mesh, jobs.Job(frames.append))
     frames = [one for one in frames if isinstance(one, StepFrame)]
     return changes.add_frames(session, frames)
 
@@ -137,7 +131,7 @@ def test_no_preview_where_there_can_be_none(monkeypatch):
     session = opened()
     other = changes.set_case(session, influence_factor=1.5)
     fields = fields_of(session)
-    assert jobs.make_preview(fields, other.case, None, silent, NEVER) == (fields, None)
+    assert jobs.make_preview(fields, other.case, None, jobs.Job()) == (fields, None)
     monkeypatch.setattr(live_fields, "MOST", 0)
     assert fields_of(session) is None
 
@@ -145,6 +139,6 @@ def test_no_preview_where_there_can_be_none(monkeypatch):
 def test_it_can_be_stopped():
     session = opened()
     with pytest.raises(Cancelled):
-        jobs.make_live_fields(session.case, session.mesh, silent, lambda: True)
+        jobs.make_live_fields(session.case, session.mesh, jobs.Job(stopped=lambda: True))
     with pytest.raises(Cancelled):
-        jobs.make_preview(fields_of(session), session.case, None, silent, lambda: True)
+        jobs.make_preview(fields_of(session), session.case, None, jobs.Job(stopped=lambda: True))

@@ -19,7 +19,7 @@ from slideviz.session.design_table import (
     values_of,
     write_results,
 )
-from slideviz.session.jobs import JobProgress, run_designs
+from slideviz.session.jobs import Job, JobProgress, run_designs
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_only_what_has_no_result_is_run(passage, monkeypatch):
     monkeypatch.setattr(sweeping, "Processes", type("Thread", (), {"__new__": made}))
     table = DesignTable().crossed("STEPS", ["1", "2", "3"]).with_results([DesignRow(2, min=0.5)])
     told = []
-    run_designs(passage.case, passage.mesh, table, told.append, lambda: False)
+    run_designs(passage.case, passage.mesh, table, Job(told.append))
     rows = [one for one in told if isinstance(one, DesignRow)]
     assert sorted((row.design, row.steps) for row in rows) == [(1, 1), (3, 3)]
     news = [one for one in told if isinstance(one, JobProgress)]
@@ -144,8 +144,7 @@ def test_it_can_be_stopped(passage):
             passage.case,
             passage.mesh,
             DesignTable().crossed("STEPS", ["1"]),
-            lambda _: None,
-            lambda: True,
+            Job(stopped=lambda: True),
         )
 
 

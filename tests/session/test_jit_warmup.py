@@ -4,6 +4,7 @@ from slideviz.baselines import idw
 from slideviz.elastic import laplacian, stiffness
 from slideviz.rbf import closest, compiled
 from slideviz.session import jit_warmup
+from slideviz.session.jobs import Job
 
 
 def signatures():
@@ -16,7 +17,7 @@ def signatures():
 
 
 def test_it_makes_the_loops_ready_that_runs_use():
-    jit_warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, Job())
     ready = signatures()
     for name in ("fill_matrix", "sum_plain", "_build", "_query"):
         assert ready[name], name
@@ -25,9 +26,9 @@ def test_it_makes_the_loops_ready_that_runs_use():
 
 
 def test_nothing_is_told_when_nothing_is_compiled():
-    jit_warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, Job())
     told = []
-    jit_warmup.warm_up(lambda: told.append(1), lambda: False)
+    jit_warmup.warm_up(lambda: told.append(1), Job())
     assert not told
 
 
@@ -40,12 +41,12 @@ def test_compilation_is_told():
     def fresh(x):
         return x + 1
 
-    def deform(name, sliding, stopped):
+    def deform(name, sliding, job):
         fresh(len(name))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jit_warmup, "_deform", deform)
-        jit_warmup.warm_up(lambda: told.append(1), lambda: False)
+        jit_warmup.warm_up(lambda: told.append(1), Job())
     assert told
 
 
@@ -54,12 +55,12 @@ def test_it_stops_when_asked_and_swallows_what_the_run_would_tell(monkeypatch):
 
     done = []
 
-    def deform(name, sliding, stopped):
+    def deform(name, sliding, job):
         done.append(name)
         raise CaseError("wrong")
 
     monkeypatch.setattr(jit_warmup, "_deform", deform)
-    jit_warmup.warm_up(lambda: None, lambda: True)
+    jit_warmup.warm_up(lambda: None, Job(stopped=lambda: True))
     assert not done
-    jit_warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, Job())
     assert len(done) == 1

@@ -13,13 +13,9 @@ from slideviz.session.state import StepFrame
 from tests.builders import passage
 
 
-def never():
-    return False
-
-
 def test_opening_a_case_gives_mesh_roles_pairs_and_quality(kept_passage):
     heard = []
-    opened = jobs.open_file(kept_passage / "passage.cfg", None, heard.append, never)
+    opened = jobs.open_file(kept_passage / "passage.cfg", None, jobs.Job(heard.append))
     session = opened.session
     assert session.role("airfoil") == "moving"
     assert session.path == session.case.mesh_file
@@ -33,20 +29,20 @@ def test_opening_a_case_gives_mesh_roles_pairs_and_quality(kept_passage):
 
 def test_opening_can_be_stopped(kept_passage):
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.open_file(kept_passage / "mesh.su2", None, lambda _: None, lambda: True)
+        jobs.open_file(kept_passage / "mesh.su2", None, jobs.Job(stopped=lambda: True))
 
 
 def test_a_case_without_a_mesh_is_refused(tmp_path):
     file = tmp_path / "a.cfg"
     Case(roles={"a": "moving"}, motions=(Translate("a", (1.0, 0.0)),)).write(file)
     with pytest.raises(CaseError, match="MESH_FILENAME"):
-        jobs.open_file(file, None, lambda _: None, never)
+        jobs.open_file(file, None, jobs.Job())
 
 
 def test_computing_reports_every_step_with_its_quality(kept_passage):
     case = Case.read(kept_passage / "passage.cfg").change(steps=3)
     mesh, heard = read(case.mesh_file), []
-    jobs.compute(case, mesh, heard.append, never)
+    jobs.compute(case, mesh, jobs.Job(heard.append))
     frames = [item for item in heard if isinstance(item, StepFrame)]
     assert [frame.step.index for frame in frames] == [1, 2, 3]
     assert frames[-1].quality.min < 1.0
@@ -58,7 +54,7 @@ def test_computing_reports_every_step_with_its_quality(kept_passage):
 def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(kept_passage):
     case = Case.read(kept_passage / "passage.cfg").change(steps=0)
     heard = []
-    jobs.compute(case, read(case.mesh_file), heard.append, never)
+    jobs.compute(case, read(case.mesh_file), jobs.Job(heard.append))
     frames = [item for item in heard if isinstance(item, StepFrame)]
     assert len(frames) == frames[-1].step.total
     texts = [item.text for item in heard if isinstance(item, jobs.JobProgress)]
@@ -77,17 +73,17 @@ def test_computing_stops_when_asked_and_keeps_what_was_reported(kept_passage):
             frames.append(item)
 
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.compute(case, read(case.mesh_file), report, lambda: len(frames) >= 2)
+        jobs.compute(case, read(case.mesh_file), jobs.Job(report, lambda: len(frames) >= 2))
     assert len(frames) == 2
 
 
 def test_a_mesh_is_saved_with_quality_where_there_is_room(tmp_path, passage):
     import meshio
 
-    opened = jobs.prepare(passage.mesh, None, passage.case, lambda _: None, never)
+    opened = jobs.prepare(passage.mesh, None, passage.case, jobs.Job())
     frame = opened.session.frame
-    jobs.save_mesh(tmp_path / "a.su2", frame, False, lambda _: None, never)
-    jobs.save_mesh(tmp_path / "a.vtu", frame, False, lambda _: None, never)
+    jobs.save_mesh(tmp_path / "a.su2", frame, False, jobs.Job())
+    jobs.save_mesh(tmp_path / "a.vtu", frame, False, jobs.Job())
     assert np.array_equal(read(tmp_path / "a.su2").points, passage.mesh.points)
     stored = np.concatenate(meshio.read(tmp_path / "a.vtu").cell_data["size_skew"])
     # The lines of the boundaries are in the file, too, and have no quality.
@@ -99,7 +95,7 @@ def test_a_broken_file_is_one_error(tmp_path):
     file = tmp_path / "bad.su2"
     file.write_text("NDIME= 2\nNELEM= many\n")
     with pytest.raises(MeshError, match=r"bad\.su2:2"):
-        jobs.open_file(file, None, lambda _: None, never)
+        jobs.open_file(file, None, jobs.Job())
 
 
 def test_ghosts_are_where_the_motions_lead(passage):
@@ -160,9 +156,9 @@ def test_a_wheel_is_written_whole_or_not_at_all(tmp_path):
     case, heard = Case(roles=roles, periodic_type="rotational"), []
     values = path, case, mesh, StepFrame(mesh, quality(mesh)), "all", False
     with pytest.raises(Cancelled, match="stopped on request"):
-        jobs.save_wheel(*values, heard.append, lambda: True)
+        jobs.save_wheel(*values, jobs.Job(heard.append, lambda: True))
     assert not list(tmp_path.iterdir())
-    made = jobs.save_wheel(*values, heard.append, never)
+    made = jobs.save_wheel(*values, jobs.Job(heard.append))
     assert (made.passages, made.points) == (9, len(read(path).points))
     fractions = [doing.fraction for doing in heard]
     assert fractions == sorted(fractions)

@@ -19,6 +19,7 @@ from slideviz.mesh.quality import quality
 from slideviz.sections import span as sections
 from slideviz.session import changes
 from slideviz.session.jobs import (
+    Job,
     find_intersection,
     forget_intersection,
     intersection_key,
@@ -34,7 +35,7 @@ from tests.builders import passage as wheel_passage
 
 
 def look(case, mesh, stopped=False):
-    text, folding = find_intersection(case, mesh, lambda _: None, lambda: stopped)
+    text, folding = find_intersection(case, mesh, Job(stopped=lambda: stopped))
     assert not folding
     return text
 
@@ -90,7 +91,7 @@ def test_boundaries_that_disagree_about_a_node_are_told(square):
     case = Case(roles=roles, motions=motions)
     assert "bottom" in look(case, square)
     alike = case.change(motions=(motions[0], Translate("left", (0.1, 0.0))))
-    text, said = find_intersection(alike, square, lambda _: None, lambda: False)
+    text, said = find_intersection(alike, square, Job())
     assert text == ""
     assert "of bottom at (4.1, 0) has left right by 0.1, which is fixed; let that" in str(said)
 
@@ -119,7 +120,7 @@ def test_what_the_first_motion_and_section_over_the_span_need_is_computed_before
     roles = {"blade": "moving", "per1": "periodic", "per2": "periodic"}
     case = Case(roles=roles, periodic="moving", sliding="ps")
     twist = case.change(motions=(SpanMotion("blade", "twist", (0.0, 1.0), (0.0, 3.0)),))
-    find_intersection(case, mesh, lambda _: None, lambda: False)
+    find_intersection(case, mesh, Job())
     monkeypatch.setattr(span_field, "_span_between", None)
     monkeypatch.setattr(span_field, "SpanCurves", None)
     monkeypatch.setattr(span_motions, "BladeSections", None)
@@ -140,7 +141,7 @@ def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
         "".join(f"{n} 0 {-0.3 if up else 0}\n" for n, up in zip(nodes, upper, strict=True))
     )
     case = Case(roles={"airfoil": "moving"}, motions=(FromFile(file, "airfoil"),))
-    text, folding = find_intersection(case, mesh, lambda _: None, lambda: False)
+    text, folding = find_intersection(case, mesh, Job())
     assert text == ""
     assert str(folding).startswith("airfoil goes through itself near (")
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
@@ -174,7 +175,7 @@ def test_the_verdict_is_that_of_the_run(kinds, steps, interfaces, alike):
         if roles[name] == "moving"
     )
     case = Case(roles=roles, motions=motions, interfaces=interfaces, relax="no", layers="no")
-    text, _ = find_intersection(case, mesh, lambda _: None, lambda: False)
+    text, _ = find_intersection(case, mesh, Job())
     refusal = ""
     try:
         deque(deform(case, mesh), 0)

@@ -7,14 +7,14 @@ import numpy as np
 from slideviz.case.limits import read_limits
 from slideviz.case.model import Case
 from slideviz.mesh.quality import quality, quality_totals
-from slideviz.session.jobs import check_frame
+from slideviz.session.jobs import Job, check_frame
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame, result_settings
 from tests.builders import grid
 
 
 def checked(session):
-    found = check_frame(session.frame, session.mesh, session.case, print, lambda: False)
+    found = check_frame(session.frame, session.mesh, session.case, Job(print))
     return replace(session, checked=found)
 
 
@@ -54,7 +54,7 @@ def test_a_mesh_in_its_file_has_the_numbers_of_all_cells_and_the_cells_in_memory
         extra=StepFrame(worst, quality(worst, mesh)),
     )
     case = Case(limits="min > 0.95, mean > 0.4, size > 0.5")
-    found = check_frame(frame, mesh, case, print, lambda: False)
+    found = check_frame(frame, mesh, case, Job(print))
     low, mean = found.results
     assert low.actual == 0.1
     assert mean.actual == 0.5

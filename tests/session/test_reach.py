@@ -34,7 +34,7 @@ def session(request):
     case = made.case.change(sliding="none", periodic="none", steps=request.param)
     first = StepFrame(made.mesh, sv.quality(made.mesh))
     found = []
-    jobs.compute(case, made.mesh, found.append, lambda: False)
+    jobs.compute(case, made.mesh, jobs.Job(found.append))
     frames = [one for one in found if isinstance(one, StepFrame)]
     session = changes.start_run(open_mesh(first, None, (), case))
     return changes.end_run(changes.add_frames(session, frames), "done")
@@ -80,7 +80,7 @@ def test_the_curve_ends_where_the_first_cell_folds(session):
 
 def test_after_a_repair_the_path_ends_at_the_repaired_mesh(session):
     run, mesh, found = session.run_shown, session.frames[0].mesh, []
-    jobs.repair(run.case, mesh, run.frames, found.append, lambda: False)
+    jobs.repair(run.case, mesh, run.frames, jobs.Job(found.append))
     frames = [one for one in found if isinstance(one, StepFrame)]
     (*_, whole) = sv.deform(run.case.change(repair="yes"), mesh, certify=True)
     assert frames[-1].step.safe == whole.safe

@@ -26,7 +26,7 @@ from slideviz.session.saving import view_to_case
 from slideviz.session.session_file import MissingMeshError, digest, stored_session, write_session
 from slideviz.session.state import StepFrame
 
-NOBODY = (lambda _: None, lambda: False)
+NOBODY = jobs.Job()
 CAMERA = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5)
 
 
@@ -34,7 +34,7 @@ def run(session, name="", **settings):
     """The session with a run of its case with other settings."""
     found = []
     case = session.case.change(**settings)
-    jobs.compute(case, session.mesh, found.append, lambda: False)
+    jobs.compute(case, session.mesh, jobs.Job(found.append))
     frames = [one for one in found if isinstance(one, StepFrame)]
     session = changes.add_frames(changes.start_run(session, case, name), frames)
     return changes.end_run(session, "done")
@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
 def left(folder):
     """A session as somebody left it: three runs, designs, sections, a selection."""
     case = next(folder.glob("*.cfg"))
-    session = jobs.open_file(case, None, *NOBODY).session
+    session = jobs.open_file(case, None, NOBODY).session
     session = run(session, steps=2, limits=())
     session = run(session, "design 1", sliding="ds", steps=1)
     session = run(session, steps=3, repair="yes", repair_below=0.9)
@@ -74,7 +74,7 @@ def designs():
 
 def save(path, session, designs=None, copied=()):
     table = designs or DesignTable()
-    return jobs.save_session(path, session, (table, session.case), CAMERA, copied, *NOBODY)
+    return jobs.save_session(path, session, (table, session.case), CAMERA, copied, NOBODY)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def file(folder, left, designs):
 
 
 def opened(path, **named):
-    return jobs.open_file(path, None, *NOBODY, **named)
+    return jobs.open_file(path, None, NOBODY, **named)
 
 
 def same(one, other):
@@ -185,7 +185,7 @@ def test_the_mesh_beside_it_is_taken_first_and_without_one_a_sentence_names_it(
     assert opened(alone).session.path == tmp_path / "mesh.su2"
     far = tmp_path / "far"
     far.mkdir()
-    session = jobs.open_file(next(folder.glob("*.cfg")), None, *NOBODY).session
+    session = jobs.open_file(next(folder.glob("*.cfg")), None, NOBODY).session
     saved = save(far / "d.slideviz", session)
     shutil.copy(folder / "mesh.su2", far)
     assert opened(saved).session.path == far / "mesh.su2"
@@ -238,7 +238,7 @@ def test_it_is_written_whole_or_not_at_all(left, designs, tmp_path):
     calls = iter([False, False, True])
     kept = (designs, left.case)
     with pytest.raises(Cancelled):
-        jobs.save_session(path, left, kept, None, (), lambda _: None, lambda: next(calls))
+        jobs.save_session(path, left, kept, None, (), jobs.Job(stopped=lambda: next(calls)))
     assert path.read_text() == "before"
     with pytest.raises(CaseError, match="the folder does not exist"):
         write_session(tmp_path / "no" / "g.slideviz", left, stored_session(left, *kept), None)

@@ -14,7 +14,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
-from slideviz.session.jobs import find_intersection
+from slideviz.session.jobs import Job, find_intersection
 from slideviz.solver import intersection
 from slideviz.solver.intersection import folding_message, jump_message
 from slideviz.solver.intersection import intersection_message as message
@@ -117,7 +117,7 @@ def test_a_jump_over_a_wall_inside_is_refused():
     assert "move one less, around other in several runs, or let other move with it" in text
     with pytest.raises(CaseError, match="takes one through other near"):
         next(sv.deform(case, mesh))
-    said, _ = find_intersection(case, mesh, lambda _: None, lambda: False)
+    said, _ = find_intersection(case, mesh, Job())
     assert said.startswith("The motion takes one through other near")
     assert jump_message(*moved(case, mesh, Translate("one", (2.0, 0.4)))) is None
     both = case.change(roles=roles | {"other": "moving"})

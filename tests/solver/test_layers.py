@@ -393,7 +393,7 @@ def test_first_heights_that_changed_much_are_a_warning_with_wall_place_and_remed
     report = json.loads((tmp_path / "report.json").read_text())
     said = [text for text in report["warnings"] if "the first height" in text]
     frames = []
-    jobs.compute(case, mesh, frames.append, lambda: False)
+    jobs.compute(case, mesh, jobs.Job(frames.append))
     ended = Run(1, case, tuple(x for x in frames if isinstance(x, StepFrame)), "done")
     shown = [text for text in remarks_of(ended, "warning") if "the first height" in text]
     assert len(said) == len(shown) == (remedy is not None)

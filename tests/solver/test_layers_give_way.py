@@ -116,7 +116,7 @@ def test_layers_that_give_way_are_in_the_report_the_summary_and_the_window(tmp_p
     assert said[0].startswith(f"the layers at low gave way, to {walls['low',]['height']:.3g} times")
     assert said[0] in capsys.readouterr().err
     frames = []
-    jobs.compute(case, mesh, frames.append, lambda: False)
+    jobs.compute(case, mesh, jobs.Job(frames.append))
     ended = Run(1, case, tuple(each for each in frames if isinstance(each, StepFrame)), "done")
     shown = [text for text in remarks_of(ended, "warning") if "gave way" in text]
     assert [text.split(";")[0] for text in shown] == [text.split(";")[0] for text in said]

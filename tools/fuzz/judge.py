@@ -179,7 +179,7 @@ def _ran(words: list[str]) -> tuple[int, str, str]:
 
 def _session(path: Path) -> int:
     try:
-        opened = jobs.open_file(path, None, lambda _: None, lambda: False)
+        opened = jobs.open_file(path, None, jobs.Job())
     except SlidevizError as problem:
         print(f"slideviz: {problem}", file=sys.stderr)  # noqa: T201
         return 1

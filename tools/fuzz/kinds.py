@@ -300,12 +300,12 @@ def _sensitivities(folder: Path) -> Sequence[bytes]:
 
 def _sessions(folder: Path) -> Sequence[bytes]:
     """Return sessions with runs, sections and designs."""
-    nobody = (lambda _: None, lambda: False)
+    nobody = jobs.Job()
     case = Case.read(folder / CASE)
-    session = jobs.open_file(folder / CASE, None, *nobody).session
+    session = jobs.open_file(folder / CASE, None, nobody).session
     for steps in (1, 2):
         found: list[object] = []
-        jobs.compute(case.change(steps=steps), session.mesh, found.append, lambda: False)
+        jobs.compute(case.change(steps=steps), session.mesh, jobs.Job(found.append))
         frames = [one for one in found if isinstance(one, StepFrame)]
         session = changes.start_run(session, case.change(steps=steps), "")
         session = changes.end_run(changes.add_frames(session, frames), "done")
@@ -316,7 +316,7 @@ def _sessions(folder: Path) -> Sequence[bytes]:
     made = []
     for copied in ((), [folder / MESH]):
         path = jobs.save_session(
-            folder / "made.slideviz", session, (table, case), camera, copied, *nobody
+            folder / "made.slideviz", session, (table, case), camera, copied, nobody
         )
         made.append(path.read_bytes())
     return made

@@ -27,6 +27,7 @@ from slideviz.gui.responsiveness.timers import (
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
 from slideviz.session import jit_warmup
+from slideviz.session.jobs import Job
 from slideviz.system import platform
 from slideviz.system.jit_cache import compilation_watched
 
@@ -88,7 +89,7 @@ class WarmupThread(QObject):
     def _run(self) -> None:
         # Numba's threads are started here, and inherit this thread's low priority.
         try:
-            jit_warmup.warm_up(self._compilation_begun, self._stop.is_set)
+            jit_warmup.warm_up(self._compilation_begun, Job(stopped=self._stop.is_set))
         except RuntimeError:  # the interpreter shuts down, and no thread pool takes work
             if not self._stop.is_set():
                 raise

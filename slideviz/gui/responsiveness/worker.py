@@ -20,7 +20,7 @@ from qtpy.QtCore import QObject, Qt, QTimer, Signal
 from slideviz.errors import Cancelled
 from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.gui.responsiveness.timers import CLOSING_S, NEWS_S, TURN_MS, single_shot
-from slideviz.session.jobs import JobProgress, raise_if_cancelled
+from slideviz.session.jobs import Job, JobProgress
 from slideviz.session.pieces import InThread
 
 
@@ -96,17 +96,17 @@ def reraise(error: Exception) -> None:
     raise error
 
 
-def _call(piece: InThread, _report: object, stopped: Callable[[], bool]) -> Any:
-    return piece.call(partial(raise_if_cancelled, stopped))
+def _call(piece: InThread, job: Job) -> Any:
+    return piece.call(job.going_on)
 
 
 log = logging.getLogger("slideviz")
 
 
 class JobRunner(QObject):
-    """Runs jobs, ``function(*values, report, stopped)``, in a thread, one at a time.
+    """Runs jobs, ``function(*values, job)``, in a thread, one at a time.
 
-    A job calls ``report(item)`` for its signals, and ``stopped()``, which is True after `cancel`.
+    Its `Job` reports for the signals, and is stopped after `cancel`.
     """
 
     progressed = Signal(object)  # JobProgress
@@ -162,7 +162,7 @@ class JobRunner(QObject):
 
     def _run(self, stop: Event, function: Callable[..., Any], *values: Any) -> None:
         try:
-            end = ("finished", function(*values, self._report, stop.is_set))
+            end = ("finished", function(*values, Job(self._report, stop.is_set)))
         except Cancelled:
             end = ("cancelled", None)
         except Exception as error:
