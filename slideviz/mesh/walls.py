@@ -441,8 +441,8 @@ class Walls:
     cells."""
     markers: tuple[str, ...]
     """The boundaries that `summary` reports."""
-    n_cells: int
-    """Number of cells of the mesh."""
+    file_cells: IntArray
+    """Number (m,) of the file's cell that each cell of the mesh is in."""
 
     def of(self, markers: Sequence[str]) -> Walls:
         """Return the same with some of the boundaries that were measured to be reported.
@@ -491,17 +491,17 @@ class Walls:
         """
         values = (self.before or {})[name] if before else self.values[name]
         columns = self.columns
-        out = np.full(self.n_cells, np.nan)
+        out = np.full(len(self.file_cells), np.nan)
         names = columns.boundary.names
         chosen = np.isin(columns.boundary.marker, [names.index(m) for m in self.markers])
         corner = columns.corner[chosen]
-        cell = np.repeat(columns.boundary.owner[chosen], corner.shape[1])
+        cell = np.repeat(self.file_cells[columns.boundary.owner[chosen]], corner.shape[1])
         value = values[corner.ravel()]
         some = ~np.isnan(value)
         with np.errstate(all="ignore"):
             order = np.argsort(BADNESS[name](value[some]), kind="stable")
         out[cell[some][order]] = value[some][order]  # of equal cells the last one stays
-        return out
+        return out[self.file_cells]
 
 
 def _ratio_badness(ratio: FloatArray) -> FloatArray:
@@ -632,4 +632,5 @@ def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | No
         with np.errstate(all="ignore"):
             after["height_ratio"] = sealed(after["first_height"] / before["first_height"])
         after["angle_change"] = sealed(np.abs(after["wall_angle"] - before["wall_angle"]))
-    return Walls(columns, after, before, layered, chosen, len(mesh.cells))
+    cells = mesh.file_cells(np.arange(len(mesh.cells)))
+    return Walls(columns, after, before, layered, chosen, cells)

@@ -17,6 +17,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.polyhedra import outlines
 from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces, is_closed
+from slideviz.mesh.walls import walls
 from slideviz.scene.actors import CELL, POINT, part_shape
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -241,6 +242,16 @@ def test_a_polyhedron_has_the_worst_value_of_all_its_nodes(hexagons, name):
         mine = np.flatnonzero(hexagons.whole_cells == number)
         nodes = np.concatenate([parts[part] for part in mine])
         assert {*found.of_cells[mine]} == {worst(found.values[nodes])}
+
+
+def test_all_parts_of_a_polyhedron_at_a_wall_have_its_value(hexagons):
+    found = walls(hexagons, markers=["ends"])
+    heights = found.at_cells("first_height")
+    assert len(found.columns.boundary.owner)
+    for owner in found.columns.boundary.owner:
+        mine = hexagons.whole_cells == hexagons.whole_cells[owner]
+        assert len({*heights[mine]}) == 1
+        assert np.isfinite(heights[mine]).all()
 
 
 def test_messages_have_numbers_of_the_files_cells(folded, hexagons, tmp_path, capsys):
