@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
@@ -72,14 +72,13 @@ def test_a_run_mends_its_folded_cells_and_keeps_all_else():
 
 
 @given(angle=st.floats(5.0, 45.0), shift=st.floats(0.0, 0.1))
+@example(angle=10.0, shift=0.0)  # only a second round lifts
 @settings(max_examples=8, deadline=None)
 def test_after_relaxation_the_lowest_qualities_are_raised_and_the_mean_stays(angle, shift):
     mesh, case = folded(motions=(sv.Translate("", (shift, 0.0)), sv.Rotate("", angle)), relax="yes")
     plain, lifted = last(case, mesh), last(case.change(repair="yes"), mesh)
     before, after = (sv.quality(step.mesh, mesh) for step in (plain, lifted))
-    assert after.min >= before.min
-    enough = 0.9 * sv.quality(mesh, mesh).min  # above it hardly anything is left to raise
-    assert after.min > before.min or before.min >= enough
+    assert after.min > before.min
     assert after.mean >= before.mean - LOSS
     changed = (plain.mesh.points != lifted.mesh.points).any(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(changed), lifted.repaired.nodes)

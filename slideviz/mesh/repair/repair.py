@@ -596,7 +596,9 @@ class _Mending:
             before = self.best
             beta = np.full(len(self.signs), BETA / before.lowest)
             if spares:
-                beta[self.ratings(self.best_points) >= work.wanted] = 1.0 / work.wanted
+                rated = self.ratings(self.best_points)
+                spared = rated >= work.wanted
+                beta[spared] = np.maximum(1.0 / work.wanted, BETA / rated[spared])
             inverse = patch.curvature(LIFTED)
             edges = self._edges(patch)
 
