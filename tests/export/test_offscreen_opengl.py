@@ -56,6 +56,8 @@ def test_a_size_is_refused_first(monkeypatch):
 )
 def test_opengl_is_what_vtk_can_load(server, kind, there, able, monkeypatch):
     window = SimpleNamespace(GetClassName=lambda: kind)
+    # What is set here is taken back: pictures by EGL beside a window by GLX are black.
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     monkeypatch.setattr(offscreen, "needs_server", lambda: True)
     monkeypatch.setattr(offscreen, "has_x_server", lambda: server)
     monkeypatch.setattr(offscreen, "vtkRenderWindow", lambda: window)
