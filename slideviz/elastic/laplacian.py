@@ -57,7 +57,8 @@ positive definite."""
 
 CHUNKS = 16  # into how many parts long matrices are cut while they are made
 
-WEAK = 0.25, 0.1
+WEAK_FINEST = 0.25
+WEAK = 0.1
 """Entries of the finest matrix, and of others, that are weak: below this part of the geometric mean
 of the largest ones of both nodes. These share no aggregates then: in layers, which are columns."""
 
@@ -209,7 +210,8 @@ def _hierarchy(
     levels: list[LaplacianLevel] = []
     modes = free
     while len(modes) > COARSE:
-        up, modes_below = _prolongation(_strong(matrix, WEAK[len(levels) > 0]), modes)
+        strong = _strong(matrix, WEAK if levels else WEAK_FINEST)
+        up, modes_below = _prolongation(strong, modes)
         count = len(modes_below)
         down = _rearranged(up, lambda each: each.T.tocsr(), count)
         below = _product(down, _product(matrix, up, count), count)

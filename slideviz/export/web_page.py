@@ -6,6 +6,7 @@ Nothing in the page comes from a network; WebGL draws it, by ``web_page.html``.
 from __future__ import annotations
 
 import json
+import re
 from base64 import b64encode
 from dataclasses import dataclass, field
 from html import escape
@@ -92,15 +93,12 @@ def web_page(scene: Scene, session: Session, title: str) -> str:
         "flat": flat,
     }
     parts = {
-        "@TITLE@": escape(title),
-        "@LEGEND@": _legend(scene, session),
-        "@HELP@": _MOVE if flat else _TURN,
-        "@DATA@": json.dumps(data),
+        "TITLE": escape(title),
+        "LEGEND": _legend(scene, session),
+        "HELP": _MOVE if flat else _TURN,
+        "DATA": json.dumps(data),
     }
-    text = _PAGE.read_text(encoding="utf-8")
-    for mark, part in parts.items():
-        text = text.replace(mark, part)
-    return text
+    return re.sub("@([A-Z]+)@", lambda mark: parts[mark[1]], _PAGE.read_text(encoding="utf-8"))
 
 
 def _add(groups: dict[str, _Group], actor: Any) -> None:

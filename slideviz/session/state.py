@@ -25,7 +25,7 @@ from slideviz.mesh.walls import Walls, walls
 from slideviz.solver.steps import Step, safe_fraction_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
-from slideviz.system.weak_cache import weak_cache
+from slideviz.system.weak_cache import WeakCache, weak_cache
 from slideviz.terms import (
     COLOR_BY,
     DIFFERENCES,
@@ -173,6 +173,7 @@ class StepFrame:
 
 _AT_WALLS: WeakKeyDictionary[StepFrame, dict[str, FloatArray]] = WeakKeyDictionary()
 """The number of walls that was asked for last, in the cells of frames."""
+_ENDS = WeakCache()  # of frames and quantities: the ends of differences from what lives elsewhere
 
 
 @record
@@ -626,7 +627,13 @@ class Session:
         # With a color range: `second_view` would ask for this one.
         view = replace(self.view, frame=len(self.frames) - 1, color_range=(0.0, 1.0))
         last = replace(self, view=view)
-        low, high = (last.frame and last.frame.ends(what, last.reference)) or (0.0, 0.0)
+        frame = last.frame
+        reference = last.reference
+        low = high = 0.0
+        if frame is not None and reference is not None:
+            known = _ENDS.of(frame, what, WeakCache)
+            ends = known.of(reference, None, lambda: frame.ends(what, reference))
+            low, high = ends or (low, high)
         most = round_up(max(-low, high)) or 1.0
         return (-most if COLOR_BY[what].color_map else 0.0), most
 

@@ -60,8 +60,11 @@ def write_tree(tree: h5py.File, mesh: Mesh) -> None:
         _add(one, "GridLocation", "GridLocation_t", "FaceCenter" if mesh.dim == 3 else "EdgeCenter")
         _add(one, "FamilyName", "FamilyName_t", family)
     names = {name for name, role in mesh.roles.items() if role == "periodic"}
-    pairs = [pair for pair in find_pairs(mesh) if names >= {pair.first, pair.second}]
-    sides = _add(zone, "ZoneGridConnectivity", "ZoneGridConnectivity_t") if pairs else zone
+    found = find_pairs(mesh) if names else ()
+    pairs = [pair for pair in found if names >= {pair.first, pair.second}]
+    if not pairs:
+        return
+    sides = _add(zone, "ZoneGridConnectivity", "ZoneGridConnectivity_t")
     for pair in pairs:
         _add_interface(sides, families[pair.first], pair, pair.nodes, 1.0)
         _add_interface(sides, families[pair.second], pair, pair.nodes[:, ::-1], -1.0)

@@ -28,6 +28,7 @@ from slideviz.gui.widgets.build import (
     LinkLabel,
     PanelScroll,
     dialog_buttons,
+    drop,
     in_column,
     in_row,
     push_button,
@@ -141,10 +142,7 @@ class Banner(Fitted, QFrame):
         self.show_message(text, full, answers=answers)
 
     def _offer(self, answers: Answers) -> None:
-        for button in self.answers.values():
-            self._row.removeWidget(button)
-            button.hide()
-            button.deleteLater()
+        drop(self._row, self.answers.values())
         self.answers = {}
         for name, function in answers.items():
             button = push_button(name, "", lambda _=False, function=function: function())
@@ -204,10 +202,7 @@ class MessageStrip(Fitted, QFrame):
 
         ``words``: how many there are. The list opens by itself for one that is not calm.
         """
-        for old in self.rows:
-            self._column.removeWidget(old)
-            old.hide()
-            old.deleteLater()
+        drop(self._column, self.rows)
         self.rows = []
         for text, calm, answers in rows:
             banner = Banner()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias, TypeVar
 
 from qtpy.QtCore import (
@@ -456,6 +456,14 @@ def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
     if align is not None:
         label.setAlignment(align)
     return label
+
+
+def drop(layout: QLayout, widgets: Iterable[QWidget]) -> None:
+    """Take widgets out of a layout for good."""
+    for widget in widgets:
+        layout.removeWidget(widget)
+        widget.hide()
+        widget.deleteLater()
 
 
 PolicyName = Literal["Fixed", "Preferred", "Expanding", "Ignored"]
